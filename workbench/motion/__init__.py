@@ -1,0 +1,1 @@
+"""Motions as tables of poses, and what they become on the bus."""

@@ -1,0 +1,59 @@
+"""What a file holds, untouched."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+from workbench.recording.take import BodyTrack
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Raw content of a recording, in SI and radians but otherwise as it stands in the file.
+
+    kind: "motive", "joint_log", "bam_log" or "sage". version: of the format, as the file says. rate: [Hz], NaN if irregular.
+    frames: (N,) frame numbers. time: (N,) [s] from the first frame. rigid_bodies: asset -> path in the capture's axes
+    (Motive: x forward up to a yaw, y up, z right). markers: name -> (N, 3) [m]. channels: joint channel
+    ("goal.J", "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J", "enabled.J") -> (N,).
+    metadata: what the header said. problems: one line each.
+    """
+
+    source: str
+    kind: str
+    version: str
+    time: Array
+    frames: NDArray[np.int64]
+    rate: float
+    units: str = ""
+    rigid_bodies: Mapping[str, BodyTrack] = field(default_factory=dict)
+    markers: Mapping[str, Array] = field(default_factory=dict)
+    channels: Mapping[str, Array] = field(default_factory=dict)
+    commands: Commands | None = None
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    problems: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """How a robot was looked at; a simulated take passes through the same.
+
+    starts_at: time of the first command on the recording's clock [s]. yaw: of the model's first heading in the capture's
+    axes, about up, positive to the left [rad]. origin: the base link's origin at rest in the capture's axes turned into
+    the model's (z up) [m]. pivots: asset -> p_LP_L (3,) [m], the asset's pivot in its link's frame. rest: asset -> (p, quat wxyz)
+    in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
+    """
+
+    starts_at: float
+    yaw: float = 0.0
+    origin: Array = field(default_factory=lambda: np.zeros(3))
+    pivots: Mapping[str, Array] = field(default_factory=dict)
+    rest: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    noise: Mapping[str, float] = field(default_factory=dict)
+    position_noise: float = float("nan")

@@ -1,0 +1,110 @@
+"""A take: one run of the robot, recorded or simulated, in one form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BodyTrack:
+    """Path of a rigid body: p (N, 3) [m] and quaternion wxyz (N, 4), continuous in sign, NaN where unseen;
+    error (N,) [m] mean marker error, if known."""
+
+    p: Array
+    quat: Array
+    error: Array | None = None
+
+
+@dataclass(frozen=True)
+class Take:
+    """One run of the robot, recorded or simulated. SI and radians; world x forward (the robot's first heading), y left, z up.
+
+    time: (N,) [s], from the first frame (a recording), or from the first command (a simulation, negative while it rests).
+    starts_at: time of the first command [s]; NaN where unknown.
+    joints: the n joints that were seen. q: (N, n) [rad]; NaN where unseen. `zeroed`: q is zero at the rest before the first
+    command, as motion capture sees it; else q is the servo's angle. q_sigma: (N, n) standard deviation [rad].
+    p_WB (N, 3), quat_WB (N, 4) wxyz: pose of the base link's frame B in the world W. bodies: rigid bodies by asset,
+    in the take's world axes. torque: (N, n) [N m] on the joints. v: (N, n) [rad/s].
+    contact: foot -> ground reaction (N, 3) [N] in W. `problems`: what was mended, marked or left out, a line each.
+    mended: (N,) frames whose gaps were filled.
+    """
+
+    name: str
+    source: str
+    time: Array
+    joints: tuple[str, ...]
+    q: Array
+    starts_at: float = float("nan")
+    zeroed: bool = False
+    base: str = "free"
+    q_sigma: Array | None = None
+    v: Array | None = None
+    p_WB: Array | None = None
+    quat_WB: Array | None = None
+    bodies: Mapping[str, BodyTrack] = field(default_factory=dict)
+    torque: Array | None = None
+    contact: Mapping[str, Array] = field(default_factory=dict)
+    commands: Commands | None = None
+    problems: tuple[str, ...] = ()
+    mended: NDArray[np.bool_] | None = None
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def column(self, joint: str) -> int:
+        """Index of a joint's column in q, v and torque."""
+        return self.joints.index(joint)
+
+    @property
+    def since_start(self) -> Array:
+        """Time since the first command (N,) [s]."""
+        return self.time - self.starts_at
+
+    @property
+    def resting(self) -> NDArray[np.bool_]:
+        """Frames before the first command."""
+        return np.asarray(self.time < self.starts_at - 1e-9)
+
+    def zeroed_at_rest(self) -> Take:
+        """The same take with q zero at its own rest before the first command, as motion capture would see it."""
+        if self.zeroed or not self.resting.any():
+            return self
+        return replace(self, q=self.q - np.nanmean(self.q[self.resting], axis=0), zeroed=True)
+
+    def resampled(self, time: Array) -> Take:
+        """The take at other times (M,) [s] on its own clock, linear between samples, NaN outside and in gaps."""
+        from scipy.spatial.transform import Rotation, Slerp
+
+        time = np.asarray(time, dtype=float)
+
+        def linear(y: Array | None) -> Array | None:
+            if y is None:
+                return None
+            return np.column_stack([np.interp(time, self.time, c, left=np.nan, right=np.nan) for c in y.T])
+
+        def slerp(q: Array | None) -> Array | None:
+            if q is None:
+                return None
+            out = np.full((len(time), 4), np.nan)
+            good = np.isfinite(q).all(axis=1)
+            if good.sum() < 2:
+                return out
+            inside = (time >= self.time[good][0]) & (time <= self.time[good][-1])
+            out[inside] = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))(time[inside]).as_quat(scalar_first=True)
+            out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
+            return out
+
+        return replace(
+            self, time=time, q=linear(self.q), q_sigma=linear(self.q_sigma), v=linear(self.v), p_WB=linear(self.p_WB),
+            quat_WB=slerp(self.quat_WB), torque=linear(self.torque), mended=None,
+            bodies={k: BodyTrack(p=linear(b.p), quat=slerp(b.quat)) for k, b in self.bodies.items()},  # type: ignore[arg-type]
+            contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]
+        )

@@ -1,0 +1,14 @@
+"""The one exception for input that a person has to mend."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class InputError(ValueError):
+    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with 2."""
+
+    def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
+        self.source = None if source is None else str(source)
+        self.problem = " ".join(str(problem).split())
+        super().__init__(f"{self.source}: {self.problem}" if self.source else self.problem)

@@ -1,0 +1,161 @@
+"""Tree of links and joints, and forward kinematics of many configurations at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointFrame:
+    """A revolute joint: child link turns about `axis` (unit, in the parent's joint frame F) through the joint's origin."""
+
+    name: str
+    parent: str
+    child: str
+    axis: Array
+    X_PF_p: Array
+    X_PF_R: Array
+    X_MB_p: Array
+    X_MB_R: Array
+    lower: float
+    upper: float
+    effort: float
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of what follows."""
+
+    path: Path
+    root: str
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    frames: dict[str, JointFrame]
+    parent_joint: dict[str, str | None]
+    masses: dict[str, float]
+    fixed_to_world: bool
+
+    @staticmethod
+    def from_file(path: Path) -> Kinematics:
+        """Parses an SDF or URDF; InputError if Drake cannot."""
+        return _parse(Path(path))
+
+    def joint_of(self, link: str) -> str | None:
+        """Name of the joint that carries `link`; None for the root."""
+        return self.parent_joint[link]
+
+    def ancestors(self, link: str) -> list[str]:
+        """Links from the parent of `link` down to the root."""
+        out = []
+        joint = self.parent_joint[link]
+        while joint is not None:
+            out.append(self.frames[joint].parent)
+            joint = self.parent_joint[out[-1]]
+        return out
+
+    def chain(self, link: str) -> list[str]:
+        """Joints from the root to `link`."""
+        out: list[str] = []
+        joint = self.parent_joint[link]
+        while joint is not None:
+            out.insert(0, joint)
+            joint = self.parent_joint[self.frames[joint].parent]
+        return out
+
+    def forward(self, q: Array, joints: tuple[str, ...] | None = None) -> dict[str, tuple[Array, Array]]:
+        """Poses of all links in the root link's frame: {link: (p (N, 3) [m], R (N, 3, 3))}.
+
+        q: (N, n) [rad], columns named by `joints` (default: all, in self.joints' order); joints not named stay at zero.
+        """
+        q = np.atleast_2d(np.asarray(q, dtype=float))
+        column = {name: i for i, name in enumerate(self.joints if joints is None else joints)}
+        n = len(q)
+        poses: dict[str, tuple[Array, Array]] = {
+            self.root: (np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)))
+        }
+        for link in self.links:  # ordered root first
+            name = self.parent_joint[link]
+            if name is None:
+                continue
+            f = self.frames[name]
+            p, R = poses[f.parent]
+            p_F = p + R @ f.X_PF_p
+            R_F = R @ f.X_PF_R
+            if name in column:
+                R_F = R_F @ rotation_about(f.axis, q[:, column[name]])
+            poses[link] = (p_F + R_F @ f.X_MB_p, R_F @ f.X_MB_R)
+        return poses
+
+
+def rotation_about(axis: Array, angle: Array) -> Array:
+    """Rotation matrices (N, 3, 3) about a unit `axis` by `angle` (N,) [rad] (Rodrigues)."""
+    x, y, z = axis
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    s, c = np.sin(angle)[:, None, None], np.cos(angle)[:, None, None]
+    return np.asarray(np.eye(3) + s * K + (1 - c) * (K @ K), dtype=float)
+
+
+@lru_cache(maxsize=32)
+def _parse(path: Path) -> Kinematics:
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.multibody.tree import RevoluteJoint, WeldJoint
+
+    from workbench.robot.resources import ConfigureParser
+
+    plant = MultibodyPlant(0.0)
+    parser = Parser(plant)
+    ConfigureParser(parser)
+    try:
+        instances = parser.AddModels(str(path))
+    except Exception as e:
+        raise InputError(path, f"Drake cannot read this model: {e}") from None
+    if len(instances) != 1:
+        raise InputError(path, f"expected one model, found {len(instances)}")
+    instance = instances[0]
+    plant.Finalize()
+    names = [plant.get_body(b).name() for b in plant.GetBodyIndices(instance)]
+    masses = {plant.get_body(b).name(): plant.get_body(b).default_mass() for b in plant.GetBodyIndices(instance)}
+    frames: dict[str, JointFrame] = {}
+    parent_joint: dict[str, str | None] = {}
+    fixed = False
+    for index in plant.GetJointIndices(instance):
+        joint = plant.get_joint(index)
+        parent, child = joint.parent_body().name(), joint.child_body().name()
+        if parent == "world" or joint.parent_body().index() == plant.world_body().index():
+            fixed = fixed or isinstance(joint, WeldJoint)
+            continue
+        X_PF, X_BM = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child().GetFixedPoseInBodyFrame()
+        X_MB = X_BM.inverse()
+        common = dict(name=joint.name(), parent=parent, child=child, X_PF_p=X_PF.translation(), X_PF_R=X_PF.rotation().matrix(),
+                      X_MB_p=X_MB.translation(), X_MB_R=X_MB.rotation().matrix())
+        if isinstance(joint, RevoluteJoint):
+            efforts = [a.effort_limit() for a in map(plant.get_joint_actuator, plant.GetJointActuatorIndices(instance))
+                       if a.joint().index() == joint.index()]
+            frames[joint.name()] = JointFrame(
+                axis=joint.revolute_axis(), lower=float(joint.position_lower_limits()[0]),
+                upper=float(joint.position_upper_limits()[0]), effort=float(efforts[0]) if efforts else float("inf"), **common)
+        elif isinstance(joint, WeldJoint):
+            frames[joint.name()] = JointFrame(axis=np.array([0.0, 0, 1]), lower=0.0, upper=0.0, effort=0.0, **common)
+        else:
+            raise InputError(path, f"joint '{joint.name()}' is {joint.type_name()}; expected revolute or fixed")
+        parent_joint[child] = joint.name()
+    roots = [n for n in names if n not in parent_joint]
+    if len(roots) != 1:
+        raise InputError(path, f"expected one tree with one root link, found roots {', '.join(roots) or 'none'}")
+    parent_joint[roots[0]] = None
+    ordered = [roots[0]]
+    while len(ordered) < len(names):  # parents before children
+        ordered += [f.child for f in frames.values() if f.parent in ordered and f.child not in ordered]
+    movable = tuple(sorted(n for n, f in frames.items() if f.upper > f.lower))
+    return Kinematics(path=path, root=roots[0], links=tuple(ordered), joints=movable, frames=frames,
+                      parent_joint=parent_joint, masses=masses, fixed_to_world=fixed)

@@ -1,0 +1,133 @@
+"""The robot as plain data: description, servos, ground, and the physics added to them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from workbench.robot.errors import InputError
+from workbench.robot.kinematics import Kinematics
+from workbench.robot.names import BUS_IDS, RIGID_BODIES
+from workbench.robot.resources import resolve_model
+from workbench.robot.servo_constants import ServoConstants
+
+PUPPY = "package://puppy/puppy.sdf"
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Friction of foot on ground (static and dynamic alike; None: the SDF's own), the ground's stiffness [N/m] and
+    Hunt-Crossley dissipation [s/m]; None or infinite stiffness: rigid."""
+
+    friction: float | None = None
+    stiffness: float | None = None
+    dissipation: float | None = None
+
+    def __post_init__(self) -> None:
+        for key in ("friction", "stiffness", "dissipation"):
+            v = getattr(self, key)
+            if v is not None and (isinstance(v, bool) or not isinstance(v, (int, float)) or not v >= 0):
+                raise ValueError(f"{key}: expected a non-negative number, got {v!r}")
+
+
+@dataclass(frozen=True)
+class EffectSpec:
+    """One piece of physics beyond the nominal model, in the contract's words and units (section 7)."""
+
+    effect: str
+    where: tuple[str, ...] = ()
+    parameters: Mapping[str, float | tuple[float, float, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """The nominal robot and the effects added to it; plain data that knows no simulator code.
+
+    description: SDF path or package:// URL. base: link that floats. servos: constants by joint. rigid_bodies: Motive
+    asset -> link. bus_ids: Dynamixel ID by joint.
+    """
+
+    description: str = PUPPY
+    base: str = "body_link"
+    servos: Mapping[str, ServoConstants] = field(default_factory=dict)
+    ground: Ground = field(default_factory=Ground)
+    rigid_bodies: Mapping[str, str] = field(default_factory=dict)
+    bus_ids: Mapping[str, int] = field(default_factory=dict)
+    effects: tuple[EffectSpec, ...] = ()
+
+    @cached_property
+    def path(self) -> Path:
+        """The SDF file."""
+        return resolve_model(self.description)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """Tree of links and joints, with vectorised forward kinematics."""
+        return Kinematics.from_file(self.path)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the actuated joints, alphabetical (the thesis's order)."""
+        return self.kinematics.joints
+
+    def servo(self, joint: str) -> ServoConstants:
+        """Constants of one joint's servo (default AX-12A where none are given)."""
+        return self.servos.get(joint, ServoConstants())
+
+    def with_effect(self, effect: EffectSpec) -> RobotModel:
+        """The same robot with one effect more."""
+        return replace(self, effects=(*self.effects, effect))
+
+    def with_servos(self, changes: Mapping[str, Any]) -> RobotModel:
+        """The same robot with constants replaced in every servo (a take's `servos`)."""
+        return replace(self, servos={j: self.servo(j).updated(dict(changes)) for j in self.joints}) if changes else self
+
+    @cached_property
+    def sha256(self) -> str:
+        """Hash of the description's content and of everything said about it."""
+        digest = hashlib.sha256(self.path.read_bytes())
+        digest.update(yaml.safe_dump(self.as_dict() | {"description": self.path.name}, sort_keys=True).encode())
+        return digest.hexdigest()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain types, for YAML and JSON."""
+        return {
+            "description": self.description,
+            "base": self.base,
+            "servos": {j: asdict(s) for j, s in self.servos.items()},
+            "ground": asdict(self.ground),
+            "rigid_bodies": dict(self.rigid_bodies),
+            "bus_ids": dict(self.bus_ids),
+            "effects": [
+                {"effect": e.effect, "where": list(e.where),
+                 "parameters": {k: list(v) if isinstance(v, tuple) else v for k, v in e.parameters.items()}}
+                for e in self.effects
+            ],
+        }
+
+    def check_base(self, floating: bool) -> None:
+        """InputError unless the base is a link of the model, and the root of its tree where it has to float."""
+        k = self.kinematics
+        if self.base not in k.links:
+            raise InputError(self.description, f"base: no link '{self.base}'; links: {', '.join(k.links)}")
+        if floating and k.parent_joint.get(self.base) is not None:
+            raise InputError(
+                self.description,
+                f"base: '{self.base}' hangs on joint '{k.parent_joint[self.base]}' and cannot float; the root link is '{k.root}'",
+            )
+        if floating and k.fixed_to_world:
+            raise InputError(self.description, f"base: '{self.base}' is fixed to the world in the SDF and cannot float")
+
+
+def puppy_model(**changes: Any) -> RobotModel:
+    """The puppy that ships with the workbench, AX-12A at the nominal constants, the thesis's names."""
+    model = RobotModel(rigid_bodies=dict(RIGID_BODIES), bus_ids=dict(BUS_IDS), ground=Ground(friction=0.5, stiffness=math.inf))
+    model = replace(model, servos={j: ServoConstants() for j in model.joints})
+    return replace(model, **changes) if changes else model

@@ -1,0 +1,129 @@
+"""Nominal constants of a position servo (contract, section 4)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from workbench.robot.errors import InputError
+
+COUNT = math.radians(300 / 1023)
+"""One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""
+SPEED_UNIT = 0.111 * 2 * math.pi / 60
+"""One count of moving speed [rad/s] (AX-12A manual, 0.111 rpm)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoConstants:
+    """Constants of one servo; torques N m, speeds rad/s, voltages V, margins and slopes in counts of 300/1023 deg.
+
+    Either `compliance_slope`, `compliance_margin` and `punch` (of 1023), or `proportional_gain` (duty per radian).
+    """
+
+    model: str = "AX-12A"
+    stall_torque: float = 1.5
+    no_load_speed: float = 6.18
+    rated_voltage: float = 12.0
+    supply_voltage: float = 11.1
+    coulomb_friction: float = 0.06
+    viscous_friction: float = 0.01
+    reflected_inertia: float = 0.0065
+    compliance_slope: float | None = 32
+    compliance_margin: float | None = 1
+    punch: float | None = 32
+    proportional_gain: float | None = None
+
+    def __post_init__(self) -> None:
+        compliance = (self.compliance_slope, self.compliance_margin, self.punch)
+        if self.proportional_gain is None:
+            if any(v is None for v in compliance):
+                raise ValueError("expected compliance_slope, compliance_margin and punch, or proportional_gain")
+        elif any(v is not None for v in compliance):
+            raise ValueError("proportional_gain excludes compliance_slope, compliance_margin and punch")
+        for f in fields(self):
+            v = getattr(self, f.name)
+            if f.name == "model" or v is None:
+                continue
+            if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v):
+                raise ValueError(f"{f.name}: expected a number, got {v!r}")
+            if v < 0 or (v == 0 and f.name in _POSITIVE):
+                raise ValueError(f"{f.name}: expected a {'positive' if f.name in _POSITIVE else 'non-negative'} number, got {v}")
+
+    @property
+    def margin(self) -> float:
+        """Half width of the dead band [rad]."""
+        return (self.compliance_margin or 0.0) * COUNT
+
+    @property
+    def gain(self) -> float:
+        """Steepness of the law outside the margin [duty per radian]."""
+        if self.proportional_gain is not None:
+            return self.proportional_gain
+        assert self.compliance_slope is not None
+        return (1 - self.punch_duty) / (self.compliance_slope * COUNT)
+
+    @property
+    def punch_duty(self) -> float:
+        """Duty at the edge of the margin."""
+        return (self.punch or 0.0) / 1023
+
+    @property
+    def torque_at_full_duty(self) -> float:
+        """Stall torque at the supply voltage [N m]."""
+        return self.stall_torque * self.supply_voltage / self.rated_voltage
+
+    @property
+    def back_emf(self) -> float:
+        """Torque lost per joint speed by the motor's back-EMF [N m s/rad]."""
+        return self.stall_torque / self.no_load_speed
+
+    def updated(self, changes: dict[str, Any]) -> ServoConstants:
+        """With some keys replaced; a switch between the two position laws drops the other's keys."""
+        changes = dict(changes)
+        if changes.get("proportional_gain") is not None:
+            for key in ("compliance_slope", "compliance_margin", "punch"):
+                changes.setdefault(key, None)
+        elif any(changes.get(k) is not None for k in ("compliance_slope", "compliance_margin", "punch")):
+            changes.setdefault("proportional_gain", None)
+        unknown = sorted(set(changes) - {f.name for f in fields(self)})
+        if unknown:
+            raise ValueError(f"unknown key '{unknown[0]}'; known: {', '.join(f.name for f in fields(self))}")
+        return replace(self, **changes)
+
+
+_POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
+
+
+def load_servo_constants(path: str | Path) -> ServoConstants:
+    """Reads `servo.yaml`; InputError names the file and the key."""
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as e:
+        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as e:
+        raise InputError(path, f"not valid YAML: {e}") from None
+    if not isinstance(content, dict):
+        raise InputError(path, "expected a mapping of servo constants")
+    required = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
+                "reflected_inertia"}
+    missing = sorted(required - set(content))
+    if missing:
+        raise InputError(path, f"key '{missing[0]}' is missing")
+    law = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
+    try:
+        return ServoConstants(**({k: None for k in law} | _as_known(content)))
+    except ValueError as e:
+        raise InputError(path, str(e)) from None
+
+
+def _as_known(content: dict[str, Any]) -> dict[str, Any]:
+    known = {f.name for f in fields(ServoConstants)}
+    for key in content:
+        if key not in known:
+            raise ValueError(f"unknown key '{key}'; expected one of {', '.join(sorted(known))}")
+    return content
