@@ -1,0 +1,205 @@
+"""The servo bank: the nominal servo law as a Drake system, on any plant whose joints it is given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JointActuator, PdControllerGains, RevoluteJoint
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, DiagramBuilder, DiscreteValues, LeafSystem
+from pydrake.systems.primitives import ConstantVectorSource
+
+from workbench.robot import InputError, RobotModel
+from workbench.servo.law import ServoLaw
+
+Array = NDArray[np.float64]
+
+HOLDING_DAMPING = 1e3
+"""Damping [N m s/rad] below which Coulomb friction creeps in discrete plants: at 0.06 N m a joint at rest creeps by less
+than 0.06/1000 rad/s (0.003 deg/s)."""
+BRISTLE_SLIP = 5e-4
+"""Deflection [rad] at which a bristle of a continuous plant yields; a tenth of a count, so that no sensor sees it."""
+
+
+class ServoBank(LeafSystem):
+    """n position servos: goal and moving speed in, torque on the joints out.
+
+        plant_state    (nq + nv) -->+-----------+--> generalized_force (nv)  N m: duty torque, as the plant takes it
+        goal_position  (n) rad ---->| ServoBank |--> motor_torque      (n)   N m: duty torque less back-EMF
+        moving_speed   (n) rad/s -->|           |--> duty              (n)   -1 to 1
+        torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
+
+    torque_enable may stay unconnected: all on. The reference advances every `period` seconds (discrete state, n). Back-EMF and
+    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (discrete plants: implicit,
+    holds at rest) or as bristles (continuous plants: state, n, Dahl 1968), so that generalized_force holds what remains.
+    Build it with AddServos, which sets all that on the plant.
+    """
+
+    def __init__(self, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], law: ServoLaw, period: float, bristles: bool) -> None:
+        super().__init__()
+        self.law = law
+        self.joints = tuple(j.name() for j in joints)
+        n, nq, nv = len(joints), plant.num_positions(), plant.num_velocities()
+        self._q = np.array([j.position_start() for j in joints], dtype=int)
+        self._v = np.array([j.velocity_start() for j in joints], dtype=int)
+        self._x_v = self._v + nq
+        self._period = period
+        self._bristles = bristles
+        self._force = np.zeros(nv)
+        self._state = self.DeclareVectorInputPort("plant_state", nq + nv)
+        self._goal = self.DeclareVectorInputPort("goal_position", n)
+        self._speed = self.DeclareVectorInputPort("moving_speed", n)
+        self._enable = self.DeclareVectorInputPort("torque_enable", n)
+        self._reference = self.DeclareDiscreteState(n)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._advance)
+        state = {self._state.ticket(), self._enable.ticket(), self.xd_ticket()}
+        force_state = state | ({self.xc_ticket()} if bristles else set())
+        self.DeclareVectorOutputPort("generalized_force", nv, self._calc_force, force_state)
+        self.DeclareVectorOutputPort("motor_torque", n, self._calc_motor_torque, state)
+        self.DeclareVectorOutputPort("duty", n, self._calc_duty, state)
+        self.DeclareVectorOutputPort("reference", n, self._calc_reference, {self.xd_ticket()})
+        if bristles:
+            self.DeclareContinuousState(n)
+            self._bristle_stiffness = law.coulomb / BRISTLE_SLIP
+
+    def SetReference(self, context: Context, reference: Array) -> None:
+        """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
+        context.SetDiscreteState(np.asarray(reference, dtype=float))
+
+    def _enabled(self, context: Context) -> Array | None:
+        return self._enable.Eval(context) if self._enable.HasValue(context) else None
+
+    def _advance(self, context: Context, values: DiscreteValues) -> None:
+        reference = context.get_discrete_state_vector().value()
+        speed = self._speed.Eval(context)
+        step = speed * self._period
+        if not speed.all():
+            step = np.where(speed > 0, step, np.inf)
+        new = reference + np.minimum(np.maximum(self._goal.Eval(context) - reference, -step), step)
+        enabled = self._enabled(context)
+        if enabled is not None and not enabled.all():  # the ramp starts at the measured position once torque is back
+            new = np.where(enabled > 0.5, new, self._state.Eval(context)[self._q])
+        values.set_value(new)
+
+    def _calc_force(self, context: Context, output: BasicVector) -> None:
+        law, x = self.law, self._state.Eval(context)
+        error = context.get_discrete_state_vector().value() - x[self._q]
+        beyond = np.abs(error) - law.margin
+        size = np.minimum(law.punch + law.gain * beyond, 1.0) * law.full_torque
+        size[beyond <= 0] = 0.0
+        torque = np.copysign(size, error)
+        enabled = self._enabled(context)
+        if enabled is not None and not enabled.all():  # no back-EMF either: undo the joint's share of damping
+            torque = np.where(enabled > 0.5, torque, law.back_emf * x[self._x_v])
+        if self._bristles:
+            torque = torque - self._bristle_force(context, x[self._x_v])
+        self._force[self._v] = torque
+        output.SetFromVector(self._force)
+
+    def _bristle_force(self, context: Context, v: Array) -> Array:
+        z = context.get_continuous_state_vector().CopyToVector()
+        return np.asarray(np.clip(self._bristle_stiffness * z, -self.law.coulomb, self.law.coulomb), dtype=float)
+
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """Bristles follow the joint and yield at the Coulomb torque (Dahl, with his exponent 1)."""
+        if not self._bristles:
+            return
+        v = self._state.Eval(context)[self._x_v]
+        z = context.get_continuous_state_vector().CopyToVector()
+        load = np.sign(v) * z / BRISTLE_SLIP
+        derivatives.SetFromVector(np.where(self.law.coulomb > 0, v * (1.0 - load), 0.0))
+
+    def _calc_motor_torque(self, context: Context, output: BasicVector) -> None:
+        x = self._state.Eval(context)
+        enabled = self._enabled(context)
+        on = True if enabled is None else enabled > 0.5
+        error = context.get_discrete_state_vector().value() - x[self._q]
+        output.SetFromVector(self.law.motor_torque(error, x[self._x_v], on))
+
+    def _calc_duty(self, context: Context, output: BasicVector) -> None:
+        error = context.get_discrete_state_vector().value() - self._state.Eval(context)[self._q]
+        enabled = self._enabled(context)
+        output.SetFromVector(self.law.duty(error) * (1.0 if enabled is None else enabled > 0.5))
+
+    def _calc_reference(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().value())
+
+
+def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
+    """The joint's actuator; one is added to a plant not yet finalized. More than one, or none left to add: InputError."""
+    found = [a for a in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()) if a.joint().index() == joint.index()]
+    if len(found) > 1:
+        raise InputError(None, f"joint '{joint.name()}' has {len(found)} actuators; expected one: Drake sums their effects (facts: CENIC)")
+    if found:
+        return found[0]
+    if plant.is_finalized():
+        raise InputError(None, f"joint '{joint.name()}' has no actuator and the plant is finalized; call AddServos before Finalize")
+    return plant.AddJointActuator(joint.name(), joint)
+
+
+def servo_joints(plant: MultibodyPlant, model: RobotModel) -> list[RevoluteJoint]:
+    """The plant's joints that the model's servos drive, in the model's order; InputError names one that is missing."""
+    out = []
+    for name in model.joints:
+        if not plant.HasJointNamed(name):
+            raise InputError(None, f"the plant has no joint '{name}' (model {model.description})")
+        out.append(plant.GetJointByName(name))
+    return out
+
+
+def SetServoPhysics(plant: MultibodyPlant, model: RobotModel) -> ServoLaw:
+    """Sets on the plant's joints what the servos add to them, in place of what the SDF gave: damping, reflected inertia and,
+    in discrete plants, Coulomb friction (an actuator that brakes with at most that torque).
+
+    A joint's only actuator is used, because CENIC clamps the sum of several once, and because a joint's
+    reflected inertia is that of its last actuator.
+    """
+    joints = servo_joints(plant, model)
+    law = ServoLaw.of([model.servo(j.name()) for j in joints])
+    for i, joint in enumerate(joints):
+        actuator = find_actuator(plant, joint)
+        joint.set_default_damping(float(law.damping[i]))
+        actuator.set_default_rotor_inertia(float(law.inertia[i]))
+        actuator.set_default_gear_ratio(1.0)
+        if plant.time_step() > 0 and law.coulomb[i] > 0:
+            actuator.set_controller_gains(PdControllerGains(p=0.0, d=HOLDING_DAMPING))
+            actuator.set_effort_limit(float(law.coulomb[i]))
+        else:
+            actuator.set_effort_limit(np.inf)
+    return law
+
+
+def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, period: float | None = None) -> ServoBank:
+    """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
+    `moving_speed` inputs are left to connect.
+
+    Finalizes the plant if the caller has not. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
+    Takes the plant's applied_generalized_force input, and desired_state of the instances that hold the joints (discrete plants).
+    Under CENIC the plant is a discrete one to Drake; friction is then implicit as well.
+    """
+    if model.effects:
+        raise InputError(None, f"effect '{model.effects[0].effect}' has to be added by workbench.simulation, not by AddServos")
+    law = SetServoPhysics(plant, model)
+    if not plant.is_finalized():
+        plant.Finalize()
+    joints = servo_joints(plant, model)
+    discrete = plant.time_step() > 0
+    bank = ServoBank(plant, joints, law, period or plant.time_step() or 1e-3, bristles=not discrete and bool(law.coulomb.any()))
+    bank.set_name("servo_bank")
+    builder.AddSystem(bank)
+    builder.Connect(plant.get_state_output_port(), bank.GetInputPort("plant_state"))
+    builder.Connect(bank.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port())
+    if discrete:
+        arm_friction(builder, plant, joints)
+    return bank
+
+
+def arm_friction(builder: DiagramBuilder, plant: MultibodyPlant, joints: Sequence[RevoluteJoint]) -> None:
+    """Connects zeros as desired state of the joints' instances: Drake disarms controllers whose desired state is unconnected."""
+    for instance in {j.model_instance() for j in joints}:
+        port = plant.get_desired_state_input_port(instance)
+        zeros = builder.AddSystem(ConstantVectorSource(np.zeros(port.size())))
+        zeros.set_name(f"friction_reference_{plant.GetModelInstanceName(instance)}")
+        builder.Connect(zeros.get_output_port(), port)

@@ -1,0 +1,64 @@
+"""The nominal law of a position servo (contract, section 4; AX-12A manual, compliance figure), on plain arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot import ServoConstants
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ServoLaw:
+    """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m],
+    back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]."""
+
+    gain: Array
+    margin: Array
+    punch: Array
+    full_torque: Array
+    back_emf: Array
+    viscous: Array
+    coulomb: Array
+    inertia: Array
+
+    @staticmethod
+    def of(servos: Sequence[ServoConstants]) -> ServoLaw:
+        """Stacks the constants of one servo a joint."""
+
+        def column(f: str) -> Array:
+            return np.array([getattr(s, f) for s in servos], dtype=float)
+
+        return ServoLaw(column("gain"), column("margin"), column("punch_duty"), column("torque_at_full_duty"),
+                        column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"))
+
+    @property
+    def damping(self) -> Array:
+        """All that a joint loses per speed while its servo is on: back-EMF and viscous friction [N m s/rad]."""
+        return self.back_emf + self.viscous
+
+    def duty(self, error: Array) -> Array:
+        """Duty of the H-bridge, -1 to 1, for the error reference - measured [rad]; shapes (..., n)."""
+        beyond = np.abs(error) - self.margin
+        size = np.minimum(self.punch + self.gain * beyond, 1.0)
+        return np.copysign(np.where(beyond > 0, size, 0.0), error)
+
+    def motor_torque(self, error: Array, velocity: Array, enabled: Array | bool = True) -> Array:
+        """Torque of the motor at the joint [N m], before friction: duty torque less back-EMF, 0 with torque disabled."""
+        return np.asarray(np.where(enabled, self.duty(error) * self.full_torque - self.back_emf * velocity, 0.0), dtype=float)
+
+    def rest_error(self, torque: Array) -> Array:
+        """Error reference - measured [rad] at which duty alone balances `torque` [N m] (without friction)."""
+        size = np.abs(torque) / self.full_torque
+        return np.copysign(self.margin + np.maximum(size - self.punch, 0.0) / self.gain, torque)
+
+
+def advance_reference(reference: Array, goal: Array, speed: Array, dt: float) -> Array:
+    """The ramped reference after dt [s]: toward the goal at the moving speed [rad/s], at once where the speed is 0."""
+    step = np.where(speed > 0, speed * dt, np.inf)
+    return np.asarray(reference + np.clip(goal - reference, -step, step), dtype=float)
