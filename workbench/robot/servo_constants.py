@@ -7,9 +7,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from workbench.robot.errors import InputError
+from workbench.robot.yaml_file import read_yaml
 
 COUNT = math.radians(300 / 1023)
 """One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""
@@ -101,12 +100,7 @@ _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage",
 def load_servo_constants(path: str | Path) -> ServoConstants:
     """Reads `servo.yaml`; InputError names the file and the key."""
     path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as e:
-        raise InputError(path, f"not valid YAML: {e}") from None
+    content = read_yaml(path)
     if not isinstance(content, dict):
         raise InputError(path, "expected a mapping of servo constants")
     required = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",

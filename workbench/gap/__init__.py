@@ -1,0 +1,1 @@
+"""Session in, findings out: what the model lacks that the recording shows."""

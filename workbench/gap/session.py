@@ -1,0 +1,232 @@
+"""The session file: one robot, one day of recordings (contract, section 1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from workbench.motion.commands import Commands
+from workbench.motion.motion import load_motion
+from workbench.robot import (
+    BUS_IDS,
+    PUPPY,
+    RIGID_BODIES,
+    Ground,
+    InputError,
+    RobotModel,
+    ServoConstants,
+    load_servo_constants,
+    puppy_model,
+)
+from workbench.robot.yaml_file import Fields, read_yaml
+
+Base = Literal["free", "fixed"]
+
+
+@dataclass(frozen=True)
+class TakeSpec:
+    """One take of a session: what was commanded, what was recorded.
+
+    motion: pose table, played `cycles` times; None where the recording carries its own commands. starts_at: recording
+    time of the first command [s]; None: estimate it. servos: constants that differ in this take. use: "fit", "validate"
+    or None.
+    """
+
+    name: str
+    recording: Path
+    motion: Path | None = None
+    cycles: int = 1
+    base: Base = "free"
+    starts_at: float | None = None
+    servos: Mapping[str, float] = field(default_factory=dict)
+    use: Literal["fit", "validate"] | None = None
+
+    def commands(self, model: RobotModel) -> Commands | None:
+        """What went out on the bus; None where only the recording knows."""
+        return None if self.motion is None else load_motion(self.motion, model).commands(self.cycles)
+
+
+@dataclass(frozen=True)
+class PredictSpec:
+    """To foretell: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+
+    name: str
+    motion: Path | None = None
+    cycles: int = 1
+    commands: Path | None = None
+    start: Path | None = None
+    starts_at: float | None = None
+    frames: int | None = None
+    base: Base = "free"
+    servos: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Session:
+    """One robot, one day of recordings. model: the nominal robot. All files named exist; all names fit the model."""
+
+    path: Path
+    model: RobotModel
+    takes: tuple[TakeSpec, ...] = ()
+    predict: tuple[PredictSpec, ...] = ()
+
+    def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
+        """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
+        return (model or self.model).with_servos(take.servos)
+
+
+def load_session(path: str | Path) -> Session:
+    """Reads `session.yaml`.
+
+    InputError names the file, the key and what was expected: an unknown key anywhere, a missing file, a wrong type, a
+    joint or link that the model lacks, a base that cannot float where a take says free, a motion that the servos cannot play.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(path, "expected a session file, this is a folder")
+    top = Fields(path, read_yaml(path))
+    if top.raw("format") != 1:
+        raise top.error("format", "expected 1")
+    ground = _ground(top.mapping("ground"))
+    model = _robot(top.mapping("robot") or Fields(path, {}, "robot"), ground)
+    takes = tuple(_take(f, model) for f in top.sequence("takes"))
+    predict = tuple(_predict(f, model) for f in top.sequence("predict"))
+    top.done()
+    for key, entries in (("takes", takes), ("predict", predict)):
+        names = [e.name for e in entries]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
+    if not takes and not predict:
+        raise top.error("takes", "expected at least one take")
+    return Session(path, model, takes, predict)
+
+
+def _ground(f: Fields | None) -> Ground | None:
+    if f is None:
+        return None
+    ground = Ground(
+        friction=f.number("friction", least=0), stiffness=f.number("stiffness", least=0, finite=False),
+        dissipation=f.number("dissipation", least=0),
+    )
+    f.done()
+    return ground
+
+
+def _robot(f: Fields, ground: Ground | None) -> RobotModel:
+    description = f.text("model", PUPPY) or PUPPY
+    if description == PUPPY:
+        model = puppy_model()
+    else:
+        file = description if description.startswith("package://") else str(f.existing("model", description))
+        model = RobotModel(description=file)
+    kinematics = model.kinematics
+    links, joints = kinematics.links, model.joints
+    base = f.text("base", model.base if model.base in links else kinematics.root) or ""
+    if base not in links:
+        raise f.error("base", f"the model has no link '{base}'; expected one of {', '.join(links)}")
+    bodies = {a: link for a, link in RIGID_BODIES.items() if link in links}
+    ids = {j: i for j, i in BUS_IDS.items() if j in joints}
+    given = f.mapping("rigid_bodies")
+    if given is not None:
+        bodies = {asset: _name(given, asset, link, "link", links) for asset, link in given.items()}
+        twice = [link for link in bodies.values() if list(bodies.values()).count(link) > 1]
+        if twice:
+            raise f.error("rigid_bodies", f"link '{twice[0]}' carries two assets; expected one each")
+    given = f.mapping("bus_ids")
+    if given is not None:
+        ids = {}
+        for joint, number in given.items():
+            _name(given, joint, joint, "joint", joints)
+            good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 253
+            if not good or number in ids.values():
+                raise given.error(joint, f"expected a bus ID of its own from 0 to 253, got {number!r}")
+            ids[joint] = number
+    servos = _servos(f, joints)
+    f.done()
+    return replace(
+        model, base=base, servos=servos or model.servos, ground=ground or model.ground, rigid_bodies=bodies, bus_ids=ids)
+
+
+def _servos(f: Fields, joints: tuple[str, ...]) -> dict[str, ServoConstants]:
+    """Constants by joint, from one file for all or a file for each; a joint without a file keeps the nominal AX-12A."""
+    given = f.raw("servos")
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(joints, load_servo_constants(f.existing("servos", given)))
+    each = Fields(f.path, given, f.at("servos"))
+    return {_name(each, j, j, "joint", joints): load_servo_constants(each.existing(j, f)) for j, f in each.items()}
+
+
+def _name(f: Fields, key: str, value: Any, kind: str, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise f.error(key, f"the model has no {kind} '{value}'; expected one of {', '.join(known)}")
+    return str(value)
+
+
+def _take(f: Fields, model: RobotModel) -> TakeSpec:
+    name = _entry_name(f)
+    use = f.text("use", choices=("fit", "validate"))
+    take = TakeSpec(
+        name=name, recording=f.required("recording", f.file("recording")), motion=f.file("motion"),
+        cycles=f.whole("cycles", 1, least=1) or 1, base=_base(f, model), starts_at=f.number("starts_at", least=0),
+        servos=_changes(f, model), use=use,  # type: ignore[arg-type]
+    )
+    f.done()
+    take.commands(model)  # a motion that the robot cannot play is the session's error, not a damaged take
+    return take
+
+
+def _predict(f: Fields, model: RobotModel) -> PredictSpec:
+    spec = PredictSpec(
+        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1) or 1,
+        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0),
+        frames=f.whole("frames", least=1),
+        base=_base(f, model), servos=_changes(f, model),
+    )
+    f.done()
+    if (spec.motion is None) == (spec.commands is None):
+        raise f.error("motion", "expected either motion (with start, starts_at, frames) or commands")
+    if spec.motion is not None:
+        for key in ("start", "starts_at", "frames"):
+            f.required(key, getattr(spec, key))
+        load_motion(spec.motion, model)
+    return spec
+
+
+def _entry_name(f: Fields) -> str:
+    name = str(f.required("name", f.text("name")))
+    if name != Path(name).name or name in (".", ".."):
+        raise f.error("name", f"expected a name that can be a file's, got '{name}'")
+    return name
+
+
+def _base(f: Fields, model: RobotModel) -> Base:
+    """free or fixed; where the take does not say: free, unless the SDF itself holds the robot."""
+    said = f.text("base", choices=("free", "fixed"))
+    base: Base = "fixed" if said == "fixed" or (said is None and model.kinematics.fixed_to_world) else "free"
+    try:
+        model.check_base(floating=base == "free")
+    except InputError as e:
+        raise f.error("base", f"'{base}', but {e.problem} ({model.description})") from None
+    return base
+
+
+def _changes(f: Fields, model: RobotModel) -> dict[str, float]:
+    given = f.mapping("servos")
+    if given is None:
+        return {}
+    changes: dict[str, float] = {}
+    for key, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise given.error(key, f"expected a number, got {value!r}")
+        changes[key] = float(value)
+    try:
+        model.with_servos(changes)
+    except ValueError as e:
+        raise f.error("servos", str(e)) from None
+    return changes
