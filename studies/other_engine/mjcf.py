@@ -1,0 +1,108 @@
+"""A robot's description as a MuJoCo model (MJCF)."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from studies.other_engine.description import Description, LinkPart
+from studies.other_engine.servo import ServoBank
+from workbench.robot import Ground
+
+HELD_AT = 1.0
+"""Height of the root link's origin on the stand [m]."""
+IMPEDANCE = 0.9
+"""MuJoCo's d: the share of a contact's acceleration that the constraint takes (its default at full depth)."""
+DEFAULT_STIFFNESS = 1e5
+DEFAULT_FRICTION = 1.0
+
+
+def to_mjcf(description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float) -> str:
+    """MJCF text: bodies are the links, with the links' frames; `servos` in the order of description.joints.
+
+    Reflected inertia is `armature`; Coulomb friction is `frictionloss` (a constraint, so that it holds at rest); viscous
+    friction and back-EMF are `damping`, which implicitfast integrates implicitly. Feet are spheres on a plane, with
+    elliptic cones and condim 3.
+    """
+    top = ET.Element("mujoco", model="other_engine")
+    ET.SubElement(top, "compiler", angle="radian", autolimits="true", balanceinertia="false")
+    # impratio: friction is impratio times stiffer than the normal force, so that a foot inside its cone does not creep.
+    ET.SubElement(top, "option", timestep=_text(timestep), integrator="implicitfast", cone="elliptic", impratio="10",
+                  gravity="0 0 -9.81", tolerance="1e-10", iterations="100")
+    world = ET.SubElement(top, "worldbody")
+    ET.SubElement(world, "geom", name="ground", type="plane", size="0 0 1", condim="3")
+    index = {j: i for i, j in enumerate(description.joints)}
+    elements = {"": world}
+    for link in description.links:
+        element = ET.SubElement(elements[link.parent], "body", name=link.name)
+        elements[link.name] = element
+        if not link.joint:
+            height = HELD_AT if base == "fixed" else -description.lowest()
+            element.set("pos", _text(0, 0, height))
+            if base != "fixed":
+                ET.SubElement(element, "freejoint", name="floating_base")
+        else:
+            _hang(element, link, servos, index.get(link.joint), timestep)
+        _fill(element, link, ground)
+    return ET.tostring(top, encoding="unicode")
+
+
+def compile_model(
+    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float
+) -> mujoco.MjModel:
+    """MuJoCo's model, with each contact as stiff [N/m] as foot and ground in series.
+
+    MuJoCo's contact is a spring and damper with a virtual mass: at impedance d, time constant t and damping ratio 1 its
+    stiffness is 1 / ((1 - d) A t²), where A is the inverse mass that the foot shows (`body_invweight0`). Here it is
+    solved for t, which MuJoCo asks to be at least two steps. The contract's dissipation has no counterpart; the damping
+    ratio of 1 makes impacts inelastic, as 20 s/m does.
+    """
+    model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep))
+    for link in description.links:
+        body = model.body(link.name).id
+        for k, sphere in enumerate(link.spheres):
+            stiffness = DEFAULT_STIFFNESS if math.isnan(sphere.stiffness) else sphere.stiffness
+            if ground.stiffness is not None:
+                stiffness = 1 / (1 / stiffness + 1 / ground.stiffness)
+            time_constant = 1 / math.sqrt(stiffness * (1 - IMPEDANCE) * model.body_invweight0[body, 0])
+            model.geom(_geom_name(link, k)).solref[:] = max(time_constant, 2 * timestep), 1.0
+    return model
+
+
+def _hang(element: ET.Element, link: LinkPart, servos: ServoBank, i: int | None, timestep: float) -> None:
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(link.R).ravel())
+    element.set("pos", _text(*link.p))
+    element.set("quat", _text(*quat))
+    if i is None:
+        return
+    ET.SubElement(
+        element, "joint", name=link.joint, type="hinge", pos=_text(*link.anchor), axis=_text(*link.axis),
+        armature=_text(servos.inertia[i]), frictionloss=_text(servos.coulomb[i]),
+        damping=_text(servos.viscous[i] + servos.back_emf[i]), range=_text(link.lower, link.upper),
+        limited="true" if math.isfinite(link.lower) and math.isfinite(link.upper) else "false",
+        # A stiff friction constraint: below the Coulomb torque the joint creeps at thousandths of a degree per second.
+        solreffriction=_text(2 * timestep, 1), solimpfriction="0.99 0.99 0.001")
+
+
+def _fill(element: ET.Element, link: LinkPart, ground: Ground) -> None:
+    M = link.inertia
+    ET.SubElement(element, "inertial", pos=_text(*link.com), mass=_text(link.mass),
+                  fullinertia=_text(M[0, 0], M[1, 1], M[2, 2], M[0, 1], M[0, 2], M[1, 2]))
+    for k, sphere in enumerate(link.spheres):
+        friction = sphere.friction if ground.friction is None else ground.friction
+        ET.SubElement(
+            element, "geom", name=_geom_name(link, k), type="sphere", pos=_text(*sphere.center),
+            size=_text(sphere.radius), condim="3", priority="1", solimp=_text(IMPEDANCE, IMPEDANCE, 0.001),
+            friction=_text(DEFAULT_FRICTION if math.isnan(friction) else friction, 0, 0))
+
+
+def _geom_name(link: LinkPart, k: int) -> str:
+    return f"{link.name}/{k}"
+
+
+def _text(*values: float) -> str:
+    return " ".join(repr(float(v)) for v in values)

@@ -1,0 +1,63 @@
+"""The nominal servo law (contract, section 4), for a row of servos at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot import ServoConstants
+
+Array = NDArray[np.float64]
+_COUNT = np.deg2rad(300 / 1023)
+
+
+class ServoBank:
+    """The law from position error to duty, and the motor behind it, for n servos. Arrays are (n,), SI and radians."""
+
+    def __init__(self, servos: Sequence[ServoConstants]) -> None:
+        def column(name: str) -> Array:
+            return np.array([0.0 if getattr(s, name) is None else getattr(s, name) for s in servos], dtype=float)
+
+        proportional = np.array([s.proportional_gain is not None for s in servos], dtype=bool)
+        self.margin = np.where(proportional, 0.0, column("compliance_margin") * _COUNT)
+        self.punch = np.where(proportional, 0.0, column("punch") / 1023)
+        with np.errstate(divide="ignore"):
+            self.slope = np.where(proportional, 1 / column("proportional_gain"), column("compliance_slope") * _COUNT)
+        """Error beyond the margin at which the duty is full [rad]."""
+        self.full_torque = column("stall_torque") * column("supply_voltage") / column("rated_voltage")
+        self.back_emf = column("stall_torque") / column("no_load_speed")
+        self.viscous = column("viscous_friction")
+        self.coulomb = column("coulomb_friction")
+        self.inertia = column("reflected_inertia")
+
+    def duty(self, error: Array) -> Array:
+        """Duty, -1 to 1, at an error goal - position [rad], (..., n)."""
+        beyond = np.abs(error) - self.margin
+        size = np.minimum(1.0, self.punch + (1 - self.punch) * beyond / self.slope)
+        return np.where(beyond > 0, np.copysign(size, error), 0.0)
+
+    def motor_torque(self, error: Array, speed: Array, enabled: Array | bool = True) -> Array:
+        """Torque of the motor at the joint [N m] at a joint speed [rad/s]: the torque-speed line scaled by duty."""
+        return np.where(enabled, self.duty(error) * self.full_torque - self.back_emf * speed, 0.0)
+
+
+class Reference:
+    """What each servo steers to: from its last reference to the goal, at the moving speed (0 = at once)."""
+
+    def __init__(self, n: int) -> None:
+        self._since, self._from, self._goal = 0.0, np.zeros(n), np.zeros(n)
+        self._speed, self.enabled = np.full(n, np.inf), np.ones(n, dtype=bool)
+
+    def command(self, t: float, goal: Array, speed: Array, enabled: NDArray[np.bool_], position: Array) -> None:
+        """A command at time t [s]; a servo that is just enabled starts from its `position`."""
+        self._from = np.where(enabled & ~self.enabled, position, self.at(t))
+        self._since, self._goal, self.enabled = t, np.asarray(goal, dtype=float), np.asarray(enabled, dtype=bool)
+        self._speed = np.where(np.asarray(speed) > 0, speed, np.inf)
+
+    def at(self, t: float) -> Array:
+        """The reference (n,) [rad] at t, not before the last command [s]."""
+        elapsed = t - self._since
+        reach = self._speed * elapsed if elapsed > 0 else np.where(np.isinf(self._speed), np.inf, 0.0)
+        return self._from + np.minimum(np.maximum(self._goal - self._from, -reach), reach)
