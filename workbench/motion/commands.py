@@ -34,20 +34,38 @@ class Commands:
         if np.any(np.diff(self.times) <= 0):
             raise ValueError("command times must increase")
 
+    @staticmethod
+    def from_log(time: Array, joints: tuple[str, ...], goals: Array,
+                 enabled: NDArray[np.bool_] | None = None) -> Commands:
+        """Commands of a log of goals. time: (N,) [s], increasing. goals: (N, n) [rad]. enabled: (N, n), default all.
+
+        Moving speed 0 (at once); samples that change nothing are left out; a goal that is NaN keeps the one before.
+        Time zero is the log's first sample. ValueError where a joint's first goal is missing.
+        """
+        goals = np.asarray(goals, dtype=float)
+        on = np.ones(goals.shape, dtype=bool) if enabled is None else np.asarray(enabled, dtype=bool)
+        known = np.maximum.accumulate(np.where(np.isnan(goals), -1, np.arange(len(goals))[:, None]), axis=0)
+        if len(goals) == 0 or (known[0] < 0).any():
+            raise ValueError("the first sample must hold a goal for each joint")
+        goals = np.take_along_axis(goals, known, axis=0)
+        new = np.ones(len(goals), dtype=bool)
+        new[1:] = ((np.diff(goals, axis=0) != 0) | (on[1:] != on[:-1])).any(axis=1)
+        since = np.asarray(time, dtype=float) - time[0]
+        return Commands(since[new], joints, goals[new], np.zeros_like(goals[new]), on[new], float(since[-1]),
+                        np.full(int(new.sum()), -1))
+
     def reference(self, t: Array) -> Array:
-        """The servos' ramped reference at times t (N,): (N, n) [rad], from neutral before the first command (contract, section 4)."""
+        """The servos' ramped reference (N, n) [rad] at times t (N,), neutral before the first command (contract, 4)."""
         t = np.asarray(t, dtype=float)
+        reach = np.where(self.speeds > 0, self.speeds, np.inf)
+        from_ = np.zeros((len(self.times), len(self.joints)))  # the reference when each command comes
+        for k, dwell in enumerate(np.diff(self.times)):
+            from_[k + 1] = from_[k] + _ramp(self.goals[k] - from_[k], reach[k], dwell)
+        last = np.searchsorted(self.times, t, side="right") - 1
+        sent = last >= 0
+        at = last[sent]
         out = np.zeros((len(t), len(self.joints)))
-        ref = np.zeros(len(self.joints))
-        edges = [*self.times, np.inf]
-        for k, start in enumerate(self.times):
-            inside = (t >= start) & (t < edges[k + 1])
-            reach = np.where(self.speeds[k] > 0, self.speeds[k], np.inf)
-            step = self.goals[k] - ref
-            if inside.any():
-                out[inside] = ref + _ramp(step, reach, t[inside, None] - start)
-            if np.isfinite(edges[k + 1]):
-                ref = ref + _ramp(step, reach, np.array([[edges[k + 1] - start]]))[0]
+        out[sent] = from_[at] + _ramp(self.goals[at] - from_[at], reach[at], (t[sent] - self.times[at])[:, None])
         return out
 
     def column(self, joint: str) -> int:
@@ -55,9 +73,9 @@ class Commands:
         return self.joints.index(joint)
 
     def reordered(self, joints: tuple[str, ...]) -> Commands:
-        """The same commands with columns in another order; joints without a command hold neutral, joints not asked for are dropped."""
-        K = len(self.times)
-        goals, speeds, enabled = np.zeros((K, len(joints))), np.zeros((K, len(joints))), np.ones((K, len(joints)), dtype=bool)
+        """The same with columns in another order; joints without a command hold neutral, those left out are dropped."""
+        shape = (len(self.times), len(joints))
+        goals, speeds, enabled = np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
         for i, j in enumerate(joints):
             if j in self.joints:
                 c = self.joints.index(j)
@@ -65,7 +83,7 @@ class Commands:
         return Commands(self.times, joints, goals, speeds, enabled, self.end, self.poses)
 
 
-def _ramp(step: Array, speed: Array, elapsed: Array) -> Array:
+def _ramp(step: Array, speed: Array, elapsed: Array | float) -> Array:
     with np.errstate(invalid="ignore"):
         reach = np.where(np.isinf(speed), np.inf, speed * elapsed)
     return np.asarray(np.clip(step, -reach, reach), dtype=float)

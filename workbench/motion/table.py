@@ -1,0 +1,106 @@
+"""Pose tables in the servos' own units, and the thesis's conversion of angles into them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+from workbench.robot import COUNT, SPEED_UNIT, InputError
+
+if TYPE_CHECKING:
+    from workbench.motion.motion import Motion
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+CENTRE = 512
+"""Goal position of the neutral pose (AX-12A: 0 to 1023 over 300 degrees)."""
+LARGEST = 1023
+"""Largest goal position and moving speed that the servo's registers take in joint mode."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTable:
+    """Poses as the firmware plays them: each is sent, then waited for.
+
+    joints: (n,) names. goals: (P, n) goal positions, 0 to 1023. speeds: (P, n) moving speeds, 0 to 1023, 0 = at once.
+    dwells_ms: (P,) [ms], at least 1. source: where they come from. InputError names joint, pose and value out of range.
+    """
+
+    joints: tuple[str, ...]
+    goals: Counts
+    speeds: Counts
+    dwells_ms: Counts
+    source: str = "pose table"
+
+    def __post_init__(self) -> None:
+        shape = (len(self.dwells_ms), len(self.joints))
+        if self.goals.shape != shape or self.speeds.shape != shape:
+            raise InputError(self.source, f"expected goals and speeds for {shape[0]} poses of {shape[1]} joints")
+        if 0 in shape:
+            raise InputError(self.source, "expected at least one pose of one joint")
+        for what, counts in (("goal position", self.goals), ("moving speed", self.speeds)):
+            for k, i in np.argwhere((counts < 0) | (counts > LARGEST))[:1]:
+                place = f"pose {k + 1}, joint {self.joints[i]}"
+                raise InputError(self.source, f"{place}: {what} {counts[k, i]} is outside 0 to {LARGEST}")
+        for k in np.flatnonzero(self.dwells_ms < 1)[:1]:
+            raise InputError(self.source, f"pose {k + 1}: dwell of {self.dwells_ms[k]} ms; expected 1 or more")
+
+    def __len__(self) -> int:
+        return len(self.dwells_ms)
+
+    @staticmethod
+    def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion") -> PoseTable:
+        """The thesis's equations 3.1 to 3.4: rows of angles (K, n) [rad] at times (K,) [s] become K - 1 poses.
+
+        Goals are rounded to counts of 300/1023 deg about 512, speeds to counts of 114/1023 rpm, dwells to milliseconds.
+        The first row gives no pose of its own, only the speed of the first pose.
+        """
+        degrees = np.degrees(angles)
+        elapsed = np.diff(times)
+        with np.errstate(divide="raise", invalid="raise"):
+            rpm = np.abs(np.diff(degrees, axis=0) / elapsed[:, None]) / 6
+        return PoseTable(
+            joints,
+            goals=CENTRE + _nearest(degrees[1:] * LARGEST / 300),
+            speeds=_nearest(rpm * LARGEST / 114),
+            dwells_ms=_nearest(elapsed * 1000),
+            source=source,
+        )
+
+    def angles(self) -> Array:
+        """Goals as angles (P, n) [rad], zero = servo centre."""
+        return np.asarray((self.goals - CENTRE) * COUNT, dtype=float)
+
+    def commands(self, cycles: int = 1) -> Commands:
+        """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
+        if cycles < 1:
+            raise InputError(self.source, f"cycles: expected 1 or more, got {cycles}")
+        ends = np.cumsum(np.tile(self.dwells_ms, cycles)) / 1000
+        goals = np.tile(self.angles(), (cycles, 1))
+        return Commands(
+            times=np.concatenate([[0.0], ends[:-1]]),
+            joints=self.joints,
+            goals=goals,
+            speeds=np.tile(self.speeds * SPEED_UNIT, (cycles, 1)),
+            enabled=np.ones(goals.shape, dtype=bool),
+            end=float(ends[-1]),
+            poses=np.tile(np.arange(len(self)), cycles),
+        )
+
+    def as_motion(self) -> Motion:
+        """The poses as angles at their arrival times; the first row is the last pose, where the cycle closes."""
+        from workbench.motion.motion import Motion
+
+        angles = self.angles()
+        times = np.concatenate([[0.0], np.cumsum(self.dwells_ms) / 1000])
+        return Motion(self.source, times, self.joints, np.vstack([angles[-1:], angles]), self.source)
+
+
+def _nearest(x: Array) -> Counts:
+    """Nearest integers, halves away from zero as MATLAB rounds, with halves that were lost to the change of units."""
+    return np.asarray(np.sign(x) * np.floor(np.abs(x) + 0.5 + 1e-9), dtype=np.int64)
