@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from workbench.robot import InputError, RobotModel
 from workbench.servo.law import ServoLaw
 
 Array = NDArray[np.float64]
+Friction = Literal["implicit", "bristle"]
 
 HOLDING_DAMPING = 1e3
 """Damping [N m s/rad] below which Coulomb friction creeps in discrete plants: at 0.06 N m a joint at rest creeps by less
@@ -32,8 +34,8 @@ class ServoBank(LeafSystem):
         torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
 
     torque_enable may stay unconnected: all on. The reference advances every `period` seconds (discrete state, n). Back-EMF and
-    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (discrete plants: implicit,
-    holds at rest) or as bristles (continuous plants: state, n, Dahl 1968), so that generalized_force holds what remains.
+    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles of this
+    system (continuous state, n; Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
@@ -59,7 +61,7 @@ class ServoBank(LeafSystem):
         self.DeclareVectorOutputPort("generalized_force", nv, self._calc_force, force_state)
         self.DeclareVectorOutputPort("motor_torque", n, self._calc_motor_torque, state)
         self.DeclareVectorOutputPort("duty", n, self._calc_duty, state)
-        self.DeclareVectorOutputPort("reference", n, self._calc_reference, {self.xd_ticket()})
+        self.DeclareStateOutputPort("reference", self._reference)
         if bristles:
             self.DeclareContinuousState(n)
             self._bristle_stiffness = law.coulomb / BRISTLE_SLIP
@@ -123,9 +125,6 @@ class ServoBank(LeafSystem):
         enabled = self._enabled(context)
         output.SetFromVector(self.law.duty(error) * (1.0 if enabled is None else enabled > 0.5))
 
-    def _calc_reference(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(context.get_discrete_state_vector().value())
-
 
 def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
     """The joint's actuator; one is added to a plant not yet finalized. More than one, or none left to add: InputError."""
@@ -149,9 +148,9 @@ def servo_joints(plant: MultibodyPlant, model: RobotModel) -> list[RevoluteJoint
     return out
 
 
-def SetServoPhysics(plant: MultibodyPlant, model: RobotModel) -> ServoLaw:
+def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction) -> ServoLaw:
     """Sets on the plant's joints what the servos add to them, in place of what the SDF gave: damping, reflected inertia and,
-    in discrete plants, Coulomb friction (an actuator that brakes with at most that torque).
+    where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque).
 
     A joint's only actuator is used, because CENIC clamps the sum of several once, and because a joint's
     reflected inertia is that of its last actuator.
@@ -163,7 +162,7 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel) -> ServoLaw:
         joint.set_default_damping(float(law.damping[i]))
         actuator.set_default_rotor_inertia(float(law.inertia[i]))
         actuator.set_default_gear_ratio(1.0)
-        if plant.time_step() > 0 and law.coulomb[i] > 0:
+        if friction == "implicit" and law.coulomb[i] > 0:
             actuator.set_controller_gains(PdControllerGains(p=0.0, d=HOLDING_DAMPING))
             actuator.set_effort_limit(float(law.coulomb[i]))
         else:
@@ -171,27 +170,33 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel) -> ServoLaw:
     return law
 
 
-def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, period: float | None = None) -> ServoBank:
+def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, period: float | None = None,
+              friction: Friction | None = None) -> ServoBank:
     """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
     `moving_speed` inputs are left to connect.
 
     Finalizes the plant if the caller has not. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
-    Takes the plant's applied_generalized_force input, and desired_state of the instances that hold the joints (discrete plants).
-    Under CENIC the plant is a discrete one to Drake; friction is then implicit as well.
+    Takes the plant's applied_generalized_force input and, for implicit friction, desired_state of the instances that hold the joints.
+    `friction`: "implicit" (discrete plants, the default there, and CENIC) or "bristle" (continuous plants with an integrator whose
+    error control sees the bristles; CENIC's does not, steps over them and slides on without friction).
     """
     if model.effects:
         raise InputError(None, f"effect '{model.effects[0].effect}' has to be added by workbench.simulation, not by AddServos")
-    law = SetServoPhysics(plant, model)
+    if friction is None:
+        friction = "implicit" if plant.time_step() > 0 else "bristle"
+    if friction == "bristle" and plant.time_step() > 0:
+        raise InputError(None, "bristle friction needs a continuous plant (time_step 0); a discrete one takes friction='implicit'")
+    law = SetServoPhysics(plant, model, friction)
     if not plant.is_finalized():
         plant.Finalize()
     joints = servo_joints(plant, model)
-    discrete = plant.time_step() > 0
-    bank = ServoBank(plant, joints, law, period or plant.time_step() or 1e-3, bristles=not discrete and bool(law.coulomb.any()))
+    bank = ServoBank(plant, joints, law, period or plant.time_step() or 1e-3,
+                     bristles=friction == "bristle" and bool(law.coulomb.any()))
     bank.set_name("servo_bank")
     builder.AddSystem(bank)
     builder.Connect(plant.get_state_output_port(), bank.GetInputPort("plant_state"))
     builder.Connect(bank.GetOutputPort("generalized_force"), plant.get_applied_generalized_force_input_port())
-    if discrete:
+    if friction == "implicit":
         arm_friction(builder, plant, joints)
     return bank
 

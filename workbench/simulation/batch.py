@@ -1,0 +1,65 @@
+"""Many runs over both cores, or over a Dask cluster, by joblib."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from workbench.motion.commands import Commands
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation.config import SimulationConfig
+from workbench.simulation.rollout import Array, Simulation
+
+KEPT_STATIONS = 8
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: what Simulation.run takes, of a model in a configuration."""
+
+    model: RobotModel
+    config: SimulationConfig
+    commands: Commands | None = None
+    duration: float | None = None
+    lead: float = 0.1
+    trajectory: tuple[Array, Array] | None = None
+    path: Take | None = None
+    name: str = "simulation"
+
+
+def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
+    """Takes of all jobs, in their order, the same whatever `n_jobs` is. Worker processes keep their last stations, so that jobs that
+    differ in commands alone build none. Inside `joblib.parallel_config(backend="dask")` the jobs run on the client's cluster.
+    progress: called with (done, all).
+    """
+    takes: list[Take] = []
+    for take in _stream(jobs, n_jobs):
+        takes.append(take)
+        if progress:
+            progress(len(takes), len(jobs))
+    return takes
+
+
+def _stream(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
+    if n_jobs == 1 or len(jobs) == 1:
+        return (run_job(job) for job in jobs)
+    return Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
+
+
+_stations: OrderedDict[Any, Simulation] = OrderedDict()
+
+
+def run_job(job: Job) -> Take:
+    """One job in this process, on a kept station where model and configuration are those of an earlier job."""
+    key = (job.model.sha256, job.config)
+    if key not in _stations:
+        _stations[key] = Simulation(job.model, job.config)
+    _stations.move_to_end(key)
+    while len(_stations) > KEPT_STATIONS:
+        _stations.popitem(last=False)
+    return _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, name=job.name)

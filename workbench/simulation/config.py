@@ -1,0 +1,56 @@
+"""Every choice of a simulation, in one typed place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+BASES = ("free", "fixed", "path")
+DRIVES = ("servo", "fast_servo", "ideal", "playback")
+CONTACTS = ("point", "hydroelastic")
+APPROXIMATIONS = ("lagged", "sap", "similar")
+
+
+@dataclass(frozen=True)
+class SimulationConfig:
+    """Loadable by `pydrake.common.yaml.yaml_load_typed`.
+
+    time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic", … as in
+    Drake's GetIntegrationSchemes) to `accuracy`. approximation: of discrete contact. base: "free", "fixed" (held level, clear of the
+    ground), or "path" (moved along a recorded path). drive: "servo" (the full law), "fast_servo" (Drake's implicit PD; see
+    fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a recording, no dynamics). contact: "point" or "hydroelastic".
+    hydroelastic_modulus [Pa]: of feet that are given no hydroelastic shape by the SDF. settle [s]: time in which the
+    robot comes to rest in neutral. log_period [s]: of what is written down; 0: 1 ms or the step, if longer.
+    contact_period [s]: between samples of contact forces; 0: none.
+    """
+
+    time_step: float = 1e-3
+    base: str = "free"
+    drive: str = "servo"
+    contact: str = "point"
+    approximation: str = "lagged"
+    integrator: str = "runge_kutta3"
+    accuracy: float = 1e-4
+    hydroelastic_modulus: float = 2e6
+    settle: float = 1.0
+    log_period: float = 0.0
+    contact_period: float = 1 / 120
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("base", BASES), ("drive", DRIVES), ("contact", CONTACTS), ("approximation", APPROXIMATIONS)):
+            if getattr(self, name) not in allowed:
+                raise ValueError(f"{name}: expected one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, float) and not 0 <= value < float("inf"):
+                raise ValueError(f"{f.name}: expected a non-negative number, got {value}")
+        if self.time_step == 0 and self.drive == "fast_servo":
+            raise ValueError("drive: fast_servo needs a discrete plant (time_step > 0)")
+
+    @property
+    def logged_every(self) -> float:
+        """Seconds between two rows of the log, a multiple of the step."""
+        if self.log_period:
+            return self.log_period
+        if self.time_step == 0:
+            return 1e-3
+        return self.time_step * max(1, round(1e-3 / self.time_step))

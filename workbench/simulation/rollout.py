@@ -1,0 +1,273 @@
+"""Runs of a station: commands or trajectories in, a Take out. One station serves many runs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context
+
+from workbench.motion.commands import Commands
+from workbench.recording.take import Take
+from workbench.robot import InputError, RobotModel
+from workbench.servo import ServoLaw
+from workbench.servo.bank import servo_joints
+from workbench.simulation.config import SimulationConfig
+from workbench.simulation.contact import lowest_point
+from workbench.simulation.forces import FootForces
+from workbench.simulation.gantry import AXES, base_poses, gantry_coordinates
+from workbench.simulation.reference import linear_trajectory, reference_columns
+
+Array = NDArray[np.float64]
+
+
+class Simulation:
+    """One robot in one configuration, built once; every run starts from the same settled neutral pose."""
+
+    def __init__(self, model: RobotModel, config: SimulationConfig | None = None) -> None:
+        from workbench.simulation.station import MakePuppyStation
+
+        self.model = model
+        self.config = config or SimulationConfig()
+        self.diagram = MakePuppyStation(self.config, model)
+        self.plant = self.diagram.plant()
+        self.context: Context = self.diagram.CreateDefaultContext()
+        self.simulator = Simulator(self.diagram, self.context)
+        if self.config.time_step == 0:
+            ApplySimulatorConfig(SimulatorConfig(integration_scheme=self.config.integrator, accuracy=self.config.accuracy,
+                                                 max_step_size=0.01), self.simulator)
+        self._plant_context = self.diagram.GetMutableSubsystemContext(self.plant, self.context)
+        joints = servo_joints(self.plant, model)
+        self._q = np.array([j.position_start() for j in joints], dtype=int)
+        self._v = np.array([j.velocity_start() for j in joints], dtype=int) + self.plant.num_positions()
+        self._joints = joints
+        self._law = ServoLaw.of([model.servo(j) for j in model.joints])
+        self._base = self.plant.GetBodyByName(model.base)
+        self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
+        self._rest: tuple[bytes | None, Context] | None = None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Order of the columns of commands and takes."""
+        return self.model.joints
+
+    def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
+            trajectory: tuple[Array, Array] | None = None, path: Take | None = None, name: str = "simulation") -> Take:
+        """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
+        default: the commands' ramped reference). duration [s] after the first command (default: to the end). lead [s] of rest
+        before it. path: take whose base moves this one (base "path"). Returns a Take with time 0 at the first command.
+        """
+        if self.config.drive == "playback":
+            raise InputError(None, "drive 'playback' shows a take; call play_back")
+        if commands is not None:
+            commands = commands.reordered(self.joints)
+        if duration is None:
+            if trajectory is not None:
+                duration = float(trajectory[0][-1])
+            elif commands is not None:
+                duration = commands.end
+            else:
+                raise ValueError("expected commands, a trajectory or a duration")
+        lead = self._whole_steps(lead)
+        base_path = self._base_path_to_follow(path, lead, duration)
+        self._rest_in_neutral(None if base_path is None else base_path[1][0])
+        if base_path is not None:
+            self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(linear_trajectory(*base_path))
+        self._follow(commands, trajectory, lead, duration)
+        contact = self._advance(commands, lead, lead + duration)
+        return self._take(commands, lead, contact, name)
+
+    def play_back(self, take: Take) -> Take:
+        """The thesis's animation: the model posed at each frame of a take, joints it did not see in neutral, gaps bridged, velocities by
+        differences; no dynamics. Publishes each pose, so that a visualizer on the diagram shows it."""
+        q = np.zeros((len(take), len(self.joints)))
+        for i, joint in enumerate(self.joints):
+            if joint in take.joints:
+                q[:, i] = _bridged(take.time, take.q[:, take.column(joint)])
+        p, quat = _base_track(take)
+        for t, row, p_WB, quat_WB in zip(take.time, q, p, quat):
+            self.context.SetTime(float(t - take.time[0]))
+            for joint, angle in zip(self._joints, row):
+                joint.set_angle(self._plant_context, angle)
+            if self.config.base == "free":
+                X_WB = RigidTransform(RotationMatrix(_matrix(quat_WB)), p_WB)
+                self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, X_WB)
+            self.diagram.ForcedPublish(self.context)
+        return Take(name=take.name, source="playback", time=take.time, joints=self.joints, q=q, starts_at=take.starts_at,
+                    zeroed=take.zeroed, base=take.base, v=np.gradient(q, take.time, axis=0), p_WB=p, quat_WB=quat,
+                    bodies=take.bodies, commands=take.commands)
+
+    def _whole_steps(self, seconds: float) -> float:
+        return round(seconds / self.config.logged_every) * self.config.logged_every
+
+    def _base_path_to_follow(self, path: Take | None, lead: float, duration: float) -> tuple[Array, Array] | None:
+        """Times (K,) [s] on the run's clock and gantry coordinates (K, 6) of the path, from the run's first instant on."""
+        if self.config.base != "path":
+            return None
+        if path is None:
+            raise ValueError("base 'path' needs a take to follow")
+        times = path.since_start + lead
+        rows = gantry_coordinates(*_base_track(path))
+        start = np.array([np.interp(0.0, times, c) for c in rows.T])
+        inside = (times > 0) & (times < lead + duration + 0.1)
+        return np.concatenate([[0.0], times[inside]]), np.vstack([start, rows[inside]])
+
+    def _rest_in_neutral(self, gantry: Array | None) -> None:
+        """Puts the context at the state in which the robot stands still in neutral, at time 0; found once, kept for the next run."""
+        key = None if gantry is None else gantry.tobytes()
+        if self._rest is None or self._rest[0] != key:
+            self.context.SetTimeStateAndParametersFrom(self.diagram.CreateDefaultContext())
+            self._place_base(gantry)
+            self._hold_neutral()
+            self.simulator.Initialize()
+            self.simulator.AdvanceTo(self._whole_steps(self.config.settle))
+            self._centre_base()
+            self._rest = key, self.context.Clone()
+        self.context.SetTimeStateAndParametersFrom(self._rest[1])
+        self.context.SetTime(0.0)
+        for name in _LOGS:
+            if self.diagram.HasSubsystemNamed(name):
+                self.diagram.GetSubsystemByName(name).FindMutableLog(self.context).Clear()
+
+    def _place_base(self, gantry: Array | None) -> None:
+        if gantry is not None:
+            for name, value in zip(AXES, gantry):
+                self.plant.GetJointByName(f"gantry_{name}").SetPositions(self._plant_context, [value])
+            hold = linear_trajectory(np.array([0.0, 1.0]), np.vstack([gantry, gantry]))
+            self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(hold)
+        elif self.config.base == "free":
+            poses = {link: RigidTransform(RotationMatrix(R[0]), p[0])
+                     for link, (p, R) in self.model.kinematics.forward(np.zeros((1, len(self.joints)))).items()}
+            height = -lowest_point(self.plant, self.diagram.scene_graph(), self._base.model_instance(), poses)
+            self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, RigidTransform([0, 0, height]))
+
+    def _hold_neutral(self) -> None:
+        neutral = np.zeros(len(self.joints))
+        if self.config.drive == "servo":
+            self._command(neutral, neutral, neutral + 1)
+        else:
+            self._update_reference(np.array([0.0, 1.0]), np.zeros((2, len(self.joints))))
+
+    def _centre_base(self) -> None:
+        """Takes the millimetres and the heading that settling added out of the state: the floor is the same everywhere."""
+        if self.config.base != "free":
+            return
+        X_WB = self.plant.GetFreeBodyPose(self._plant_context, self._base)
+        rpy = RollPitchYaw(X_WB.rotation())
+        centred = RigidTransform(RollPitchYaw(rpy.roll_angle(), rpy.pitch_angle(), 0.0), [0, 0, X_WB.translation()[2]])
+        self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, centred)
+
+    def _command(self, goal: Array, speed: Array, enabled: Array) -> None:
+        for port, value in (("goal_position", goal), ("moving_speed", speed), ("torque_enable", enabled)):
+            self.diagram.GetInputPort(port).FixValue(self.context, value)
+
+    def _update_reference(self, times: Array, rows: Array) -> None:
+        columns = reference_columns(self.plant, self.model)
+        self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(linear_trajectory(times, rows[:, columns]))
+
+    def _follow(self, commands: Commands | None, trajectory: tuple[Array, Array] | None, lead: float, duration: float) -> None:
+        """Hands a trajectory to the drives that follow one; a trajectory that does not start in neutral is approached during the lead."""
+        if self.config.drive == "servo":
+            if trajectory is not None:
+                raise InputError(None, "drive 'servo' plays commands; a trajectory needs drive 'ideal'")
+            return
+        if trajectory is None:
+            if commands is None:
+                return
+            times = np.arange(0.0, duration + 1e-9, self.config.logged_every)
+            trajectory = times, commands.reference(times)
+        times, rows = np.asarray(trajectory[0], dtype=float) - trajectory[0][0] + lead, np.asarray(trajectory[1], dtype=float)
+        if lead > 0:
+            s = np.linspace(0, 1, 20)[:-1]
+            times, rows = np.concatenate([s * lead, times]), np.vstack([np.outer(s * s * (3 - 2 * s), rows[0]), rows])
+        self._update_reference(times, rows)
+
+    def _advance(self, commands: Commands | None, lead: float, end: float) -> tuple[Array, dict[str, Array]]:
+        """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
+        changes = {} if commands is None or self.config.drive != "servo" else {lead + float(t): k for k, t in enumerate(commands.times)}
+        period = self.config.contact_period
+        samples = np.arange(0.0, end + 1e-9, period) if period and self.config.base == "free" else np.empty(0)
+        forces: list[Array] = []
+        sampled: list[float] = []
+        self.simulator.Initialize()
+        due = set(samples.tolist())
+        for t in sorted(due | {c for c in changes if c < end} | {end}):
+            self.simulator.AdvanceTo(t)
+            if t in due:
+                forces.append(self._foot_forces(self._plant_context))
+                sampled.append(t)
+            if t in changes:
+                assert commands is not None
+                k = changes[t]
+                self._command(commands.goals[k], commands.speeds[k], commands.enabled[k].astype(float))
+        stacked = np.array(forces).reshape(len(forces), len(self._foot_forces.feet), 3)
+        return np.array(sampled), {foot: stacked[:, i] for i, foot in enumerate(self._foot_forces.feet)}
+
+    def _log(self, name: str) -> tuple[Array, Array]:
+        log = self.diagram.GetSubsystemByName(f"{name}_log").FindLog(self.context)
+        return log.sample_times(), log.data().T
+
+    def _take(self, commands: Commands | None, lead: float, contact: tuple[Array, dict[str, Array]], name: str) -> Take:
+        t, x = self._log("state")
+        q, v = x[:, self._q], x[:, self._v]
+        p, quat = self._base_path(x)
+        time = t - lead
+        foot = {f: np.column_stack([np.interp(t, contact[0], c) for c in force.T]) for f, force in contact[1].items()} if len(contact[0]) else {}
+        return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
+                    p_WB=p, quat_WB=quat, torque=self._torque(t, q, v, commands, lead), contact=foot, commands=commands)
+
+    def _base_path(self, x: Array) -> tuple[Array, Array]:
+        if self.config.base == "free":
+            start = self._base.floating_positions_start()
+            return x[:, start + 4:start + 7], x[:, start:start + 4]
+        if self.config.base == "path":
+            columns = [self.plant.GetJointByName(f"gantry_{a}").position_start() for a in AXES]
+            return base_poses(x[:, columns])
+        X_WB = self.plant.EvalBodyPoseInWorld(self._plant_context, self._base)
+        return (np.tile(X_WB.translation(), (len(x), 1)),
+                np.tile(X_WB.rotation().ToQuaternion().wxyz(), (len(x), 1)))
+
+    def _torque(self, t: Array, q: Array, v: Array, commands: Commands | None, lead: float) -> Array | None:
+        """Torque of the servos on the joints [N m]: motor less viscous friction, and Coulomb friction, from the logs."""
+        if self.config.drive == "servo" and self.config.time_step == 0 and self.config.integrator != "cenic":
+            force = self._log("generalized_force")[1][:, self._v - self.plant.num_positions()]
+            return np.asarray(force - self._law.damping * v)
+        actuation = self._log("net_actuation")[1]
+        last = {self.plant.get_joint_actuator(a).joint().name(): self.plant.get_joint_actuator(a).input_start()
+                for a in self.plant.GetJointActuatorIndices()}
+        drake = actuation[:, [last[j] for j in self.joints]]
+        if self.config.drive == "ideal":
+            return drake
+        if self.config.drive == "fast_servo":
+            return np.asarray(drake - self._law.damping * v)
+        enabled: Array | bool = True
+        if commands is not None and not commands.enabled.all():
+            row = np.clip(np.searchsorted(commands.times, t - lead + 1e-9, side="right") - 1, 0, None)
+            enabled = commands.enabled[row]
+        error = self._log("reference")[1] - q
+        return np.asarray(self._law.motor_torque(error, v, enabled) - self._law.viscous * v + drake)
+
+
+_LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log")
+
+
+def _bridged(time: Array, values: Array) -> Array:
+    good = np.isfinite(values)
+    return np.interp(time, time[good], values[good]) if good.any() else np.zeros_like(values)
+
+
+def _base_track(take: Take) -> tuple[Array, Array]:
+    """Base path of a take with gaps bridged; at the origin, level, where it was not seen."""
+    n = len(take)
+    if take.p_WB is None or take.quat_WB is None:
+        return np.zeros((n, 3)), np.tile([1.0, 0, 0, 0], (n, 1))
+    p = np.column_stack([_bridged(take.time, c) for c in take.p_WB.T])
+    quat = np.column_stack([_bridged(take.time, c) for c in take.quat_WB.T])
+    return p, quat / np.linalg.norm(quat, axis=1, keepdims=True)
+
+
+def _matrix(quat: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(quat, scalar_first=True).as_matrix())

@@ -1,0 +1,115 @@
+"""The station: plant, contact and servos of one robot as a RobotDiagram, with the same ports whatever drives it."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
+from pydrake.planning import RobotDiagram, RobotDiagramBuilder
+from pydrake.systems.primitives import VectorLogSink
+
+from workbench.robot import ConfigureParser, InputError, RobotModel, puppy_model
+from workbench.servo import AddServos, ServoLaw
+from workbench.servo.bank import find_actuator, servo_joints
+from workbench.simulation.config import SimulationConfig
+from workbench.simulation.contact import AddGround, SelectFeet
+from workbench.simulation.fast_servo import AddFastServos
+from workbench.simulation.gantry import AddGantry, ConnectPath
+from workbench.simulation.reference import ConnectReference
+
+_APPROXIMATIONS = {"lagged": DiscreteContactApproximation.kLagged, "sap": DiscreteContactApproximation.kSap,
+                   "similar": DiscreteContactApproximation.kSimilar}
+IDEAL_GAINS = PdControllerGains(p=1e5, d=1e3)
+"""Of the ideal drive [N m/rad, N m s/rad]: 1.5 N m bends it by 15 microradians."""
+
+
+def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel | None = None) -> RobotDiagram:
+    """A robot (default: the puppy) in its world.
+
+    Inputs: `goal_position` (n) rad and `moving_speed` (n) rad/s, `torque_enable` (n) (drive "servo"). Joints in `model.joints`' order.
+    Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, and with drive "servo" `motor_torque` (n) N m,
+    `duty` (n), `reference` (n) rad. Systems: "plant", "scene_graph", "servo_bank", "joint_reference" (the trajectory that
+    drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named after the
+    port they write down: "state_log", "net_actuation_log", "reference_log".
+    """
+    config = config or SimulationConfig()
+    model = model or puppy_model()
+    if model.effects:
+        raise InputError(None, f"effect '{model.effects[0].effect}' is not known to this version of the simulation")
+    model.check_base(floating=config.base == "free")
+    builder = RobotDiagramBuilder(time_step=config.time_step)
+    plant = builder.plant()
+    instance = _add_model(builder, model)
+    if config.time_step > 0:
+        plant.set_discrete_contact_approximation(_APPROXIMATIONS[config.approximation])
+    plant.set_contact_model(ContactModel.kPoint if config.contact == "point" else ContactModel.kHydroelasticWithFallback)
+    SelectFeet(plant, builder.scene_graph(), instance, config.contact, config.hydroelastic_modulus)
+    if config.base == "free":
+        AddGround(plant, builder.scene_graph(), instance, model.ground)
+    elif config.base == "fixed" and not model.kinematics.fixed_to_world:
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(model.base, instance), RigidTransform([0, 0, 1.0]))
+    elif config.base == "path":
+        AddGantry(builder, model.base, instance)
+    _add_drive(builder, plant, model, config)
+    if config.base == "path":
+        ConnectPath(builder)
+    _add_logs(builder, plant, config)
+    return builder.Build()
+
+
+def _add_model(builder: RobotDiagramBuilder, model: RobotModel) -> ModelInstanceIndex:
+    parser = builder.parser()
+    ConfigureParser(parser)
+    return parser.AddModels(str(model.path))[0]
+
+
+def _add_drive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, config: SimulationConfig) -> None:
+    diagram = builder.builder()
+    if config.drive == "servo":
+        implicit = config.time_step > 0 or config.integrator == "cenic"
+        bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle")
+        for port in ("goal_position", "moving_speed", "torque_enable"):
+            diagram.ExportInput(bank.GetInputPort(port), port)
+        for port in ("motor_torque", "duty", "reference"):
+            diagram.ExportOutput(bank.GetOutputPort(port), port)
+    elif config.drive == "fast_servo":
+        AddFastServos(diagram, plant, model)
+    elif config.drive == "ideal":
+        AddIdealDrive(builder, plant, model)
+    else:
+        plant.Finalize()
+
+
+def AddIdealDrive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel) -> None:
+    """Joints that follow "joint_reference" whatever it takes: Drake's implicit PD, stiff and without an effort limit."""
+    joints = servo_joints(plant, model)
+    law = ServoLaw.of([model.servo(j.name()) for j in joints])
+    for joint, inertia in zip(joints, law.inertia):
+        actuator = find_actuator(plant, joint)
+        joint.set_default_damping(0.0)
+        actuator.set_default_rotor_inertia(float(inertia))
+        actuator.set_default_gear_ratio(1.0)
+        actuator.set_effort_limit(np.inf)
+        actuator.set_controller_gains(IDEAL_GAINS)
+    plant.Finalize()
+    ConnectReference(builder.builder(), plant, joints, with_velocity=True)
+
+
+def _add_logs(builder: RobotDiagramBuilder, plant: MultibodyPlant, config: SimulationConfig) -> None:
+    diagram = builder.builder()
+    diagram.ExportOutput(plant.get_state_output_port(), "state")
+    diagram.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
+    logged = {"state": plant.get_state_output_port()}
+    if plant.num_actuators():
+        logged["net_actuation"] = plant.get_net_actuation_output_port()
+        diagram.ExportOutput(logged["net_actuation"], "net_actuation")
+    if config.drive == "servo":
+        bank = builder.builder().GetSubsystemByName("servo_bank")
+        logged["reference"] = bank.GetOutputPort("reference")
+        if config.time_step == 0:
+            logged["generalized_force"] = bank.GetOutputPort("generalized_force")
+    for name, port in logged.items():
+        log = diagram.AddSystem(VectorLogSink(port.size(), config.logged_every))
+        log.set_name(f"{name}_log")
+        diagram.Connect(port, log.get_input_port())
