@@ -1,0 +1,30 @@
+"""`workbench inspect FILE`: what a file is."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "inspect",
+        help="say what a recording, motion, model, session or table is",
+        description="Says what a file is, told by its content: kind, version, units, rate, frames, assets or joints, "
+        "share of gaps, and what is wrong with it. FILE is a recording (Motive CSV, joint log, BAM log, SAGE), "
+        "a motion table, a .mtn file, a rollout, a robot model (SDF, URDF or package://puppy/puppy.sdf), "
+        "a session.yaml, model.yaml or servo.yaml, or a folder of firmware tables.",
+    )
+    parser.add_argument("file", metavar="FILE")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Prints the inspection."""
+    from workbench.view.inspection import inspect_file
+
+    inspection = inspect_file(args.file)
+    print(json.dumps(inspection.as_dict(), indent=2, allow_nan=False) if args.json else inspection.as_text())
+    return 0
