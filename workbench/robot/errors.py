@@ -6,7 +6,8 @@ from os import PathLike
 
 
 class InputError(ValueError):
-    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with 2."""
+    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with
+    2."""
 
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
         self.source = None if source is None else str(source)

@@ -136,8 +136,9 @@ def _parse(path: Path) -> Kinematics:
             continue
         X_PF, X_BM = joint.frame_on_parent().GetFixedPoseInBodyFrame(), joint.frame_on_child().GetFixedPoseInBodyFrame()
         X_MB = X_BM.inverse()
-        common = dict(name=joint.name(), parent=parent, child=child, X_PF_p=X_PF.translation(), X_PF_R=X_PF.rotation().matrix(),
-                      X_MB_p=X_MB.translation(), X_MB_R=X_MB.rotation().matrix())
+        common = {"name": joint.name(), "parent": parent, "child": child,
+                  "X_PF_p": X_PF.translation(), "X_PF_R": X_PF.rotation().matrix(),
+                  "X_MB_p": X_MB.translation(), "X_MB_R": X_MB.rotation().matrix()}
         if isinstance(joint, RevoluteJoint):
             efforts = [a.effort_limit() for a in map(plant.get_joint_actuator, plant.GetJointActuatorIndices(instance))
                        if a.joint().index() == joint.index()]

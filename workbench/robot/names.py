@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-JOINTS: tuple[str, ...] = tuple("blb blm blt brb brm brt flb flm flt frb frm frt head neck tail".split())
+JOINTS: tuple[str, ...] = (
+    "blb", "blm", "blt", "brb", "brm", "brt", "flb", "flm", "flt", "frb", "frm", "frt", "head", "neck", "tail",
+)
 """The thesis's alphabetical order, of every table that has columns without a header."""
 
 BUS_IDS = MappingProxyType(
-    dict(blb=15, blm=13, blt=11, brb=14, brm=12, brt=10, flb=9, flm=7, flt=5, frb=8, frm=6, frt=4, head=17, neck=16, tail=1)
+    dict(zip(JOINTS, (15, 13, 11, 14, 12, 10, 9, 7, 5, 8, 6, 4, 17, 16, 1)))
 )
 
 RIGID_BODIES = MappingProxyType(

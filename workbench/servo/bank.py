@@ -34,12 +34,14 @@ class ServoBank(LeafSystem):
         torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
 
     torque_enable may stay unconnected: all on. The reference advances every `period` seconds (discrete state, n). Back-EMF and
-    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles of this
-    system (continuous state, n; Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
+    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles
+    of this system (continuous state, n; Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
-    def __init__(self, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], law: ServoLaw, period: float, bristles: bool) -> None:
+    def __init__(
+        self, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], law: ServoLaw, period: float, bristles: bool
+    ) -> None:
         super().__init__()
         self.law = law
         self.joints = tuple(j.name() for j in joints)
@@ -130,11 +132,11 @@ def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
     """The joint's actuator; one is added to a plant not yet finalized. More than one, or none left to add: InputError."""
     found = [a for a in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()) if a.joint().index() == joint.index()]
     if len(found) > 1:
-        raise InputError(None, f"joint '{joint.name()}' has {len(found)} actuators; expected one: Drake sums their effects (facts: CENIC)")
+        raise InputError(None, f"joint '{joint.name()}' has {len(found)} actuators; expected one, which the servo takes over")
     if found:
         return found[0]
     if plant.is_finalized():
-        raise InputError(None, f"joint '{joint.name()}' has no actuator and the plant is finalized; call AddServos before Finalize")
+        raise InputError(None, f"joint '{joint.name()}' has no actuator, and the plant is finalized: call AddServos before")
     return plant.AddJointActuator(joint.name(), joint)
 
 
@@ -176,9 +178,9 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     `moving_speed` inputs are left to connect.
 
     Finalizes the plant if the caller has not. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
-    Takes the plant's applied_generalized_force input and, for implicit friction, desired_state of the instances that hold the joints.
-    `friction`: "implicit" (discrete plants, the default there, and CENIC) or "bristle" (continuous plants with an integrator whose
-    error control sees the bristles; CENIC's does not, steps over them and slides on without friction).
+    Takes the plant's applied_generalized_force input and, for implicit friction, desired_state of the instances that hold
+    the joints. `friction`: "implicit" (discrete plants, the default there, and CENIC) or "bristle" (continuous plants with
+    an integrator whose error control sees the bristles; CENIC's does not, steps over them and slides on without friction).
     """
     if model.effects:
         raise InputError(None, f"effect '{model.effects[0].effect}' has to be added by workbench.simulation, not by AddServos")

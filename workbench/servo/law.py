@@ -48,7 +48,7 @@ class ServoLaw:
         size = np.minimum(self.punch + self.gain * beyond, 1.0)
         return np.copysign(np.where(beyond > 0, size, 0.0), error)
 
-    def motor_torque(self, error: Array, velocity: Array, enabled: Array | bool = True) -> Array:
+    def motor_torque(self, error: Array, velocity: Array, enabled: NDArray[np.bool_] | bool = True) -> Array:
         """Torque of the motor at the joint [N m], before friction: duty torque less back-EMF, 0 with torque disabled."""
         return np.asarray(np.where(enabled, self.duty(error) * self.full_torque - self.back_emf * velocity, 0.0), dtype=float)
 

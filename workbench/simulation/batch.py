@@ -33,9 +33,9 @@ class Job:
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
-    """Takes of all jobs, in their order, the same whatever `n_jobs` is. Worker processes keep their last stations, so that jobs that
-    differ in commands alone build none. Inside `joblib.parallel_config(backend="dask")` the jobs run on the client's cluster.
-    progress: called with (done, all).
+    """Takes of all jobs, in their order, the same whatever `n_jobs` is. Worker processes keep their last stations, so that
+    jobs that differ in commands alone build none. Inside `joblib.parallel_config(backend="dask")` the jobs run on the
+    client's cluster. progress: called with (done, all).
     """
     takes: list[Take] = []
     for take in _stream(jobs, n_jobs):

@@ -14,13 +14,13 @@ APPROXIMATIONS = ("lagged", "sap", "similar")
 class SimulationConfig:
     """Loadable by `pydrake.common.yaml.yaml_load_typed`.
 
-    time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic", … as in
-    Drake's GetIntegrationSchemes) to `accuracy`. approximation: of discrete contact. base: "free", "fixed" (held level, clear of the
-    ground), or "path" (moved along a recorded path). drive: "servo" (the full law), "fast_servo" (Drake's implicit PD; see
-    fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a recording, no dynamics). contact: "point" or "hydroelastic".
-    hydroelastic_modulus [Pa]: of feet that are given no hydroelastic shape by the SDF. settle [s]: time in which the
-    robot comes to rest in neutral. log_period [s]: of what is written down; 0: 1 ms or the step, if longer.
-    contact_period [s]: between samples of contact forces; 0: none.
+    time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic",
+    … as in Drake's GetIntegrationSchemes) to `accuracy`. approximation: of discrete contact. base: "free", "fixed" (held
+    level, clear of the ground), or "path" (moved along a recorded path). drive: "servo" (the full law), "fast_servo"
+    (Drake's implicit PD; see fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a
+    recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
+    hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
+    written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces; 0: none.
     """
 
     time_step: float = 1e-3

@@ -93,8 +93,10 @@ def _friction(properties: ProximityProperties) -> float | None:
     return float(properties.GetProperty("material", "coulomb_friction").dynamic_friction())
 
 
-def lowest_point(plant: MultibodyPlant, scene_graph: SceneGraph, instance: ModelInstanceIndex, heights: dict[str, RigidTransform]) -> float:
-    """Lowest z [m] of the model's collision shapes, its links posed at `heights` (X_WL by link); 0 without shapes."""
+def lowest_point(
+    plant: MultibodyPlant, scene_graph: SceneGraph, instance: ModelInstanceIndex, poses: dict[str, RigidTransform]
+) -> float:
+    """Lowest z [m] of the model's collision shapes, its links at `poses` (X_WL by link); 0 without shapes."""
     inspector = scene_graph.model_inspector()
     lowest = math.inf
     for g, link in model_geometries(plant, instance).items():
@@ -103,6 +105,6 @@ def lowest_point(plant: MultibodyPlant, scene_graph: SceneGraph, instance: Model
         box = inspector.GetObbInGeometryFrame(g)
         X_LG = inspector.GetPoseInFrame(g)
         corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]).T * box.half_width()[:, None]
-        p_W = heights[link] @ X_LG @ box.pose() @ corners
+        p_W = poses[link] @ X_LG @ box.pose() @ corners
         lowest = min(lowest, float(p_W[2].min()))
     return lowest if math.isfinite(lowest) else 0.0

@@ -1,8 +1,8 @@
 """A fast variant of the servo on Drake's implicit PD, for large steps and many rollouts.
 
-Exact (up to the implicit step) for a proportional law without margin and punch: duty = clip(gain (ref - q), -1, 1). A compliance law
-is approximated by a line through its edge of saturation, which ignores margin and punch inside it; the error against the
-full law is measured by a test and stated in the README.
+Exact (up to the implicit step) for a proportional law without margin and punch: duty = clip(gain (ref - q), -1, 1). A
+compliance law is approximated by a line through its edge of saturation, which ignores margin and punch inside it; the error
+against the full law is measured by a test and stated in the README.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from workbench.simulation.reference import ConnectReference
 
 
 def AddFastServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel) -> None:
-    """Position gain on each joint's own actuator, Coulomb friction on a second one; finalizes the plant and adds "joint_reference".
+    """Position gain on each joint's own actuator, Coulomb friction on a second one; finalizes the plant and adds
+    "joint_reference".
 
     Both actuators carry the reflected inertia, as a joint's is that of the last one added. Discrete plants only: CENIC sums the
     gains of both and clamps them once.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, PrismaticJoint, RevoluteJoint, SpatialInertia
 from pydrake.planning import RobotDiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
@@ -38,11 +37,13 @@ def ConnectPath(builder: RobotDiagramBuilder) -> None:
     hold = PiecewisePolynomial.FirstOrderHold([0.0, 1.0], np.zeros((6, 2)))
     source = builder.builder().AddSystem(TrajectorySource(hold, 1, True))
     source.set_name("base_path")
-    builder.builder().Connect(source.get_output_port(), plant.get_desired_state_input_port(plant.GetModelInstanceByName("gantry")))
+    builder.builder().Connect(source.get_output_port(),
+    plant.get_desired_state_input_port(plant.GetModelInstanceByName("gantry")))
 
 
 def gantry_coordinates(p_WB: NDArray[np.float64], quat_WB: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Base poses (N, 3) [m], (N, 4) wxyz as gantry coordinates (N, 6): x, y, z [m], yaw, pitch, roll [rad]; continuous in yaw and roll."""
+    """Base poses (N, 3) [m], (N, 4) wxyz as gantry coordinates (N, 6): x, y, z [m], yaw, pitch, roll [rad]; continuous in
+    yaw and roll."""
     angles = np.unwrap(Rotation.from_quat(quat_WB, scalar_first=True).as_euler("ZYX"), axis=0)
     return np.hstack([p_WB, angles])
 

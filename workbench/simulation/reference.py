@@ -17,12 +17,15 @@ from workbench.robot import InputError, RobotModel
 Array = NDArray[np.float64]
 
 
-def ConnectReference(builder: DiagramBuilder, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], with_velocity: bool) -> None:
-    """Feeds the joints' PD controllers from a TrajectorySource named "joint_reference", with one column for each actuator of their
-    model instance (reference_columns); call its UpdateTrajectory before a run."""
+def ConnectReference(
+    builder: DiagramBuilder, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], with_velocity: bool
+) -> None:
+    """Feeds the joints' PD controllers from a TrajectorySource named "joint_reference", with one column for each actuator of
+    their model instance (reference_columns); call its UpdateTrajectory before a run."""
     port = plant.get_desired_state_input_port(joints[0].model_instance())
     n = port.size() // 2
-    source = builder.AddSystem(TrajectorySource(linear_trajectory(np.array([0.0, 1.0]), np.zeros((2, n))), int(with_velocity), True))
+    hold = linear_trajectory(np.array([0.0, 1.0]), np.zeros((2, n)))
+    source = builder.AddSystem(TrajectorySource(hold, int(with_velocity), True))
     source.set_name("joint_reference")
     if with_velocity:
         builder.Connect(source.get_output_port(), port)
@@ -49,10 +52,3 @@ def reference_columns(plant: MultibodyPlant, model: RobotModel) -> NDArray[np.in
 def linear_trajectory(times: Array, values: Array) -> PiecewisePolynomial:
     """First-order hold through values (N, n) at times (N,) [s], for references with corners."""
     return PiecewisePolynomial.FirstOrderHold(times, np.asarray(values).T)
-
-
-def smooth_trajectory(times: Array, values: Array) -> PiecewisePolynomial:
-    """Cubic, continuous in acceleration, at rest at both ends; values (N, n) at times (N,) [s]."""
-    values = np.asarray(values).T
-    zero = np.zeros(len(values))
-    return PiecewisePolynomial.CubicWithContinuousSecondDerivatives(times, values, zero, zero)

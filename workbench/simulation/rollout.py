@@ -79,8 +79,8 @@ class Simulation:
         return self._take(commands, lead, contact, name)
 
     def play_back(self, take: Take) -> Take:
-        """The thesis's animation: the model posed at each frame of a take, joints it did not see in neutral, gaps bridged, velocities by
-        differences; no dynamics. Publishes each pose, so that a visualizer on the diagram shows it."""
+        """The thesis's animation: the model posed at each frame of a take, joints it did not see in neutral, gaps bridged,
+        velocities by differences; no dynamics. Publishes each pose, so that a visualizer on the diagram shows it."""
         q = np.zeros((len(take), len(self.joints)))
         for i, joint in enumerate(self.joints):
             if joint in take.joints:
@@ -95,7 +95,7 @@ class Simulation:
                 self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, X_WB)
             self.diagram.ForcedPublish(self.context)
         return Take(name=take.name, source="playback", time=take.time, joints=self.joints, q=q, starts_at=take.starts_at,
-                    zeroed=take.zeroed, base=take.base, v=np.gradient(q, take.time, axis=0), p_WB=p, quat_WB=quat,
+                    zeroed=take.zeroed, base=take.base, v=np.asarray(np.gradient(q, take.time, axis=0)), p_WB=p, quat_WB=quat,
                     bodies=take.bodies, commands=take.commands)
 
     def _whole_steps(self, seconds: float) -> float:
@@ -114,7 +114,8 @@ class Simulation:
         return np.concatenate([[0.0], times[inside]]), np.vstack([start, rows[inside]])
 
     def _rest_in_neutral(self, gantry: Array | None) -> None:
-        """Puts the context at the state in which the robot stands still in neutral, at time 0; found once, kept for the next run."""
+        """Puts the context at the state in which the robot stands still in neutral, at time 0; found once, kept for the next
+        run."""
         key = None if gantry is None else gantry.tobytes()
         if self._rest is None or self._rest[0] != key:
             self.context.SetTimeStateAndParametersFrom(self.diagram.CreateDefaultContext())
@@ -167,7 +168,8 @@ class Simulation:
         self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(linear_trajectory(times, rows[:, columns]))
 
     def _follow(self, commands: Commands | None, trajectory: tuple[Array, Array] | None, lead: float, duration: float) -> None:
-        """Hands a trajectory to the drives that follow one; a trajectory that does not start in neutral is approached during the lead."""
+        """Hands a trajectory to the drives that follow one; a trajectory that does not start in neutral is approached during
+        the lead."""
         if self.config.drive == "servo":
             if trajectory is not None:
                 raise InputError(None, "drive 'servo' plays commands; a trajectory needs drive 'ideal'")
@@ -185,7 +187,8 @@ class Simulation:
 
     def _advance(self, commands: Commands | None, lead: float, end: float) -> tuple[Array, dict[str, Array]]:
         """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
-        changes = {} if commands is None or self.config.drive != "servo" else {lead + float(t): k for k, t in enumerate(commands.times)}
+        commanded = commands is not None and self.config.drive == "servo"
+        changes = {lead + float(t): k for k, t in enumerate(commands.times)} if commands is not None and commanded else {}
         period = self.config.contact_period
         samples = np.arange(0.0, end + 1e-9, period) if period and self.config.base == "free" else np.empty(0)
         forces: list[Array] = []
@@ -213,7 +216,8 @@ class Simulation:
         q, v = x[:, self._q], x[:, self._v]
         p, quat = self._base_path(x)
         time = t - lead
-        foot = {f: np.column_stack([np.interp(t, contact[0], c) for c in force.T]) for f, force in contact[1].items()} if len(contact[0]) else {}
+        sampled, forces = contact
+        foot = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
         return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
                     p_WB=p, quat_WB=quat, torque=self._torque(t, q, v, commands, lead), contact=foot, commands=commands)
 
@@ -241,7 +245,7 @@ class Simulation:
             return drake
         if self.config.drive == "fast_servo":
             return np.asarray(drake - self._law.damping * v)
-        enabled: Array | bool = True
+        enabled: NDArray[np.bool_] | bool = True
         if commands is not None and not commands.enabled.all():
             row = np.clip(np.searchsorted(commands.times, t - lead + 1e-9, side="right") - 1, 0, None)
             enabled = commands.enabled[row]

@@ -27,11 +27,11 @@ IDEAL_GAINS = PdControllerGains(p=1e5, d=1e3)
 def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel | None = None) -> RobotDiagram:
     """A robot (default: the puppy) in its world.
 
-    Inputs: `goal_position` (n) rad and `moving_speed` (n) rad/s, `torque_enable` (n) (drive "servo"). Joints in `model.joints`' order.
-    Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, and with drive "servo" `motor_torque` (n) N m,
-    `duty` (n), `reference` (n) rad. Systems: "plant", "scene_graph", "servo_bank", "joint_reference" (the trajectory that
-    drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named after the
-    port they write down: "state_log", "net_actuation_log", "reference_log".
+    Inputs: `goal_position` (n) rad and `moving_speed` (n) rad/s, `torque_enable` (n) (drive "servo"). Joints in
+    `model.joints`' order. Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, and with drive
+    "servo" `motor_torque` (n) N m, `duty` (n), `reference` (n) rad. Systems: "plant", "scene_graph", "servo_bank",
+    "joint_reference" (the trajectory that drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named
+    after the port they write down: "state_log", "net_actuation_log", "reference_log".
     """
     config = config or SimulationConfig()
     model = model or puppy_model()
