@@ -1,0 +1,26 @@
+"""Runs the command as a user would, in this process."""
+
+import pytest
+
+from workbench.cli.main import main
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The one line with which bad input is refused."""
+    capsys.readouterr()
+    code = main(arguments)
+    captured = capsys.readouterr()
+    assert code == 2, captured.err
+    lines = captured.err.splitlines()
+    assert len(lines) == 1, captured.err
+    assert lines[0].startswith(f"workbench {arguments[0]}: error: ")
+    return lines[0]
+
+
+def succeeds(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What a run that ends well prints."""
+    capsys.readouterr()
+    code = main(arguments)
+    captured = capsys.readouterr()
+    assert code == 0, captured.err
+    return captured.out

@@ -1,0 +1,78 @@
+"""Results appear whole or not at all, and whether they can appear is known before the work."""
+
+from pathlib import Path
+
+import pytest
+
+from workbench.cli.output import output_directory
+from workbench.robot import InputError
+
+
+def test_appears_at_the_end_and_whole(tmp_path: Path) -> None:
+    out = tmp_path / "runs" / "a"
+    with output_directory(out) as folder:
+        (folder / "deep").mkdir()
+        (folder / "deep" / "x.csv").write_text("1")
+        (folder / "y.csv").write_text("2")
+        assert not out.exists()
+    assert (out / "deep" / "x.csv").read_text() == "1"
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["a", "deep", "runs", "x.csv", "y.csv"]
+
+
+def test_nothing_remains_of_work_that_failed(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError, match="defect"):
+        _fail(tmp_path / "runs" / "a", RuntimeError("defect"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_failed_work_leaves_earlier_results_alone(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("old")
+    with pytest.raises(KeyboardInterrupt):
+        _fail(tmp_path, KeyboardInterrupt())
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("x.csv", "old")]
+
+
+def test_replaces_files_of_the_same_name_and_keeps_others(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("old")
+    (tmp_path / "mine.txt").write_text("kept")
+    with output_directory(tmp_path) as folder:
+        (folder / "x.csv").write_text("new")
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {"x.csv": "new", "mine.txt": "kept"}
+
+
+@pytest.mark.parametrize("below", ["", "sub/dir"])
+def test_a_path_under_a_file_is_refused_before_the_work(tmp_path: Path, below: str) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="is a file"), output_directory(tmp_path / "file" / below):
+        pytest.fail("the work began")
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_folder_without_write_permission_is_refused_before_the_work() -> None:
+    with pytest.raises(InputError, match=r"/proc/workbench: cannot be written \("), output_directory(Path("/proc/workbench")):
+        pytest.fail("the work began")
+
+
+def test_no_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)  # root may write anywhere, so the refusal is acted
+    with pytest.raises(InputError, match="Permission denied"), output_directory(tmp_path / "a"):
+        pytest.fail("the work began")
+
+
+def test_a_disk_that_fills_up_while_publishing_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "rename", full)
+    with pytest.raises(InputError, match="No space left"), output_directory(tmp_path / "a") as folder:
+        (folder / "x").write_text("1")
+    assert not list(tmp_path.iterdir())
+
+
+def _fail(out: Path, error: BaseException) -> None:
+    with output_directory(out) as folder:
+        (folder / "x.csv").write_text("half")
+        raise error
