@@ -2,8 +2,8 @@
 
 It shares no simulation code with the workbench, only plain data (`RobotModel`, `ServoConstants`, `Commands`), so that
 an agreement between the two means something. It makes recordings whose physics is known (`make_session`), and is what
-the bench races against (`bench`). A run goes through stages, each of which takes and returns plain data; between them is
-where physics that the model does not have can be put in:
+the bench races against (`bench`). A run goes through stages, each of which takes and returns plain data; between them
+is where physics that the model does not have can be put in:
 
     firmware (what is sent) ->
     description (links, joints, feet) -> mjcf (MuJoCo's model) -> play (with the servo bank) -> capture (what is seen)

@@ -20,9 +20,9 @@ _AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 class Camera:
     """How the robot is looked at, one session long.
 
-    rate [Hz]; rotation_noise about each axis [rad] and position_noise along each axis [m], standard deviations; yaw of the
-    robot's first heading in the capture's axes, positive to the left [rad]; origin (3,): of the robot's world in the
-    capture's axes [m]; gaps: mean number of gaps of each rigid body per take.
+    rate [Hz]; rotation_noise about each axis [rad] and position_noise along each axis [m], standard deviations; yaw of
+    the robot's first heading in the capture's axes, positive to the left [rad]; origin (3,): of the robot's world in
+    the capture's axes [m]; gaps: mean number of gaps of each rigid body per take.
     """
 
     rate: float = 120.0

@@ -1,10 +1,11 @@
-"""Links, joints and contact shapes of a robot as plain data, read by Drake's parser (no dynamics of Drake's are used)."""
+"""Links, joints and contact shapes of a robot as plain data, read by Drake's parser (not its dynamics)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FootSphere:
-    """A contact sphere: centre (3,) in its link's frame [m], radius [m]; friction and stiffness [N/m], NaN if unsaid."""
+    """A contact sphere: centre (3,) in its link's frame and radius [m]; friction, stiffness [N/m], NaN if unsaid."""
 
     name: str
     center: Array
@@ -33,9 +34,9 @@ class FootSphere:
 class LinkPart:
     """A link L and the joint that carries it, if any.
 
-    mass [kg], com (3,) [m] and inertia (3, 3) [kg m²] about the centre of mass, all in L. parent: the parent link; p (3,)
-    and R (3, 3): pose in the parent with the joint at zero; anchor (3,) and axis (3,): the joint's place and direction in
-    L; lower, upper [rad]: its range, equal if the joint does not move.
+    mass [kg], com (3,) [m] and inertia (3, 3) [kg m²] about the centre of mass, all in L. parent: the parent link; p
+    (3,) and R (3, 3): pose in the parent with the joint at zero; anchor (3,) and axis (3,): the joint's place and
+    direction in L; lower, upper [rad]: its range, equal if the joint does not move.
     """
 
     name: str
@@ -90,7 +91,7 @@ def describe(path: str | Path) -> Description:
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     ConfigureParser(parser)
-    (instance,) = parser.AddModels(str(path))
+    (instance,) = parser.AddModels(Path(path))
     plant.Finalize()
     inspector = scene_graph.model_inspector()
     links = []
@@ -114,9 +115,9 @@ def describe(path: str | Path) -> Description:
 
 def _inertial(body: RigidBody) -> tuple[float, Array, Array]:
     spatial = body.default_spatial_inertia()
-    mass, com = spatial.get_mass(), spatial.get_com()
-    about_origin = mass * spatial.get_unit_inertia().CopyToFullMatrix3()
-    return mass, com, about_origin - mass * (np.dot(com, com) * np.eye(3) - np.outer(com, com))
+    mass, com = float(spatial.get_mass()), np.asarray(spatial.get_com(), dtype=float)
+    about_origin = np.asarray(spatial.get_unit_inertia().CopyToFullMatrix3(), dtype=float)
+    return mass, com, mass * (about_origin - np.dot(com, com) * np.eye(3) + np.outer(com, com))
 
 
 def _spheres(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidBody) -> tuple[FootSphere, ...]:
@@ -125,12 +126,13 @@ def _spheres(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidB
         shape, properties = inspector.GetShape(geometry), inspector.GetProximityProperties(geometry)
         if not isinstance(shape, Sphere):
             continue
-        friction = properties.GetPropertyOrDefault("material", "coulomb_friction", None)
+        friction: Any = properties.GetPropertyOrDefault("material", "coulomb_friction", None)
+        stiffness: Any = properties.GetPropertyOrDefault("material", "point_contact_stiffness", math.nan)
         out.append(FootSphere(
             name=inspector.GetName(geometry).split("::")[-1],
             center=inspector.GetPoseInFrame(geometry).translation(),
             radius=shape.radius(),
             friction=math.nan if friction is None else friction.dynamic_friction(),
-            stiffness=float(properties.GetPropertyOrDefault("material", "point_contact_stiffness", math.nan)),
+            stiffness=float(stiffness),
         ))
     return tuple(out)

@@ -27,7 +27,7 @@ def read_rows(path: Path) -> tuple[tuple[str, ...], Array, Array]:
 
 
 def commands_from_rows(joints: tuple[str, ...], times: Array, angles: Array, cycles: int = 1) -> Commands:
-    """Commands of `cycles` cycles of poses, arriving at times (K,) [s] at angles (K, n) [deg]; the first row is no pose."""
+    """Commands of `cycles` cycles of poses, at times (K,) [s] and angles (K, n) [deg]; the first row is no pose."""
     goals = 512 + _round(angles[1:] / _DEG_PER_COUNT)
     dwells = _round(np.diff(times) * 1000) / 1000
     speeds = _round(np.abs(np.diff(angles, axis=0) / np.diff(times)[:, None]) / 6 / _RPM_PER_TABLE_COUNT)

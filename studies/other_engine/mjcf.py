@@ -16,16 +16,21 @@ HELD_AT = 1.0
 """Height of the root link's origin on the stand [m]."""
 IMPEDANCE = 0.9
 """MuJoCo's d: the share of a contact's acceleration that the constraint takes (its default at full depth)."""
+PUNCH_WIDTH = 1e-4
+"""Error over which the punch rises, where MuJoCo's actuators make the servo law [rad]."""
 DEFAULT_STIFFNESS = 1e5
 DEFAULT_FRICTION = 1.0
 
 
-def to_mjcf(description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float) -> str:
+def to_mjcf(
+    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float, drives: bool = False
+) -> str:
     """MJCF text: bodies are the links, with the links' frames; `servos` in the order of description.joints.
 
-    Reflected inertia is `armature`; Coulomb friction is `frictionloss` (a constraint, so that it holds at rest); viscous
-    friction and back-EMF are `damping`, which implicitfast integrates implicitly. Feet are spheres on a plane, with
-    elliptic cones and condim 3.
+    Reflected inertia is `armature`; Coulomb friction is `frictionloss` (a constraint, so that it holds at rest);
+    viscous friction and back-EMF are `damping`, which implicitfast integrates implicitly. Feet are spheres on a plane,
+    with elliptic cones and condim 3. With `drives` the servo law is in it too, as actuators whose control is the
+    reference [rad], three to a joint.
     """
     top = ET.Element("mujoco", model="other_engine")
     ET.SubElement(top, "compiler", angle="radian", autolimits="true", balanceinertia="false")
@@ -47,11 +52,15 @@ def to_mjcf(description: Description, servos: ServoBank, ground: Ground, base: s
         else:
             _hang(element, link, servos, index.get(link.joint), timestep)
         _fill(element, link, ground)
+    if drives:
+        actuators = ET.SubElement(top, "actuator")
+        for i, joint in enumerate(description.joints):
+            _drive(actuators, joint, servos, i)
     return ET.tostring(top, encoding="unicode")
 
 
 def compile_model(
-    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float
+    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float, drives: bool = False
 ) -> mujoco.MjModel:
     """MuJoCo's model, with each contact as stiff [N/m] as foot and ground in series.
 
@@ -60,7 +69,7 @@ def compile_model(
     solved for t, which MuJoCo asks to be at least two steps. The contract's dissipation has no counterpart; the damping
     ratio of 1 makes impacts inelastic, as 20 s/m does.
     """
-    model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep))
+    model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep, drives))
     for link in description.links:
         body = model.body(link.name).id
         for k, sphere in enumerate(link.spheres):
@@ -86,6 +95,21 @@ def _hang(element: ET.Element, link: LinkPart, servos: ServoBank, i: int | None,
         limited="true" if math.isfinite(link.lower) and math.isfinite(link.upper) else "false",
         # A stiff friction constraint: below the Coulomb torque the joint creeps at thousandths of a degree per second.
         solreffriction=_text(2 * timestep, 1), solimpfriction="0.99 0.99 0.001")
+
+
+def _drive(actuators: ET.Element, joint: str, servos: ServoBank, i: int) -> None:
+    """The law from error to torque as a sum of springs that saturate: it is piecewise linear, but for the punch at the
+    margin, which here rises over PUNCH_WIDTH."""
+    corners = np.cumsum([servos.margin[i], PUNCH_WIDTH, servos.slope[i] - PUNCH_WIDTH])
+    duty = np.array([0.0, servos.punch[i] + (1 - servos.punch[i]) * PUNCH_WIDTH / servos.slope[i], 1.0])
+    steepness = np.diff(duty, prepend=0.0) / np.diff(corners, prepend=0.0).clip(min=1e-12) * servos.full_torque[i]
+    # A spring that saturates at a corner is missing beyond it, so the steepness before a corner is the sum of those that
+    # saturate there or later.
+    for stiffness, corner in zip(steepness - np.append(steepness[1:], 0.0), corners):
+        if corner > 0 and abs(stiffness) > 1e-9:
+            most = abs(stiffness) * corner
+            ET.SubElement(actuators, "general", joint=joint, gaintype="fixed", biastype="affine", ctrllimited="false",
+                          gainprm=_text(stiffness), biasprm=_text(0, -stiffness, 0), forcerange=_text(-most, most))
 
 
 def _fill(element: ET.Element, link: LinkPart, ground: Ground) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from studies.other_engine.capture import Capture
+from workbench.robot.files import write_whole
 
 _KINDS = ("Rotation",) * 4 + ("Position",) * 3 + ("Mean Marker Error",)
 _AXES = (*"XYZW", *"XYZ", "")
@@ -16,8 +16,7 @@ _AXES = (*"XYZW", *"XYZ", "")
 def write_motive_csv(
     path: str | Path, capture: Capture, name: str, digits: int = 6, frames_in_take: int | None = None
 ) -> None:
-    """Writes rigid bodies; blank cells where unseen. `frames_in_take`: what the header says of a start cut from a take."""
-    path = Path(path)
+    """Writes rigid bodies; blank cells where unseen. `frames_in_take`: of the whole take, where this is its start."""
     assets = list(capture.p)
     total = len(capture) if frames_in_take is None else frames_in_take
     header = {
@@ -40,6 +39,4 @@ def write_motive_csv(
     for k, row in enumerate(table):
         cells = ("" if np.isnan(x) else f"{x:.{digits}f}" for x in row)
         lines.append(f"{k},{k / capture.rate:.6f}," + ",".join(cells))
-    part = path.with_name(path.name + ".part")
-    part.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    os.replace(part, path)
+    write_whole(path, "\n".join(lines) + "\n")

@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 class Rollout:
     """One run.
 
-    time (N,) [s], from -lead, 0 = first command, in steps. q, v (N, n) [rad, rad/s] and torque (N, n) [N m, of the motors
-    at the joints] by `joints`. qpos (N, nq): MuJoCo's configuration. contact: link -> force on it (N, 3) [N], of the
-    ground and of other feet, for links with feet. model: MuJoCo's model, whose bodies are the links.
+    time (N,) [s], from -lead, 0 = first command, in steps. q, v (N, n) [rad, rad/s] and torque (N, n) [N m, of the
+    motors at the joints] by `joints`. qpos (N, nq): MuJoCo's configuration. contact: link -> force on it (N, 3) [N], of
+    the ground and of other feet, for links with feet. model: MuJoCo's model, whose bodies are the links.
     """
 
     time: Array
