@@ -1,0 +1,1 @@
+"""To look at: figures, the 3D replay, the report page."""
