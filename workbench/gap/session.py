@@ -82,7 +82,7 @@ def load_session(path: str | Path) -> Session:
     """Reads `session.yaml`.
 
     InputError names the file, the key and what was expected: an unknown key anywhere, a missing file, a wrong type, a
-    joint or link that the model lacks, a base that cannot float where a take says free, a motion that the servos cannot play.
+    joint or link that the model lacks, a base that cannot float where a take says free, a motion that cannot be played.
     """
     path = Path(path)
     if path.is_dir():
@@ -148,11 +148,12 @@ def _robot(f: Fields, ground: Ground | None) -> RobotModel:
     servos = _servos(f, joints)
     f.done()
     return replace(
-        model, base=base, servos=servos or model.servos, ground=ground or model.ground, rigid_bodies=bodies, bus_ids=ids)
+        model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
+        ground=ground or model.ground)
 
 
 def _servos(f: Fields, joints: tuple[str, ...]) -> dict[str, ServoConstants]:
-    """Constants by joint, from one file for all or a file for each; a joint without a file keeps the nominal AX-12A."""
+    """Constants by joint, from one file for all or one for each; a joint without a file keeps the nominal AX-12A."""
     given = f.raw("servos")
     if given is None:
         return {}

@@ -1,0 +1,161 @@
+"""Which foot stands when: from where the feet are, recorded and simulated alike, or from contact forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from workbench.recording.take import Take
+from workbench.robot import FEET, RobotModel
+
+Array = NDArray[np.float64]
+
+LIFT = 0.0075
+"""A foot is off the ground above this share of the height at which the base rests: 1.3 mm for a puppy, twice what capture
+noise makes of a foot's height. On simulated walks the duty factor then lies within 0.04 of that from contact forces."""
+SHORTEST = 0.03
+"""Stance or swing shorter than this [s] is chatter, not a step."""
+
+
+@dataclass(frozen=True)
+class FootPhases:
+    """When one foot stands. stance: (N,) of the take's frames. known: (N,) where the foot was seen.
+
+    falls: times at which it touches down [s], on the take's clock. duty: share of the time from the first command to the
+    last command's end (or the take's) in which it stands.
+    """
+
+    stance: NDArray[np.bool_]
+    known: NDArray[np.bool_]
+    falls: Array
+    duty: float
+
+
+def foot_phases(take: Take, model: RobotModel) -> dict[str, FootPhases]:
+    """Stance of each foot (by its knee's joint) from the height of its lowest point over where it stood at rest.
+
+    Works on any take with a base pose and the legs' joints, zeroed or not: heights are compared with the same foot's own
+    at rest, so that zero poses, droop and a pivot's error cancel. Empty for a base held fixed or a robot without feet.
+    """
+    if take.p_WB is None or take.quat_WB is None or take.base == "fixed":
+        return {}
+    heights = foot_heights(take, model)
+    rest_height = _rest_height(take, heights)
+    out = {}
+    for foot, z in heights.items():
+        resting = z[take.resting & np.isfinite(z)]
+        ground = float(np.median(resting)) if len(resting) else float(np.nanmin(z, initial=np.inf))
+        out[foot] = _phases(take, z - ground < LIFT * rest_height, np.isfinite(z))
+    return out
+
+
+def force_phases(take: Take, least: float = 0.05) -> dict[str, FootPhases]:
+    """Stance of each foot from a simulation's contact forces: more than `least` of the mean total load."""
+    if not take.contact:
+        return {}
+    load = {foot: f[:, 2] for foot, f in take.contact.items()}
+    total = float(np.nanmean(np.sum(list(load.values()), axis=0)))
+    if not total > 0:
+        return {}
+    return {foot: _phases(take, f > least * total, np.isfinite(f)) for foot, f in load.items()}
+
+
+def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
+    """Height of each foot's lowest point in the world (N,) [m]; NaN where its leg or the base was not seen."""
+    assert take.p_WB is not None
+    assert take.quat_WB is not None
+    seen = np.isfinite(take.p_WB).all(axis=1) & np.isfinite(take.quat_WB).all(axis=1)
+    z_axis = np.full((len(take), 3), np.nan)  # the world's up in the base link's frame
+    z_axis[seen] = Rotation.from_quat(take.quat_WB[seen], scalar_first=True).as_matrix()[:, 2, :]
+    kinematics = model.kinematics
+    poses = kinematics.forward(take.q, take.joints)
+    p_RB, R_RB = poses[model.base]
+    out = {}
+    for foot, (points, radii) in foot_points(model.path).items():
+        link = kinematics.frames[foot].child
+        if not set(kinematics.chain(link)) & set(kinematics.joints) <= set(take.joints):
+            continue
+        p, R = poses[link]
+        p_B = np.einsum("nji,nmj->nmi", R_RB, (p - p_RB)[:, None] + np.einsum("nij,mj->nmi", R, points))
+        out[foot] = take.p_WB[:, 2] + (np.einsum("ni,nmi->nm", z_axis, p_B) - radii).min(axis=1)
+    return out
+
+
+@lru_cache(maxsize=16)
+def foot_points(path: Path) -> dict[str, tuple[Array, Array]]:
+    """Points (M, 3) [m] on each foot's link that may touch the ground, with radii (M,), by the knee's joint.
+
+    From the link's collision shapes: a sphere is its centre with its radius, any other shape the corners of its box. A
+    robot without the puppy's knee joints has no feet here.
+    """
+    from pydrake.geometry import Role, SceneGraph, Sphere
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    from workbench.robot import ConfigureParser
+
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    ConfigureParser(parser)
+    (instance,) = parser.AddModels(path)
+    plant.Finalize()
+    inspector = scene_graph.model_inspector()
+    feet: dict[str, tuple[Array, Array]] = {}
+    for foot in FEET:
+        if not plant.HasJointNamed(foot, instance):
+            continue
+        body = plant.GetJointByName(foot, instance).child_body()
+        frame = plant.GetBodyFrameIdOrThrow(body.index())
+        points, radii = [], []
+        for geometry in inspector.GetGeometries(frame, Role.kProximity):
+            X_BG, shape = inspector.GetPoseInFrame(geometry), inspector.GetShape(geometry)
+            if isinstance(shape, Sphere):
+                points.append(X_BG.translation()[None])
+                radii.append(np.array([shape.radius()]))
+                continue
+            box = inspector.GetObbInGeometryFrame(geometry)
+            if box is None:  # a half space
+                continue
+            corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, 8) * box.half_width()[:, None]
+            points.append((X_BG.multiply(box.pose()).multiply(corners)).T)
+            radii.append(np.zeros(8))
+        if points:
+            feet[foot] = np.vstack(points), np.concatenate(radii)
+    return feet
+
+
+def _rest_height(take: Take, heights: dict[str, Array]) -> float:
+    """Height of the base link's origin over the feet before the first command (or in the first frames) [m]."""
+    assert take.p_WB is not None
+    use = take.resting if take.resting.any() else np.arange(len(take)) < 10
+    over = [np.nanmedian(take.p_WB[use, 2] - z[use]) for z in heights.values() if np.isfinite(z[use]).any()]
+    return float(np.median(over)) if over else float("nan")
+
+
+def _phases(take: Take, stance: NDArray[np.bool_], known: NDArray[np.bool_]) -> FootPhases:
+    stance = _without_chatter(stance | ~known, take.time)
+    end = take.starts_at + take.commands.end if take.commands is not None else take.time[-1]
+    moving = (take.since_start >= 0) & (take.time <= end)
+    down = np.flatnonzero(np.diff(stance.astype(int)) == 1) + 1
+    falls = take.time[down[known[down] & known[down - 1] & moving[down]]]
+    use = moving & known
+    return FootPhases(stance & known, known, falls, float(stance[use].mean()) if use.any() else float("nan"))
+
+
+def _without_chatter(stance: NDArray[np.bool_], time: Array) -> NDArray[np.bool_]:
+    """Phases below SHORTEST, the shortest first, are joined to their neighbours; the first and the last phase stay."""
+    stance = stance.copy()
+    while True:
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(stance.astype(int))) + 1, [len(stance)]])
+        lengths = np.append(time, time[-1])[edges[1:]] - time[edges[:-1]]
+        inner = lengths[1:-1]
+        if not len(inner) or inner.min() >= SHORTEST:
+            return stance
+        i = int(np.argmin(inner)) + 1
+        stance[edges[i] : edges[i + 1]] ^= True

@@ -1,0 +1,149 @@
+"""What one take did, and how two differ, on plain arrays. SI and radians; NaN where nothing can be said."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def rms(x: Array, axis: int = 0) -> Array:
+    """Root of the mean square along `axis` over what is not NaN; NaN where nothing is left."""
+    seen = np.isfinite(x)
+    count = seen.sum(axis=axis)
+    total = np.sum(np.square(np.where(seen, x, 0.0)), axis=axis)
+    return np.asarray(np.sqrt(np.divide(total, count, out=np.full(np.shape(count), np.nan), where=count > 0)))
+
+
+def rms_difference(a: Array, b: Array, use: Mask) -> Array:
+    """RMS of a - b over the frames `use` where both are seen: (n,) for columns (N, n)."""
+    return rms(a[use] - b[use])
+
+
+def rms_distance(a: Array, b: Array, use: Mask) -> float:
+    """RMS distance of two paths (N, 3) over the frames `use` where both are seen."""
+    return float(rms(np.linalg.norm(a[use] - b[use], axis=1)))
+
+
+def noise_at_rest(x: Array, resting: Mask, least: int = 5) -> Array:
+    """RMS about the mean over the frames at rest: (n,) for columns (N, n); NaN below `least` frames.
+
+    Unbiased for white noise (n - 1 in place of n).
+    """
+    rest = x[resting]
+    count = np.isfinite(rest).sum(axis=0)
+    out = np.full(x.shape[1], np.nan)
+    enough = count >= least
+    if enough.any():
+        out[enough] = np.nanstd(rest[:, enough], axis=0, ddof=1)
+    return out
+
+
+def correlation(a: Array, b: Array, use: Mask) -> Array:
+    """Pearson's correlation of each column over the frames `use`; NaN for a column that does not move."""
+    both = use[:, None] & np.isfinite(a) & np.isfinite(b)
+    count = np.maximum(both.sum(axis=0), 1)
+
+    def centred(x: Array) -> Array:
+        x = np.where(both, x, 0.0)
+        return np.where(both, x - x.sum(axis=0) / count, 0.0)
+
+    x, y = centred(a), centred(b)
+    spread = np.sqrt((x * x).sum(axis=0) * (y * y).sum(axis=0))
+    return np.asarray(np.divide((x * y).sum(axis=0), spread, out=np.full(len(spread), np.nan), where=spread > 1e-12))
+
+
+def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array, most: float = 0.2) -> Array:
+    """Time by which column a_j comes later than b_j [s], (n,): the shift of least RMS difference.
+
+    Between frames by a parabola. NaN for a column of b that moves less than 5 times `noise` (n,) (NaN: 1e-3 rad), or whose
+    best shift lies at the edge of +-`most` [s]. Both on the same `time` (N,).
+    """
+    shown = use[:, None] & np.isfinite(b)
+    moves = np.where(shown, b, -np.inf).max(axis=0) - np.where(shown, b, np.inf).min(axis=0)
+    ready = moves > np.where(noise > 0, 5 * noise, 1e-3)
+    step = float(np.median(np.diff(time)))
+    shifts = np.arange(-int(most / step) - 1, int(most / step) + 2) * step
+    cost = np.full((len(shifts), a.shape[1]), np.nan)
+    for j in np.flatnonzero(ready):
+        seen = np.isfinite(b[:, j])
+        for i, shift in enumerate(shifts):
+            shifted = np.interp(time - shift, time[seen], b[seen, j])
+            cost[i, j] = rms(a[use, j] - shifted[use]) ** 2
+    out = np.full(a.shape[1], np.nan)
+    for j in np.flatnonzero(ready & np.isfinite(cost).all(axis=0)):
+        i = int(np.argmin(cost[:, j]))
+        if 0 < i < len(shifts) - 1:
+            before, at, after = cost[i - 1 : i + 2, j]
+            curve = before - 2 * at + after
+            out[j] = shifts[i] + (0.5 * step * (before - after) / curve if curve > 0 else 0.0)
+    return out
+
+
+def heading(quat_WB: Array) -> Array:
+    """Heading of a link about z, positive to the left, continuous (N,) [rad], from quaternions wxyz (N, 4).
+
+    The direction of the link's x axis in the plane: what is left of the rotation when tilt and roll are taken out.
+    """
+    out = np.full(len(quat_WB), np.nan)
+    seen = np.isfinite(quat_WB).all(axis=1)
+    if seen.any():
+        x = Rotation.from_quat(quat_WB[seen], scalar_first=True).as_matrix()[:, :, 0]
+        out[seen] = np.unwrap(np.arctan2(x[:, 1], x[:, 0]))
+    return out
+
+
+def travelled(p_WB: Array, since_start: Array) -> Array:
+    """Displacement (3,) [m] from the rest before the first command to the last frame seen; NaN where neither is."""
+    seen = np.isfinite(p_WB).all(axis=1)
+    before, after = seen & (since_start < 0), seen & (since_start >= 0)
+    if not after.any():
+        return np.full(3, np.nan)
+    first = p_WB[before].mean(axis=0) if before.any() else p_WB[after][0]
+    return np.asarray(p_WB[after][-1] - first)
+
+
+def turned(quat_WB: Array, since_start: Array) -> float:
+    """Change of heading [rad] from the rest before the first command to the last frame seen, whole turns counted."""
+    return float(travelled(np.column_stack([heading(quat_WB), np.zeros((len(quat_WB), 2))]), since_start)[0])
+
+
+def planar_speed(time: Array, p_WB: Array, window: float = 0.1) -> Array:
+    """Speed in the plane (N,) [m/s]: slope of a straight line over `window` [s] (Savitzky and Golay's first derivative)."""
+    from scipy.signal import savgol_filter
+
+    step = float(np.median(np.diff(time)))
+    length = min(max(3, 2 * round(window / step / 2) + 1), len(time) - (len(time) + 1) % 2)
+    filled = np.column_stack([_filled(time, p_WB[:, i]) for i in range(2)])
+    return np.asarray(np.linalg.norm(savgol_filter(filled, length, 1, deriv=1, delta=step, axis=0), axis=1))
+
+
+def smoothness(time: Array, speed: Array, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float:
+    """Spectral arc length (SPARC) of a speed profile: minus the length of its normalised spectrum; 0 is smoothest.
+
+    S. Balasubramanian, A. Melendez-Calderon, A. Roby-Brami, E. Burdet: On the analysis of movement smoothness. J.
+    NeuroEng. Rehabil. 12:112, 2015, with that paper's cutoff [Hz], amplitude threshold and zero padding. Unlike jerk it
+    bears a recording's noise. NaN for a profile that is zero or shorter than four samples.
+    """
+    if len(speed) < 4 or not np.isfinite(speed).all() or not np.any(speed):
+        return float("nan")
+    rate = 1 / float(np.median(np.diff(time)))
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + padding)
+    spectrum = np.abs(np.fft.rfft(speed, size))
+    frequency = np.fft.rfftfreq(size, 1 / rate)
+    spectrum = spectrum[frequency <= cutoff] / spectrum.max()
+    frequency = frequency[frequency <= cutoff]
+    above = np.flatnonzero(spectrum >= threshold)
+    inside = slice(above[0], above[-1] + 1)
+    frequency, spectrum = frequency[inside], spectrum[inside]
+    if len(frequency) < 2:
+        return float("nan")
+    return -float(np.hypot(np.diff(frequency) / (frequency[-1] - frequency[0]), np.diff(spectrum)).sum())
+
+
+def _filled(time: Array, x: Array) -> Array:
+    seen = np.isfinite(x)
+    return np.interp(time, time[seen], x[seen]) if seen.any() else np.zeros_like(x)
