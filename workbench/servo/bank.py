@@ -23,6 +23,8 @@ HOLDING_DAMPING = 1e3
 than 0.06/1000 rad/s (0.003 deg/s)."""
 BRISTLE_SLIP = 5e-4
 """Deflection [rad] at which a bristle of a continuous plant yields; a tenth of a count, so that no sensor sees it."""
+BRISTLE_SHARPNESS = 8
+"""Exponent of the bristle's yield: 1 is Dahl's, higher ones come nearer to Coulomb's corner."""
 
 
 class ServoBank(LeafSystem):
@@ -35,7 +37,7 @@ class ServoBank(LeafSystem):
 
     torque_enable may stay unconnected: all on. The reference advances every `period` seconds (discrete state, n). Back-EMF and
     viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles
-    of this system (continuous state, n; Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
+    of this system (continuous state, n; after Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
@@ -67,6 +69,7 @@ class ServoBank(LeafSystem):
         if bristles:
             self.DeclareContinuousState(n)
             self._bristle_stiffness = law.coulomb / BRISTLE_SLIP
+            self._bristle_damping = 2.0 * np.sqrt(self._bristle_stiffness * law.inertia)  # critical, for the servo alone
 
     def SetReference(self, context: Context, reference: Array) -> None:
         """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
@@ -102,18 +105,21 @@ class ServoBank(LeafSystem):
         self._force[self._v] = torque
         output.SetFromVector(self._force)
 
-    def _bristle_force(self, context: Context, v: Array) -> Array:
+    def _bristle_rate(self, context: Context, v: Array) -> tuple[Array, Array]:
+        """Bristles follow the joint and yield at the Coulomb torque; returns deflection [rad] and its rate [rad/s], (n,)."""
         z = context.get_continuous_state_vector().CopyToVector()
-        return np.asarray(np.clip(self._bristle_stiffness * z, -self.law.coulomb, self.law.coulomb), dtype=float)
+        load = np.maximum(np.sign(v) * z / BRISTLE_SLIP, 0.0)
+        return z, np.where(self.law.coulomb > 0, v * (1.0 - load**BRISTLE_SHARPNESS), 0.0)
+
+    def _bristle_force(self, context: Context, v: Array) -> Array:
+        z, rate = self._bristle_rate(context, v)
+        force = self._bristle_stiffness * z + self._bristle_damping * rate
+        return np.asarray(np.clip(force, -self.law.coulomb, self.law.coulomb), dtype=float)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
-        """Bristles follow the joint and yield at the Coulomb torque (Dahl, with his exponent 1)."""
-        if not self._bristles:
-            return
-        v = self._state.Eval(context)[self._x_v]
-        z = context.get_continuous_state_vector().CopyToVector()
-        load = np.sign(v) * z / BRISTLE_SLIP
-        derivatives.SetFromVector(np.where(self.law.coulomb > 0, v * (1.0 - load), 0.0))
+        """Of the bristles."""
+        if self._bristles:
+            derivatives.SetFromVector(self._bristle_rate(context, self._state.Eval(context)[self._x_v])[1])
 
     def _calc_motor_torque(self, context: Context, output: BasicVector) -> None:
         x = self._state.Eval(context)
@@ -129,14 +135,12 @@ class ServoBank(LeafSystem):
 
 
 def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
-    """The joint's actuator; one is added to a plant not yet finalized. More than one, or none left to add: InputError."""
+    """The joint's actuator, added to the plant if it has none; InputError if it has several."""
     found = [a for a in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()) if a.joint().index() == joint.index()]
     if len(found) > 1:
         raise InputError(None, f"joint '{joint.name()}' has {len(found)} actuators; expected one, which the servo takes over")
     if found:
         return found[0]
-    if plant.is_finalized():
-        raise InputError(None, f"joint '{joint.name()}' has no actuator, and the plant is finalized: call AddServos before")
     return plant.AddJointActuator(joint.name(), joint)
 
 
@@ -177,7 +181,7 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
     `moving_speed` inputs are left to connect.
 
-    Finalizes the plant if the caller has not. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
+    Call it on a plant that is not yet finalized, as the servos change its joints; it finalizes the plant. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
     Takes the plant's applied_generalized_force input and, for implicit friction, desired_state of the instances that hold
     the joints. `friction`: "implicit" (discrete plants, the default there, and CENIC) or "bristle" (continuous plants with
     an integrator whose error control sees the bristles; CENIC's does not, steps over them and slides on without friction).
@@ -187,10 +191,11 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     if friction is None:
         friction = "implicit" if plant.time_step() > 0 else "bristle"
     if friction == "bristle" and plant.time_step() > 0:
-        raise InputError(None, "bristle friction needs a continuous plant (time_step 0); a discrete one takes friction='implicit'")
+        raise InputError(None, "bristle friction needs a continuous plant; a discrete one takes friction='implicit'")
+    if plant.is_finalized():
+        raise InputError(None, "the plant is finalized already; AddServos changes its joints and finalizes it itself")
     law = SetServoPhysics(plant, model, friction)
-    if not plant.is_finalized():
-        plant.Finalize()
+    plant.Finalize()
     joints = servo_joints(plant, model)
     bank = ServoBank(plant, joints, law, period or plant.time_step() or 1e-3,
                      bristles=friction == "bristle" and bool(law.coulomb.any()))
