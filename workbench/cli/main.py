@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("inspect",)
+VERBS = ("inspect", "simulate", "export")
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -1,0 +1,47 @@
+"""`workbench export MOTION`: firmware tables."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.options import add_model, add_out, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "export",
+        help="turn a motion into the robot's firmware tables",
+        description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt and motion.h. The motion is "
+        "played on the simulated robot first; what breaks a servo's range, speed or torque is refused unless --force.",
+    )
+    parser.add_argument("motion", metavar="MOTION")
+    add_model(parser)
+    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="played in simulation (default: 3)")
+    parser.add_argument("--force", action="store_true", help="write the tables although a limit is broken, with a warning")
+    add_out(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulates, checks and writes."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.device import export
+    from workbench.motion import load_motion
+    from workbench.simulation import Simulation, SimulationConfig
+    from workbench.simulation.play import play_motion
+
+    model = load_model(args.model)
+    motion = load_motion(args.motion, model)
+    motion.as_table()  # refused before the simulation
+    base = "fixed" if model.kinematics.fixed_to_world else "free"
+    with output_directory(args.out) as folder, Progress("export") as progress:
+        take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, args.cycles,
+                           progress=lambda done: progress("simulating", done))
+        exported = export(motion, model, folder, take, args.force)
+    for violation in exported.violations:
+        print(f"workbench export: warning: {violation}", file=sys.stderr)
+    print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}")
+    return 0

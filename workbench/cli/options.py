@@ -1,0 +1,56 @@
+"""Arguments that several verbs share, and what they stand for."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from workbench.robot import RobotModel
+
+PUPPY = "package://puppy/puppy.sdf"
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """--model: which robot."""
+    parser.add_argument(
+        "--model", metavar="FILE", default=PUPPY,
+        help="robot: an SDF or URDF, or a session.yaml whose robot, servos and ground are taken (default: the bundled puppy)")
+
+
+def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """--out: the folder for results."""
+    said = "; is made if need be, other files in it stay"
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, required=default is None, default=default and Path(default),
+        help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))
+
+
+def load_model(name: str) -> RobotModel:
+    """The robot that --model names."""
+    from workbench.gap.session import load_session
+    from workbench.robot import RobotModel, puppy_model
+
+    if name == PUPPY:
+        return puppy_model()
+    if Path(name).suffix.lower() in (".yaml", ".yml"):
+        return load_session(name).model
+    model = RobotModel(description=name)
+    return RobotModel(description=name, base=model.kinematics.root)
+
+
+def positive(text: str) -> int:
+    """A whole number of at least 1, for argparse."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected 1 or more, got {value}")
+    return value
+
+
+def seconds(text: str) -> float:
+    """A positive finite number, for argparse."""
+    value = float(text)
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text}")
+    return value

@@ -1,0 +1,50 @@
+"""`workbench simulate MOTION`: a motion on the simulated robot."""
+
+from __future__ import annotations
+
+import argparse
+
+from workbench.cli.options import add_model, add_out, load_model, positive, seconds
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="play a motion on the simulated robot",
+        description="Plays a motion table (CSV, or FILE.mtn#PAGE) from neutral on the simulated robot and writes rollout.csv "
+        "(the take as one table), figures, and replay.html, which opens from disk and shows the run in 3D.",
+    )
+    parser.add_argument("motion", metavar="MOTION")
+    add_model(parser)
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
+    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="walking, or held level on a stand")
+    parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
+                        help="full servo law; its fast approximation; joints that follow the motion exactly")
+    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often the motion is played (default: 1)")
+    parser.add_argument("--time-step", type=seconds, default=1e-3, metavar="S", help="of the simulation (default: 0.001)")
+    add_out(parser, default="runs/simulate")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulates, writes the table, the figures and the replay, and says how far it went."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.motion import load_motion
+    from workbench.recording.rollout_table import save_rollout
+    from workbench.simulation import Simulation, SimulationConfig
+    from workbench.simulation.play import play_motion
+    from workbench.view.scene import write_replay
+
+    model = load_model(args.model)
+    model.check_base(floating=args.base == "free")
+    motion = load_motion(args.motion, model)
+    config = SimulationConfig(time_step=args.time_step, base=args.base, drive=args.drive, contact=args.contact)
+    with output_directory(args.out) as folder, Progress("simulate") as progress:
+        take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
+        progress("writing")
+        save_rollout(take, folder / "rollout.csv")
+        write_replay(folder / "replay.html", model, take, title=f"{motion.name}, {args.contact} contact, {args.drive} drive")
+    print(f"wrote {args.out}: rollout.csv, replay.html")
+    return 0
