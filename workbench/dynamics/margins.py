@@ -1,0 +1,70 @@
+"""What a motion asks of the servos, and how far they are from what they cannot give."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot import ServoConstants
+
+Array = NDArray[np.float64]
+
+CREEP = 0.05
+"""Joint speed [rad/s] below which Coulomb friction fades to zero with the speed: its direction at rest is not known."""
+
+
+@dataclass(frozen=True)
+class ServoLoad:
+    """One servo over a whole motion. rms, peak: of the motor torque [N m]. torque_margin [N m], speed_margin [rad/s]: the
+    smallest. beyond_fifth: share of the time above a fifth of the data sheet's stall torque, which ROBOTIS advises against."""
+
+    rms: float
+    peak: float
+    torque_margin: float
+    speed_margin: float
+    beyond_fifth: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the servo can do all of it."""
+        return self.torque_margin >= 0 and self.speed_margin >= 0
+
+
+def motor_torque(servos: Sequence[ServoConstants], torque: Array, v: Array, a: Array, friction: bool = True) -> Array:
+    """What motor and gear must give, back-EMF taken off, so that `torque` (N, n) [N m] reaches the links (contract, section 4):
+    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), the last fading below CREEP."""
+    inertia, viscous, coulomb = (_row(servos, key) for key in ("reflected_inertia", "viscous_friction", "coulomb_friction"))
+    needed = torque + inertia * a
+    if friction:
+        needed = needed + viscous * v + coulomb * np.clip(v / CREEP, -1, 1)
+    return np.asarray(needed)
+
+
+def torque_margin(servos: Sequence[ServoConstants], needed: Array, v: Array) -> Array:
+    """Motor torque left at full duty (N, n) [N m], negative where the servo cannot: V/V_rated stall − back-EMF · speed along
+    the torque − |needed|. A servo that is driven backwards has the back-EMF on its side."""
+    full, back_emf = _row(servos, "torque_at_full_duty"), _row(servos, "back_emf")
+    return np.asarray(full - back_emf * v * np.sign(needed) - np.abs(needed))
+
+
+def speed_margin(servos: Sequence[ServoConstants], v: Array) -> Array:
+    """Distance (N, n) [rad/s] from the no-load speed at the supply voltage, where full duty gives no torque."""
+    return np.asarray(_row(servos, "torque_at_full_duty") / _row(servos, "back_emf") - np.abs(v))
+
+
+def servo_load(servo: ServoConstants, needed: Array, torque_left: Array, speed_left: Array) -> ServoLoad:
+    """Over the samples (N,) that are not NaN; NaN throughout if there are none."""
+    seen = np.isfinite(needed)
+    if not seen.any():
+        return ServoLoad(*[float("nan")] * 5)
+    size = np.abs(needed[seen])
+    return ServoLoad(
+        rms=float(np.sqrt(np.mean(size**2))), peak=float(size.max()), torque_margin=float(torque_left[seen].min()),
+        speed_margin=float(speed_left[seen].min()), beyond_fifth=float(np.mean(size > servo.stall_torque / 5)))
+
+
+def _row(servos: Sequence[ServoConstants], key: str) -> Array:
+    return np.array([getattr(s, key) for s in servos], dtype=float)

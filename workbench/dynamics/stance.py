@@ -1,0 +1,58 @@
+"""Which feet are down, and where the floor is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.dynamics.machine import FootPoints
+from workbench.robot import InputError
+
+Array = NDArray[np.float64]
+
+TOUCH = 3e-3
+"""Points up to this far above the floor may carry load [m]."""
+LIFTING = 0.1
+"""Points that rise or fall faster than this carry none [m/s]."""
+SHARP = 1e-3
+"""Height above the floor [m] at which force is twice as dear as on it: of a tilted foot the lower edge carries."""
+REACH = 0.01
+"""A foot's own floor may lie this far above the lowest foot's [m]: leg lengths and rest angles are not known better."""
+
+
+def floor_under(places: Array, points: FootPoints) -> Array:
+    """Height of the floor (F,) [m] as each foot finds it: what its lowest point is below in a tenth of the samples, or, for a
+    foot that hardly touches, REACH above the lowest floor of the others. places: (N, C, 3) [m], NaN where unseen."""
+    floors = np.full(len(points.feet), np.nan)
+    for f in range(len(points.feet)):
+        lowest = places[:, points.foot == f, 2].min(axis=1)
+        if np.isfinite(lowest).any():
+            floors[f] = np.nanquantile(lowest, 0.1)
+    with np.errstate(invalid="ignore"):
+        return np.minimum(floors, np.min(floors, where=np.isfinite(floors), initial=np.inf) + REACH)
+
+
+def dearness(time: Array, places: Array, points: FootPoints, floor: Array,
+             stance: Mapping[str, NDArray[np.bool_]] | None) -> Array:
+    """How dear force is at each point (N, C): 1 on the floor, rising with the height above it, infinite without contact.
+
+    Without `stance` a point is in contact if it is within TOUCH of its foot's floor (F,) [m] and slower than LIFTING. With
+    `stance`, foot -> (N,) bool, a foot is down when it says so, and its floor is where its lowest point is.
+    """
+    height = places[:, :, 2] - floor[points.foot]
+    if stance is None:
+        speed = np.abs(np.gradient(places[:, :, 2], time, axis=0)) if len(time) > 1 else np.zeros_like(height)
+        touching = (height < TOUCH) & (speed < LIFTING)
+    else:
+        touching = np.zeros(height.shape, dtype=bool)
+        for foot, down in stance.items():
+            if foot not in points.feet:
+                raise InputError(None, f"stance: the robot has no foot '{foot}'; its feet: {' '.join(points.feet) or 'none'}")
+            if np.shape(down) != time.shape:
+                raise InputError(None, f"stance, {foot}: expected a value for each of {len(time)} samples, got {np.shape(down)}")
+            own = points.foot == points.feet.index(foot)
+            height[:, own] -= height[:, own].min(axis=1, keepdims=True)
+            touching[:, own] = np.asarray(down, dtype=bool)[:, None] & (height[:, own] < TOUCH)
+    return np.where(touching, 1 + (np.maximum(height, 0) / SHARP) ** 2, np.inf)
