@@ -7,9 +7,18 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointActuator, PdControllerGains, RevoluteJoint
-from pydrake.systems.framework import BasicVector, Context, ContinuousState, DiagramBuilder, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    ContinuousState,
+    DiagramBuilder,
+    DiscreteValues,
+    LeafSystem,
+    ValueProducer,
+)
 from pydrake.systems.primitives import ConstantVectorSource
 
 from workbench.robot import InputError, RobotModel
@@ -59,6 +68,12 @@ class ServoBank(LeafSystem):
         self._speed = self.DeclareVectorInputPort("moving_speed", n)
         self._enable = self.DeclareVectorInputPort("torque_enable", n)
         self._reference = self.DeclareDiscreteState(n)
+        self._slope = law.gain * law.full_torque  # of the law as torque over |error|, before it is cut
+        self._offset = law.punch * law.full_torque - self._slope * law.margin
+        self._cached_command = self.DeclareCacheEntry(
+            "command", ValueProducer(allocate=lambda: AbstractValue.Make((np.zeros(n), None)),
+                                     calc=lambda context, value: value.set_value(self._calc_command(context))),
+            {self._speed.ticket(), self._enable.ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._advance)
         state = {self._state.ticket(), self._enable.ticket(), self.xd_ticket()}
         force_state = state | ({self.xc_ticket()} if bristles else set())
@@ -75,31 +90,32 @@ class ServoBank(LeafSystem):
         """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
         context.SetDiscreteState(np.asarray(reference, dtype=float))
 
-    def _enabled(self, context: Context) -> Array | None:
-        return self._enable.Eval(context) if self._enable.HasValue(context) else None
+    def _command(self, context: Context) -> tuple[Array, NDArray[np.bool_] | None]:
+        """How far the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all; cached while inputs last."""
+        return self._cached_command.Eval(context)  # type: ignore[no-any-return]
+
+    def _calc_command(self, context: Context) -> tuple[Array, NDArray[np.bool_] | None]:
+        speed = self._speed.Eval(context)
+        step = np.where(speed > 0, speed * self._period, np.inf)
+        on = self._enable.Eval(context) > 0.5 if self._enable.HasValue(context) else None
+        return step, None if on is None or on.all() else on
 
     def _advance(self, context: Context, values: DiscreteValues) -> None:
+        step, on = self._command(context)
         reference = context.get_discrete_state_vector().value()
-        speed = self._speed.Eval(context)
-        step = speed * self._period
-        if not speed.all():
-            step = np.where(speed > 0, step, np.inf)
         new = reference + np.minimum(np.maximum(self._goal.Eval(context) - reference, -step), step)
-        enabled = self._enabled(context)
-        if enabled is not None and not enabled.all():  # the ramp starts at the measured position once torque is back
-            new = np.where(enabled > 0.5, new, self._state.Eval(context)[self._q])
+        if on is not None:  # the ramp starts at the measured position once torque is back
+            new = np.where(on, new, self._state.Eval(context)[self._q])
         values.set_value(new)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
-        law, x = self.law, self._state.Eval(context)
+        x = self._state.Eval(context)
         error = context.get_discrete_state_vector().value() - x[self._q]
-        beyond = np.abs(error) - law.margin
-        size = np.minimum(law.punch + law.gain * beyond, 1.0) * law.full_torque
-        size[beyond <= 0] = 0.0
-        torque = np.copysign(size, error)
-        enabled = self._enabled(context)
-        if enabled is not None and not enabled.all():  # no back-EMF either: undo the joint's share of damping
-            torque = np.where(enabled > 0.5, torque, law.back_emf * x[self._x_v])
+        size = np.abs(error)
+        torque = np.copysign(np.minimum(self._offset + self._slope * size, self.law.full_torque) * (size > self.law.margin), error)
+        on = self._command(context)[1]
+        if on is not None:  # no back-EMF either: undo the joint's share of damping
+            torque = np.where(on, torque, self.law.back_emf * x[self._x_v])
         if self._bristles:
             torque = torque - self._bristle_force(context, x[self._x_v])
         self._force[self._v] = torque
@@ -122,16 +138,14 @@ class ServoBank(LeafSystem):
             derivatives.SetFromVector(self._bristle_rate(context, self._state.Eval(context)[self._x_v])[1])
 
     def _calc_motor_torque(self, context: Context, output: BasicVector) -> None:
-        x = self._state.Eval(context)
-        enabled = self._enabled(context)
-        on = True if enabled is None else enabled > 0.5
+        x, on = self._state.Eval(context), self._command(context)[1]
         error = context.get_discrete_state_vector().value() - x[self._q]
-        output.SetFromVector(self.law.motor_torque(error, x[self._x_v], on))
+        output.SetFromVector(self.law.motor_torque(error, x[self._x_v], True if on is None else on))
 
     def _calc_duty(self, context: Context, output: BasicVector) -> None:
+        on = self._command(context)[1]
         error = context.get_discrete_state_vector().value() - self._state.Eval(context)[self._q]
-        enabled = self._enabled(context)
-        output.SetFromVector(self.law.duty(error) * (1.0 if enabled is None else enabled > 0.5))
+        output.SetFromVector(self.law.duty(error) * (1.0 if on is None else on))
 
 
 def find_actuator(plant: MultibodyPlant, joint: RevoluteJoint) -> JointActuator:
