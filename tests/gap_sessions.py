@@ -1,0 +1,63 @@
+"""Small sessions that tests write: an arm of three joints on a fixed base, and its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+
+SERVO = """\
+model: AX-12A
+stall_torque: 1.5
+no_load_speed: 6.18
+rated_voltage: 12.0
+supply_voltage: 11.1
+compliance_slope: 32
+compliance_margin: 1
+punch: 32
+coulomb_friction: 0.06
+viscous_friction: 1e-2
+reflected_inertia: 6.5e-3
+"""
+MOTION = "time,one,three,two\n0,0,0,0\n0.3,20,-10,30\n0.6,-20,10,-15\n0.9,0,0,0\n"
+
+
+def _link(name: str, z: float) -> str:
+    return (f'<link name="{name}"><pose>0 0 {z} 0 0 0</pose><inertial><pose>0 0 0.04 0 0 0</pose><mass>0.1</mass><inertia>'
+            "<ixx>1e-4</ixx><iyy>1e-4</iyy><izz>2e-5</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial></link>")
+
+
+def arm_sdf(fixed: bool = True) -> str:
+    """trunk, upper, middle, lower on the joints one (y), two (y), three (x); welded to the world if `fixed`."""
+    links = "".join(_link(n, z) for n, z in (("trunk", 0.1), ("upper", 0.2), ("middle", 0.28), ("lower", 0.36)))
+    joints = "".join(
+        f'<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child><axis><xyz>{axis}</xyz><limit>'
+        "<lower>-2.6</lower><upper>2.6</upper><effort>1.5</effort></limit></axis></joint>"
+        for name, parent, child, axis in (("one", "trunk", "upper", "0 1 0"), ("two", "upper", "middle", "0 1 0"),
+                                          ("three", "middle", "lower", "1 0 0")))
+    weld = '<joint name="mount" type="fixed"><parent>world</parent><child>trunk</child></joint>' if fixed else ""
+    return f'<?xml version="1.0"?><sdf version="1.7"><model name="arm">{links}{weld}{joints}</model></sdf>'
+
+
+def session_content() -> dict:
+    """A session that load_session accepts, to be changed by a test."""
+    return {
+        "format": 1,
+        "robot": {"model": "robot.sdf", "base": "trunk", "servos": "servo.yaml",
+                  "rigid_bodies": {"Trunk": "trunk", "Upper": "upper", "Middle": "middle", "Lower": "lower"},
+                  "bus_ids": {"one": 1, "two": 2, "three": 3}},
+        "takes": [{"name": "wave", "motion": "motions/wave.csv", "cycles": 2, "recording": "takes/wave.csv", "base": "fixed"}],
+    }
+
+
+def write_session(folder: Path, content: dict | str | None = None, fixed: bool = True) -> Path:
+    """Writes session.yaml and all files that it names; returns its path."""
+    files = {"robot.sdf": arm_sdf(fixed), "servo.yaml": SERVO, "motions/wave.csv": MOTION, "takes/wave.csv": "time\n"}
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            path.write_text(text)
+    content = session_content() if content is None else content
+    (folder / "session.yaml").write_text(content if isinstance(content, str) else yaml.safe_dump(content, sort_keys=False))
+    return folder / "session.yaml"
