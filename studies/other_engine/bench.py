@@ -47,7 +47,7 @@ class NativePlayer:
         description = describe(model.path)
         servos = ServoBank([model.servo(j) for j in description.joints])
         self.joints = description.joints
-        self.time = timestep * np.arange(1, round(duration / timestep) + 1)
+        self.time: Array = timestep * np.arange(1.0, round(duration / timestep) + 1)
         """Times of the states that `run` returns (N,) [s], 0 = first command."""
         self._model = compile_model(description, servos, model.ground, base, timestep, drives=True)
         self._data = mujoco.MjData(self._model)
@@ -56,7 +56,7 @@ class NativePlayer:
         self._start = self._advance(self._state(), at_rest)[-1]
         # The drives come in the joints' order; each of a joint's actuators gets the same reference. It does not depend on
         # the robot, as long as torque stays enabled.
-        reference = commands.reordered(self.joints).reference(self.time - timestep)
+        reference = commands.reordered(self.joints).reference(np.asarray(self.time - timestep, dtype=float))
         self._control = np.ascontiguousarray(reference[:, self._joint_of_actuator()])
 
     def run(self) -> Array:

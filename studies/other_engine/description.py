@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Role, SceneGraph, SceneGraphInspector, Sphere
+from pydrake.geometry import Box, Role, SceneGraph, SceneGraphInspector, Sphere
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
@@ -20,14 +20,22 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class FootSphere:
-    """A contact sphere: centre (3,) in its link's frame and radius [m]; friction, stiffness [N/m], NaN if unsaid."""
+class ContactShape:
+    """A sphere or box: centre p (3,) [m] and R (3, 3) in its link's frame; half: half its extents along its own axes (3,)
+    [m], of a sphere three times the radius; friction and stiffness [N/m], NaN where the file does not say."""
 
-    name: str
-    center: Array
-    radius: float
+    kind: str
+    p: Array
+    R: Array
+    half: Array
     friction: float
     stiffness: float
+
+    def bottom(self, p_WL: Array, R_WL: Array) -> float:
+        """Height of its lowest point where its link is at p_WL (3,), R_WL (3, 3) [m]."""
+        up = (R_WL @ self.R)[2]
+        reach = self.half[0] if self.kind == "sphere" else float(np.abs(up) @ self.half)
+        return float((p_WL + R_WL @ self.p)[2] - reach)
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class LinkPart:
     mass: float
     com: Array
     inertia: Array
-    spheres: tuple[FootSphere, ...]
+    shapes: tuple[ContactShape, ...]
     joint: str = ""
     parent: str = ""
     p: Array = field(default_factory=lambda: np.zeros(3))
@@ -67,24 +75,19 @@ class Description:
         return self.links[0]
 
     def lowest(self) -> float:
-        """Height of the lowest contact sphere's bottom in the root's frame, joints at zero [m]; 0 without spheres."""
+        """Height of the lowest point of all contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""
         poses = {self.root.name: (np.zeros(3), np.eye(3))}
         for link in self.links[1:]:
             p, R = poses[link.parent]
             poses[link.name] = (p + R @ link.p, R @ link.R)
-        bottoms = [
-            float((p + R @ s.center)[2]) - s.radius
-            for link in self.links
-            for p, R in [poses[link.name]]
-            for s in link.spheres
-        ]
-        return min(bottoms, default=0.0)
+        return min((s.bottom(*poses[link.name]) for link in self.links for s in link.shapes), default=0.0)
 
 
 def describe(path: str | Path) -> Description:
     """Reads an SDF or URDF of revolute and fixed joints; InputError where Drake cannot, or where a link has no mass.
 
-    Spheres are the contact shapes that this engine knows; others (a hydroelastic foot beside its spheres) are left out.
+    Spheres and boxes are the contact shapes that this engine knows; meshes (a hydroelastic foot beside its spheres) are
+    left out.
     """
     kinematics = Kinematics.from_file(Path(path))
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
@@ -100,15 +103,15 @@ def describe(path: str | Path) -> Description:
         mass, com, inertia = _inertial(body)
         if mass <= 0:
             raise InputError(path, f"link '{name}': expected a positive mass")
-        spheres = _spheres(plant, inspector, body)
+        shapes = _shapes(plant, inspector, body)
         joint = kinematics.parent_joint[name]
         if joint is None:
-            links.append(LinkPart(name, mass, com, inertia, spheres))
+            links.append(LinkPart(name, mass, com, inertia, shapes))
             continue
         f = kinematics.frames[joint]
         R_LM = f.X_MB_R.T
         links.append(LinkPart(
-            name, mass, com, inertia, spheres, joint=joint, parent=f.parent, p=f.X_PF_p + f.X_PF_R @ f.X_MB_p,
+            name, mass, com, inertia, shapes, joint=joint, parent=f.parent, p=f.X_PF_p + f.X_PF_R @ f.X_MB_p,
             R=f.X_PF_R @ f.X_MB_R, anchor=-R_LM @ f.X_MB_p, axis=R_LM @ f.axis, lower=f.lower, upper=f.upper))
     return Description(tuple(links), kinematics.joints)
 
@@ -120,18 +123,21 @@ def _inertial(body: RigidBody) -> tuple[float, Array, Array]:
     return mass, com, mass * (about_origin - np.dot(com, com) * np.eye(3) + np.outer(com, com))
 
 
-def _spheres(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidBody) -> tuple[FootSphere, ...]:
+def _shapes(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidBody) -> tuple[ContactShape, ...]:
     out = []
     for geometry in inspector.GetGeometries(plant.GetBodyFrameIdOrThrow(body.index()), Role.kProximity):
         shape, properties = inspector.GetShape(geometry), inspector.GetProximityProperties(geometry)
-        if not isinstance(shape, Sphere):
+        if isinstance(shape, Sphere):
+            kind, half = "sphere", np.full(3, shape.radius())
+        elif isinstance(shape, Box):
+            kind, half = "box", np.asarray(shape.size(), dtype=float) / 2
+        else:
             continue
         friction: Any = properties.GetPropertyOrDefault("material", "coulomb_friction", None)
         stiffness: Any = properties.GetPropertyOrDefault("material", "point_contact_stiffness", math.nan)
-        out.append(FootSphere(
-            name=inspector.GetName(geometry).split("::")[-1],
-            center=inspector.GetPoseInFrame(geometry).translation(),
-            radius=shape.radius(),
+        X_LG = inspector.GetPoseInFrame(geometry)
+        out.append(ContactShape(
+            kind, np.asarray(X_LG.translation()), np.asarray(X_LG.rotation().matrix()), half,
             friction=math.nan if friction is None else friction.dynamic_friction(),
             stiffness=float(stiffness),
         ))

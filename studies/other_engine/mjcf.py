@@ -7,10 +7,13 @@ import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from studies.other_engine.description import Description, LinkPart
 from studies.other_engine.servo import ServoBank
 from workbench.robot import Ground
+
+Array = NDArray[np.float64]
 
 HELD_AT = 1.0
 """Height of the root link's origin on the stand [m]."""
@@ -28,8 +31,8 @@ def to_mjcf(
     """MJCF text: bodies are the links, with the links' frames; `servos` in the order of description.joints.
 
     Reflected inertia is `armature`; Coulomb friction is `frictionloss` (a constraint, so that it holds at rest);
-    viscous friction and back-EMF are `damping`, which implicitfast integrates implicitly. Feet are spheres on a plane,
-    with elliptic cones and condim 3. With `drives` the servo law is in it too, as actuators whose control is the
+    viscous friction and back-EMF are `damping`, which implicitfast integrates implicitly. The ground is a plane,
+    friction cones are elliptic, condim 3. With `drives` the servo law is in it too, as actuators whose control is the
     reference [rad], three to a joint.
     """
     top = ET.Element("mujoco", model="other_engine")
@@ -72,8 +75,8 @@ def compile_model(
     model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep, drives))
     for link in description.links:
         body = model.body(link.name).id
-        for k, sphere in enumerate(link.spheres):
-            stiffness = DEFAULT_STIFFNESS if math.isnan(sphere.stiffness) else sphere.stiffness
+        for k, shape in enumerate(link.shapes):
+            stiffness = DEFAULT_STIFFNESS if math.isnan(shape.stiffness) else shape.stiffness
             if ground.stiffness is not None:
                 stiffness = 1 / (1 / stiffness + 1 / ground.stiffness)
             time_constant = 1 / math.sqrt(stiffness * (1 - IMPEDANCE) * model.body_invweight0[body, 0])
@@ -82,10 +85,8 @@ def compile_model(
 
 
 def _hang(element: ET.Element, link: LinkPart, servos: ServoBank, i: int | None, timestep: float) -> None:
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(link.R).ravel())
     element.set("pos", _text(*link.p))
-    element.set("quat", _text(*quat))
+    element.set("quat", _quaternion(link.R))
     if i is None:
         return
     ET.SubElement(
@@ -116,16 +117,22 @@ def _fill(element: ET.Element, link: LinkPart, ground: Ground) -> None:
     M = link.inertia
     ET.SubElement(element, "inertial", pos=_text(*link.com), mass=_text(link.mass),
                   fullinertia=_text(M[0, 0], M[1, 1], M[2, 2], M[0, 1], M[0, 2], M[1, 2]))
-    for k, sphere in enumerate(link.spheres):
-        friction = sphere.friction if ground.friction is None else ground.friction
+    for k, shape in enumerate(link.shapes):
+        friction = shape.friction if ground.friction is None else ground.friction
         ET.SubElement(
-            element, "geom", name=_geom_name(link, k), type="sphere", pos=_text(*sphere.center),
-            size=_text(sphere.radius), condim="3", priority="1", solimp=_text(IMPEDANCE, IMPEDANCE, 0.001),
+            element, "geom", name=_geom_name(link, k), type=shape.kind, pos=_text(*shape.p), quat=_quaternion(shape.R),
+            size=_text(*shape.half), condim="3", priority="1", solimp=_text(IMPEDANCE, IMPEDANCE, 0.001),
             friction=_text(DEFAULT_FRICTION if math.isnan(friction) else friction, 0, 0))
 
 
 def _geom_name(link: LinkPart, k: int) -> str:
     return f"{link.name}/{k}"
+
+
+def _quaternion(R: Array) -> str:
+    quat = np.zeros(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(R).ravel())
+    return _text(*quat)
 
 
 def _text(*values: float) -> str:

@@ -23,7 +23,7 @@ class Rollout:
 
     time (N,) [s], from -lead, 0 = first command, in steps. q, v (N, n) [rad, rad/s] and torque (N, n) [N m, of the
     motors at the joints] by `joints`. qpos (N, nq): MuJoCo's configuration. contact: link -> force on it (N, 3) [N], of
-    the ground and of other feet, for links with feet. model: MuJoCo's model, whose bodies are the links.
+    the ground and of other links, for links with contact shapes. model: MuJoCo's model, whose bodies are the links.
     """
 
     time: Array
@@ -82,7 +82,7 @@ class _Run:
         self.reference = Reference(len(self.joints))
         self.position = np.array([model.joint(j).qposadr[0] for j in self.joints])
         self.dof = np.array([model.joint(j).dofadr[0] for j in self.joints])
-        self.feet = {link.name: model.body(link.name).id for link in description.links if link.spheres}
+        self.feet = {link.name: model.body(link.name).id for link in description.links if link.shapes}
 
     def go(self, commands: Commands, duration: float, lead: float, settle: float) -> Rollout:
         h = self.model.opt.timestep
