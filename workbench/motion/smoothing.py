@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
-from scipy.signal import lfilter, savgol_filter
+from scipy.signal import cont2discrete, lfilter, oaconvolve
 
 from workbench.motion.motion import Motion
 
@@ -65,13 +67,13 @@ def interpolate_motion(motion: Motion, cycles: int = 1, step: float = 1e-4, knot
 
 
 def savitzky_golay(trajectory: Trajectory, window: int, order: int = 3) -> Trajectory:
-    """Angles smoothed over `window` samples (odd), derivatives from the same local polynomials; no lag."""
-    _check(trajectory, window, order)
+    """Angles smoothed over `window` samples (odd), derivatives from the same local polynomials; no lag.
 
-    def derivative(k: int) -> Array:
-        return np.asarray(savgol_filter(trajectory.q, window, order, deriv=k, delta=trajectory.step, axis=0))
-
-    return replace(trajectory, q=derivative(0), v=derivative(1), a=derivative(2))
+    Savitzky and Golay, Analytical Chemistry 36 (1964) 1627; the first and last half window take the polynomial of the first and
+    last whole one.
+    """
+    q, v, a = (_local_polynomial(trajectory.q, window, order, k, trajectory.step) for k in range(3))
+    return replace(trajectory, q=q, v=v, a=a)
 
 
 def filter_derivatives(trajectory: Trajectory, window: int, order: int = 3) -> Trajectory:
@@ -79,26 +81,25 @@ def filter_derivatives(trajectory: Trajectory, window: int, order: int = 3) -> T
 
     Nothing then makes v the derivative of q: the caller can measure by how much it is not (`inconsistency`).
     """
-    _check(trajectory, window, order)
-    v, a = (np.asarray(savgol_filter(y, window, order, axis=0)) for y in (trajectory.v, trajectory.a))
+    v, a = (_local_polynomial(y, window, order, 0, trajectory.step) for y in (trajectory.v, trajectory.a))
     return replace(trajectory, v=v, a=a)
 
 
 def low_pass(trajectory: Trajectory, time_constant: float) -> Trajectory:
-    """Simulink's converter (the thesis's "MATLAB filter"): q through 1/(T s + 1)^2 [T in s], with the filter's own derivatives.
+    """Simulink's converter (the thesis's "MATLAB filter"): q through 1/(T s + 1)^2, with the filter's own derivatives.
 
-    It lags by 2 T. Starts settled at the first sample; the input is held over each step.
+    time_constant: T [s]. It lags by 2 T. The filter starts settled at the first sample.
     """
     if not time_constant > 0:
         raise ValueError(f"expected a positive time constant, got {time_constant}")
-    h, T = trajectory.step, time_constant
-    p = float(np.exp(-h / T))
-    # Exact for a held input, by z-transform of the step responses of 1/(Ts+1)^2 and s/(Ts+1)^2; poles p twice.
-    denominator = [1, -2 * p, p * p]
-    to_q = [0, 1 - p - h / T * p, p * p - p + h / T * p]
-    to_v = [0, h / T**2 * p, -h / T**2 * p]
+    T = time_constant
     u = trajectory.q - trajectory.q[0]
-    q, v = lfilter(to_q, denominator, u, axis=0), lfilter(to_v, denominator, u, axis=0)
+
+    def respond(*numerator: float) -> Array:
+        b, a, _ = cont2discrete((numerator, (T**2, 2 * T, 1.0)), trajectory.step, method="foh")  # type: ignore[call-overload]
+        return np.asarray(lfilter(np.ravel(b), a, u, axis=0))
+
+    q, v = respond(1.0), respond(1.0, 0.0)
     return replace(trajectory, q=q + trajectory.q[0], v=v, a=(u - 2 * T * v - q) / T**2)
 
 
@@ -108,7 +109,22 @@ def inconsistency(trajectory: Trajectory) -> Array:
     return np.asarray(np.ptp(trajectory.q - integral, axis=0))
 
 
-def _check(trajectory: Trajectory, window: int, order: int) -> None:
-    if window % 2 == 0 or not order < window <= len(trajectory.time):
-        longest = len(trajectory.time)
-        raise ValueError(f"window: expected an odd number above order {order}, at most {longest} samples, got {window}")
+def _local_polynomial(y: Array, window: int, order: int, derivative: int, step: float) -> Array:
+    """Derivative of the polynomials fitted to the window about each row of y (N, n).
+
+    In abscissae scaled to -1..1: scipy's savgol_filter, unscaled, silently returns zeros from order 5 and 1001 samples on.
+    """
+    if window % 2 == 0 or not 0 < order < window <= len(y):
+        raise ValueError(f"window: expected an odd number above the order {order} and at most {len(y)} samples, got {window}")
+    if derivative > order:
+        return np.zeros_like(y)
+    half = window // 2
+    x = np.arange(-half, half + 1) / half
+    fit = np.linalg.pinv(np.vander(x, order + 1, increasing=True))  # samples to coefficients
+    scale = 1 / (half * step) ** derivative
+    centre = fit[derivative] * math.factorial(derivative) * scale
+    out = np.empty_like(y)
+    out[half:len(y) - half] = oaconvolve(y, centre[::-1, None], mode="valid", axes=0)
+    for edge, at, to in ((y[:window], x[:half], out[:half]), (y[-window:], x[half + 1:], out[len(y) - half:])):
+        to[:] = polyval(at, polyder(fit @ edge, derivative)).T * scale
+    return out

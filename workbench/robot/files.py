@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from workbench.robot.errors import InputError
@@ -51,5 +52,6 @@ def write_together(folder: str | Path, contents: Mapping[str, str | bytes]) -> l
         raise InputError(at, f"cannot be written ({e.strerror})") from None
     finally:
         for part in parts:
-            part.unlink(missing_ok=True)
+            with suppress(OSError):
+                part.unlink()
     return paths

@@ -1,0 +1,93 @@
+"""Firmware tables: the thesis's text files, read back, and a C header that a compiler reads the same way."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.device import read_tables, write_tables
+from workbench.motion import PoseTable, load_motion
+from workbench.robot import BUS_IDS, InputError, data_file
+
+TABLE = load_motion(data_file("robotis_walk.csv")).as_table()
+
+PRINT_ALL = r"""
+#include <stdio.h>
+#include "motion.h"
+int main(void)
+{
+    for (int j = 0; j < MOTION_JOINTS; ++j) printf("%s %d\n", motion_joints[j], motion_bus_ids[j]);
+    for (int p = 0; p < MOTION_POSES; ++p) {
+        for (int j = 0; j < MOTION_JOINTS; ++j) printf("%d %d ", motion_goals[p][j], motion_speeds[p][j]);
+        printf("%lu\n", (unsigned long)motion_dwells_ms[p]);
+    }
+    return 0;
+}
+"""
+
+
+def test_layout_of_the_thesis_under_a_line_that_says_the_order(tmp_path: Path) -> None:
+    files = write_tables(TABLE, tmp_path)
+    assert [f.name for f in files] == ["pos.txt", "speed.txt", "timeDiff.txt", "motion.h"]
+    order = "# joints: blb blm blt brb brm brt flb flm flt frb frm frt head neck tail"
+    pos = (tmp_path / "pos.txt").read_text().splitlines()
+    assert pos[:3] == [order, "4,", "412,482,532,722,632,552,762,642,512,412,442,492,512,442,522,"]
+    speed = (tmp_path / "speed.txt").read_text().splitlines()
+    assert speed[:3] == [order, "4,", "159,128,128,190,284,66,315,97,59,159,28,3,0,62,62,"]
+    assert (tmp_path / "timeDiff.txt").read_text().splitlines() == [order, "4,", "140,", "103,", "94,", "131,"]
+
+
+def test_read_back_to_the_same_table(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    odd = PoseTable(("tail", "blb"), rng.integers(0, 1024, (7, 2)), rng.integers(0, 1024, (7, 2)), rng.integers(1, 70000, 7))
+    for table in (TABLE, odd):
+        write_tables(table, tmp_path)  # the second time over the first
+        back = read_tables(tmp_path)
+        assert back.joints == table.joints
+        assert np.array_equal(back.goals, table.goals)
+        assert np.array_equal(back.speeds, table.speeds)
+        assert np.array_equal(back.dwells_ms, table.dwells_ms)
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
+def test_c_header_compiles_without_warnings_and_says_the_same(tmp_path: Path) -> None:
+    write_tables(TABLE, tmp_path)
+    (tmp_path / "main.c").write_text('#include "motion.h"\n' + PRINT_ALL)  # twice: the guard holds
+    strict = ["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([*strict, "main.c", "-o", "main"], cwd=tmp_path, check=True, capture_output=True)
+    lines = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True).stdout.splitlines()
+    assert dict(line.split() for line in lines[:15]) == {j: str(i) for j, i in BUS_IDS.items()}
+    numbers = np.array([[int(x) for x in line.split()] for line in lines[15:]])
+    assert np.array_equal(numbers[:, 0:-1:2], TABLE.goals)
+    assert np.array_equal(numbers[:, 1:-1:2], TABLE.speeds)
+    assert np.array_equal(numbers[:, -1], TABLE.dwells_ms)
+
+
+@pytest.mark.parametrize(("name", "old", "new", "message"), [
+    ("pos.txt", "# joints:", "# order:", "pos.txt: line 1: expected '# joints: "),
+    ("speed.txt", "blb blm", "blm blb", "speed.txt: line 1: joints are not in the order of pos.txt"),
+    ("pos.txt", "4,", "5,", "pos.txt: line 2: expected the number of poses, and 4 follow"),
+    ("timeDiff.txt", "4,\n140,\n", "3,\n", "timeDiff.txt: 3 poses, but 4 in pos.txt"),
+    ("timeDiff.txt", "140,", "140,2,", "timeDiff.txt: pose 1: expected 1 numbers, found 2"),
+    ("speed.txt", "159,128,", "159,", "speed.txt: pose 1: expected 15 numbers, found 14"),
+    ("speed.txt", "159,128,", "159,x,", "speed.txt: expected integers"),
+    ("pos.txt", "412,482,", "412,1482,", "pose 1, joint blm: goal position 1482 is outside 0 to 1023"),
+])
+def test_damaged_tables_are_refused(name: str, old: str, new: str, message: str, tmp_path: Path) -> None:
+    write_tables(TABLE, tmp_path)
+    text = (tmp_path / name).read_text()
+    assert old in text
+    (tmp_path / name).write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=message):
+        read_tables(tmp_path)
+
+
+def test_joints_need_bus_ids(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="joint tail has no bus ID"):
+        write_tables(TABLE, tmp_path / "new", {j: i for j, i in BUS_IDS.items() if j != "tail"})
+    with pytest.raises(InputError, match="joints blb and blm share bus ID 13"):
+        write_tables(TABLE, tmp_path / "new", {**BUS_IDS, "blb": 13})
+    assert not (tmp_path / "new").exists()

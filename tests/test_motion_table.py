@@ -1,0 +1,128 @@
+"""The thesis's conversion (equations 3.1 to 3.4), pose tables, and the file that people write."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workbench.motion import Motion, PoseTable, load_motion, save_motion
+from workbench.robot import COUNT, JOINTS, SPEED_UNIT, InputError, data_file
+from workbench.robot.files import write_together
+
+
+@pytest.fixture(scope="module")
+def walk() -> Motion:
+    return load_motion(data_file("robotis_walk.csv"))
+
+
+def test_the_thesis_figures_in_order_of_joints(walk: Motion) -> None:
+    """Figure 3.4. Its pos.txt is in bus-ID order, so goals are compared by joint."""
+    table = walk.as_table()
+    assert table.joints == JOINTS
+    assert table.goals[0].tolist() == [412, 482, 532, 722, 632, 552, 762, 642, 512, 412, 442, 492, 512, 442, 522]
+    assert table.speeds[0].tolist() == [159, 128, 128, 190, 284, 66, 315, 97, 59, 159, 28, 3, 0, 62, 62]
+    assert table.speeds[1].tolist() == [212, 0, 170, 255, 212, 85, 424, 297, 85, 212, 127, 0, 0, 85, 85]
+    assert table.dwells_ms.tolist() == [140, 103, 94, 131]
+    by_bus = ["tail", "frt", "flt", "frm", "flm", "frb", "flb", "brt", "blt", "brm", "blm", "brb", "blb", "neck", "head"]
+    last = [502, 491, 531, 451, 611, 361, 661, 531, 491, 541, 441, 661, 361, 462, 512]
+    assert [table.goals[3, JOINTS.index(j)] for j in by_bus] == last
+
+
+def test_firmware_timing(walk: Motion) -> None:
+    commands = walk.commands(cycles=3)
+    assert commands.times[:6] == pytest.approx([0, 0.140, 0.243, 0.337, 0.468, 0.608])
+    assert commands.end == pytest.approx(3 * 0.468)
+    assert commands.poses.tolist() == [0, 1, 2, 3] * 3
+    assert commands.goals[0, 0] == pytest.approx((412 - 512) * COUNT)
+    assert commands.speeds[4, 6] == pytest.approx(315 * SPEED_UNIT)
+    assert commands.enabled.all()
+    with pytest.raises(InputError, match="cycles"):
+        walk.commands(cycles=0)
+
+
+def test_halves_round_away_from_zero_as_in_matlab() -> None:
+    half = np.radians(np.array([[0, 0.0], [0.5, -0.5]]) * 300 / 1023)
+    assert PoseTable.from_angles(("a", "b"), np.array([0, 1.0]), half).goals.tolist() == [[513, 511]]
+
+
+@pytest.mark.parametrize(("angle", "time", "message"), [
+    (150.0, 1.0, "pose 1, joint flm: goal position 1024 is outside 0 to 1023"),
+    (-150.3, 1.0, "pose 1, joint flm: goal position -1 is outside"),
+    (100.0, 0.1, "pose 1, joint flm: moving speed 1496 is outside"),
+    (0.1, 0.0004, "pose 1: dwell of 0 ms"),
+])
+def test_what_the_registers_cannot_hold_is_refused(angle: float, time: float, message: str) -> None:
+    motion = Motion("m", np.array([0, time]), ("flm",), np.radians([[0.0], [angle]]), "m.csv")
+    with pytest.raises(InputError, match=message) as raised:
+        motion.as_table()
+    assert raised.value.source == "m.csv"
+
+
+def test_table_and_motion_agree(walk: Motion) -> None:
+    """Back from counts the angles are within half a count, and converting them again gives the same goals and dwells."""
+    back = walk.as_table().as_motion()
+    assert np.abs(back.angles - walk.angles).max() <= COUNT / 2
+    assert back.closes
+    assert np.array_equal(back.as_table().goals, walk.as_table().goals)
+    assert np.array_equal(back.as_table().dwells_ms, walk.as_table().dwells_ms)
+
+
+def test_columns_are_found_by_name(walk: Motion, tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    path.write_bytes(b"\xef\xbb\xbf tail, time ,flm\r\n# a remark\r\n1,0,2\r\n\r\n3,0.5,4\r\n")
+    motion = load_motion(path)
+    assert motion.joints == ("tail", "flm")
+    assert np.degrees(motion.angles) == pytest.approx(np.array([[1, 2], [3, 4]]))
+    lines = data_file("robotis_walk.csv").read_text().splitlines()
+    path.write_text("\n".join(lines[1:]))
+    headless = load_motion(path)
+    assert headless.joints == JOINTS
+    assert np.array_equal(headless.angles, walk.angles)
+
+
+def test_written_and_read_again(walk: Motion, tmp_path: Path) -> None:
+    path = save_motion(walk, tmp_path / "new" / "walk.csv")
+    assert path.read_text() == data_file("robotis_walk.csv").read_text()
+    assert [p.name for p in path.parent.iterdir()] == ["walk.csv"]
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("", "empty"),
+    ("time,flm\n", "two rows"),
+    ("time,flm\n0,1\n", "two rows"),
+    ("time,flm\n0,1\n1,nan\n", "line 3, column flm: expected a finite number, found 'nan'"),
+    ("time,flm\n0,1\n1,\n", "line 3, column flm: expected a finite number, found ''"),
+    ("time,flm\n0,1\ninf,2\n", "line 3, column time"),
+    ("time,flm\n0,1\n1\n", "line 3: expected 2 cells, found 1"),
+    ("time,flm\n0,1\n1,2\n1,3\n", "row 3: time 1 s does not come after 1 s"),
+    ("time,flm\n1,1\n0,2\n", "row 2: time 0 s"),
+    ("flm,flt\n0,1\n", "'time'"),
+    ("time,flm,flm\n0,1,1\n", "'flm' stands there twice"),
+    ("0,1,2\n1,1,2\n", "line 1: without a header, expected time and 15 joints, found 3 cells"),
+])
+def test_bad_tables_are_one_readable_line(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as raised:
+        load_motion(path)
+    assert str(raised.value).startswith(str(path))
+    assert "\n" not in str(raised.value)
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        load_motion(tmp_path / "none.csv")
+    (tmp_path / "b.csv").write_bytes(b"time,flm\n0,\xff\n")
+    with pytest.raises(InputError, match="UTF-8"):
+        load_motion(tmp_path / "b.csv")
+
+
+def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    (tmp_path / "a").write_text("old")
+    with pytest.raises(InputError, match="b: cannot be written"):
+        write_together(tmp_path, {"a": "new", "b": "new"})
+    assert (tmp_path / "a").read_text() == "old"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b"]
+    with pytest.raises(InputError, match="cannot be written"):
+        write_together(tmp_path / "a", {"c": "new"})

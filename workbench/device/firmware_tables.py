@@ -1,0 +1,150 @@
+"""Firmware tables: what the controller's program plays, as the thesis's text files and as a C header."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.device.limits import Violation, check_limits
+from workbench.motion import Motion, PoseTable
+from workbench.recording.take import Take
+from workbench.robot import BUS_IDS, InputError, RobotModel
+from workbench.robot.files import read_text, write_together
+
+Counts = NDArray[np.int64]
+
+GOALS, SPEEDS, DWELLS, HEADER = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h"
+ORDER = "# joints:"
+
+
+@dataclass(frozen=True)
+class Export:
+    """What `export` wrote, and what it had to say about it."""
+
+    files: tuple[Path, ...]
+    violations: tuple[Violation, ...]
+
+
+def export(
+    motion: Motion, model: RobotModel, out_dir: str | Path, simulated: Take | None = None, force: bool = False,
+) -> Export:
+    """Checks a motion against the servos' limits and writes its firmware tables.
+
+    simulated: the motion as it ran in simulation; without it torque goes unchecked. InputError, and nothing written,
+    where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
+    """
+    table = motion.as_table()
+    violations = check_limits(table, model, simulated)
+    broken = [v for v in violations if not v.warning]
+    if broken and not force:
+        more = f" (and {len(broken) - 1} more)" if len(broken) > 1 else ""
+        raise InputError(motion.source, f"{broken[0]}{more}; not exported")
+    return Export(tuple(write_tables(table, out_dir, model.bus_ids or BUS_IDS)), tuple(violations))
+
+
+def write_tables(table: PoseTable, folder: str | Path, bus_ids: Mapping[str, int] = BUS_IDS) -> list[Path]:
+    """Writes pos.txt, speed.txt, timeDiff.txt and motion.h, all or none.
+
+    The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
+    line that says the order of joints, the same in all files. InputError for a joint without a bus ID.
+    """
+    for joint in table.joints:
+        if joint not in bus_ids:
+            raise InputError(table.source, f"joint {joint} has no bus ID; those that have: {' '.join(bus_ids)}")
+    shared = [j for j in table.joints if [bus_ids[k] for k in table.joints].count(bus_ids[j]) > 1]
+    if shared:
+        raise InputError(table.source, f"joints {' and '.join(shared)} share bus ID {bus_ids[shared[0]]}")
+    order = f"{ORDER} {' '.join(table.joints)}"
+
+    def text(rows: Counts) -> str:
+        return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
+
+    return write_together(folder, {
+        GOALS: text(table.goals),
+        SPEEDS: text(table.speeds),
+        DWELLS: text(table.dwells_ms[:, None]),
+        HEADER: _c_header(table, bus_ids),
+    })
+
+
+def read_tables(folder: str | Path) -> PoseTable:
+    """Reads the three text files back; InputError where they disagree, or lack the line that says the order of joints."""
+    folder = Path(folder)
+    joints, goals = _read(folder / GOALS)
+    columns = {SPEEDS: len(joints), DWELLS: 1}
+    counts = {}
+    for name, width in columns.items():
+        order, counts[name] = _read(folder / name, width)
+        if order != joints:
+            raise InputError(folder / name, f"line 1: joints are not in the order of {GOALS}")
+        if len(counts[name]) != len(goals):
+            raise InputError(folder / name, f"{len(counts[name])} poses, but {len(goals)} in {GOALS}")
+    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder))
+
+
+def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], Counts]:
+    """Order of the joints, and a row of `width` counts (default: one for each joint) for each pose."""
+    lines = [line.strip() for line in read_text(path).splitlines() if line.strip()]
+    if not lines or not lines[0].startswith(ORDER):
+        raise InputError(path, f"line 1: expected '{ORDER} …', the order of joints")
+    joints = tuple(lines[0].removeprefix(ORDER).split())
+    try:
+        rows = [[int(cell) for cell in re.split(r"[,\s]+", line.strip(", "))] for line in lines[1:]]
+    except ValueError as e:
+        raise InputError(path, f"expected integers: {e}") from None
+    if not rows or rows[0] != [len(rows) - 1]:
+        raise InputError(path, f"line 2: expected the number of poses, and {max(len(rows) - 1, 0)} follow")
+    for k, row in enumerate(rows[1:], start=1):
+        if len(row) != (width or len(joints)):
+            raise InputError(path, f"pose {k}: expected {width or len(joints)} numbers, found {len(row)}")
+    return joints, np.array(rows[1:], dtype=np.int64)
+
+
+def _c_header(table: PoseTable, bus_ids: Mapping[str, int]) -> str:
+    """Constant arrays for the controller's program; rows are poses, columns are joints in the order of motion_joints."""
+    names = ", ".join(json.dumps(joint) for joint in table.joints)
+    ids = _listed([bus_ids[joint] for joint in table.joints], ", ")
+
+    def rows(counts: Counts) -> str:
+        return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)
+
+    return f"""\
+/* {len(table)} poses of {len(table.joints)} joints, for a program that sends each pose and then waits for its dwell.
+   Written by the workbench; do not edit. Columns: {' '.join(table.joints)} */
+#ifndef WORKBENCH_MOTION_H
+#define WORKBENCH_MOTION_H
+
+#include <stdint.h>
+
+#define MOTION_POSES {len(table)}
+#define MOTION_JOINTS {len(table.joints)}
+
+static const char *const motion_joints[MOTION_JOINTS] = {{{names}}};
+
+static const uint8_t motion_bus_ids[MOTION_JOINTS] = {{{ids}}};
+
+/* Goal positions, 0 to 1023 over 300 degrees, 512 = neutral. */
+static const uint16_t motion_goals[MOTION_POSES][MOTION_JOINTS] = {{
+{rows(table.goals)}
+}};
+
+/* Moving speeds, 0.111 rpm, 0 = at once. */
+static const uint16_t motion_speeds[MOTION_POSES][MOTION_JOINTS] = {{
+{rows(table.speeds)}
+}};
+
+/* What to wait after each pose, ms. */
+static const uint32_t motion_dwells_ms[MOTION_POSES] = {{{_listed(table.dwells_ms, ', ')}}};
+
+#endif
+"""
+
+
+def _listed(counts: Iterable[int], comma: str = ",") -> str:
+    return comma.join(str(count) for count in counts)
