@@ -34,7 +34,8 @@ class Take:
     p_WB (N, 3), quat_WB (N, 4) wxyz: pose of the base link's frame B in the world W. bodies: rigid bodies by asset,
     in the take's world axes. torque: (N, n) [N m] on the joints. v: (N, n) [rad/s].
     contact: foot -> ground reaction (N, 3) [N] in W. `problems`: what was mended, marked or left out, a line each.
-    mended: (N,) frames whose gaps were filled.
+    mended: (N,) frames whose gaps were filled. off_axis: (N, n, 3) [rad] what of each joint's rotation its servo does not turn, as a rotation
+    vector in the base's axes in the neutral pose (forward, left, up).
     """
 
     name: str
@@ -55,6 +56,7 @@ class Take:
     commands: Commands | None = None
     problems: tuple[str, ...] = ()
     mended: NDArray[np.bool_] | None = None
+    off_axis: Array | None = None
 
     def __len__(self) -> int:
         return len(self.time)

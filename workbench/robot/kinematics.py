@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -33,7 +33,10 @@ class JointFrame:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of what follows."""
+    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of what follows.
+
+    masses [kg] and centers of mass (3,) [m], in the link's frame, by link.
+    """
 
     path: Path
     root: str
@@ -43,6 +46,7 @@ class Kinematics:
     parent_joint: dict[str, str | None]
     masses: dict[str, float]
     fixed_to_world: bool
+    centers: dict[str, Array] = field(default_factory=dict)
 
     @staticmethod
     def from_file(path: Path) -> Kinematics:
@@ -125,6 +129,7 @@ def _parse(path: Path) -> Kinematics:
     plant.Finalize()
     names = [plant.get_body(b).name() for b in plant.GetBodyIndices(instance)]
     masses = {plant.get_body(b).name(): plant.get_body(b).default_mass() for b in plant.GetBodyIndices(instance)}
+    centers = {plant.get_body(b).name(): plant.get_body(b).default_com() for b in plant.GetBodyIndices(instance)}
     frames: dict[str, JointFrame] = {}
     parent_joint: dict[str, str | None] = {}
     fixed = False
@@ -159,4 +164,4 @@ def _parse(path: Path) -> Kinematics:
         ordered += [f.child for f in frames.values() if f.parent in ordered and f.child not in ordered]
     movable = tuple(sorted(n for n, f in frames.items() if f.upper > f.lower))
     return Kinematics(path=path, root=roots[0], links=tuple(ordered), joints=movable, frames=frames,
-                      parent_joint=parent_joint, masses=masses, fixed_to_world=fixed)
+                      parent_joint=parent_joint, masses=masses, fixed_to_world=fixed, centers=centers)

@@ -1,0 +1,55 @@
+"""From a recording, and how it looked at the robot, to a take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording import quaternions as quat
+from workbench.recording.angles import angle_sigma, base_row, in_world, joint_angles
+from workbench.recording.mending import mend
+from workbench.recording.recording import Measurement, Recording
+from workbench.recording.take import BodyTrack, Take
+from workbench.recording.tracks import Tracks, check_assets, tracks_of
+from workbench.robot import InputError, RobotModel
+
+Array = NDArray[np.float64]
+
+
+def take_from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
+                        base: str = "free") -> Take:
+    """Joint angles with their uncertainty, base and bodies in the take's world, damage mended, marked and reported.
+
+    The world W has x along the robot's first heading, y left, z up; its origin lies under the base link's origin at rest, on the
+    capture's floor. InputError where an asset is no link of the model, where a recording has no rigid bodies, or a log's joints
+    are not the model's.
+    """
+    label = name or Path(recording.source).stem
+    if recording.kind == "motive":
+        check_assets(recording, model)
+        take = take_from_tracks(mend(tracks_of(recording), model), measurement, model, label, base)
+        return replace(take, problems=(*recording.problems, *take.problems), commands=recording.commands)
+    raise InputError(recording.source, f"no take can be made of a recording of kind '{recording.kind}'")
+
+
+def take_from_tracks(tracks: Tracks, measurement: Measurement, model: RobotModel, name: str, base: str) -> Take:
+    """As `take_from_recording`, of mended tracks."""
+    m = measurement
+    angles = joint_angles(tracks, model, m.yaw, base)
+    noise = np.array([m.noise.get(j, np.nan) for j in angles.joints])
+    p, q = in_world(tracks, m.yaw, m.origin)
+    p_WB = quat_WB = None
+    root = base_row(tracks, model)
+    if root is not None:
+        pivot = np.asarray(m.pivots.get(tracks.assets[root], np.zeros(3)))
+        quat_WB = q[root]
+        rotation = quat.matrix(quat.multiply(quat_WB, m.rest_rotation))
+        p_WB = p[root] - rotation @ pivot
+    return Take(
+        name=name, source="recording", time=tracks.time, joints=angles.joints, q=angles.q, starts_at=m.starts_at, zeroed=True,
+        base=base, q_sigma=angle_sigma(angles, noise, tracks.rate), p_WB=p_WB, quat_WB=quat_WB, off_axis=angles.off_axis,
+        bodies={a: BodyTrack(p[i], q[i]) for i, a in enumerate(tracks.assets)}, mended=tracks.mended,
+        problems=(*tracks.problems, *angles.problems))
