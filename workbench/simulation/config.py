@@ -20,7 +20,7 @@ class SimulationConfig:
     (Drake's implicit PD; see fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
     hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
-    written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces; 0: none.
+    written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces, in whole steps; 0: none.
     """
 
     time_step: float = 1e-3

@@ -29,7 +29,7 @@ class FootForces:
         self._world = int(plant.world_body().index())
 
     def __call__(self, plant_context: Context) -> NDArray[np.float64]:
-        """Forces (feet, 3) [N] of the ground on the feet, in W; of the last step in a discrete plant."""
+        """Forces (feet, 3) [N] of the ground on the feet, in W."""
         out = np.zeros((len(self.feet), 3))
         results = self._plant.get_contact_results_output_port().Eval(plant_context)
         for i in range(results.num_point_pair_contacts()):

@@ -189,8 +189,10 @@ class Simulation:
         """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
         commanded = commands is not None and self.config.drive == "servo"
         changes = {lead + float(t): k for k, t in enumerate(commands.times)} if commands is not None and commanded else {}
-        period = self.config.contact_period
-        samples = np.arange(0.0, end + 1e-9, period) if period and self.config.base == "free" else np.empty(0)
+        every = max(1, round(self.config.contact_period / self.config.logged_every))  # on a step: Drake solves each step once
+        steps = np.arange(0, round(end / self.config.logged_every) + 1, every)
+        sampling = self.config.contact_period > 0 and self.config.base == "free"
+        samples = steps * self.config.logged_every if sampling else np.empty(0)
         forces: list[Array] = []
         sampled: list[float] = []
         self.simulator.Initialize()
