@@ -87,3 +87,13 @@ def legend_above(axes: Axes, columns: int = 6) -> None:
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.2, columnspacing=1.4,
                     handlelength=1.8)
+
+
+def panels(count: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
+    """A figure of `count` panels in rows of `columns` that share their time axis; `height` of one row [inches]."""
+    rows = -(-count // columns)
+    figure = new_figure(width, height * rows + 0.6)
+    grid = list(figure.subplots(rows, columns, sharex=True, squeeze=False).flat)
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    return figure, grid[:count]
