@@ -47,6 +47,12 @@ class SimulationConfig:
             raise ValueError("drive: fast_servo needs a discrete plant (time_step > 0)")
 
     @property
+    def uses_cenic(self) -> bool:
+        """Drake's CENIC steps the plant: friction is implicit, and contact forces between steps cannot be asked for (Drake
+        1.51 aborts)."""
+        return self.time_step == 0 and self.integrator == "cenic"
+
+    @property
     def logged_every(self) -> float:
         """Seconds between two rows of the log, a multiple of the step."""
         if self.log_period:

@@ -21,14 +21,12 @@ def AddGantry(builder: RobotDiagramBuilder, base: str, instance: ModelInstanceIn
     gantry = plant.AddModelInstance("gantry")
     parent = plant.world_frame()
     for i, name in enumerate(AXES):
-        last = i == len(AXES) - 1
-        body = None if last else plant.AddRigidBody(f"gantry_{name}", gantry, SpatialInertia.Zero())
-        child = plant.GetFrameByName(base, instance) if body is None else body.body_frame()
-        axis = np.eye(3)[i if i < 3 else 5 - i]
-        kind = PrismaticJoint if i < 3 else RevoluteJoint
-        joint = plant.AddJoint(kind(f"gantry_{name}", parent, child, axis))
+        carriage = plant.AddRigidBody(f"gantry_{name}", gantry, SpatialInertia.Zero()).body_frame()
+        kind, axis = (PrismaticJoint, i) if i < 3 else (RevoluteJoint, 5 - i)
+        joint = plant.AddJoint(kind(f"gantry_{name}", parent, carriage, np.eye(3)[axis]))
         plant.AddJointActuator(f"gantry_{name}", joint).set_controller_gains(GAINS)
-        parent = child
+        parent = carriage
+    plant.WeldFrames(parent, plant.GetFrameByName(base, instance))
 
 
 def ConnectPath(builder: RobotDiagramBuilder) -> None:

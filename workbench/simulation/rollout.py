@@ -101,6 +101,11 @@ class Simulation:
     def _whole_steps(self, seconds: float) -> float:
         return round(seconds / self.config.logged_every) * self.config.logged_every
 
+    def _on_grid(self, t: float) -> float:
+        """t, or the instant of the log that it misses by rounding alone: Drake would take a step of 1e-17 s between the two."""
+        nearest = self._whole_steps(t)
+        return nearest if abs(nearest - t) < 1e-9 else t
+
     def _base_path_to_follow(self, path: Take | None, lead: float, duration: float) -> tuple[Array, Array] | None:
         """Times (K,) [s] on the run's clock and gantry coordinates (K, 6) of the path, from the run's first instant on."""
         if self.config.base != "path":
@@ -133,8 +138,7 @@ class Simulation:
 
     def _place_base(self, gantry: Array | None) -> None:
         if gantry is not None:
-            for name, value in zip(AXES, gantry):
-                self.plant.GetJointByName(f"gantry_{name}").SetPositions(self._plant_context, [value])
+            self.plant.SetPositions(self._plant_context, self.plant.GetModelInstanceByName("gantry"), gantry)
             hold = linear_trajectory(np.array([0.0, 1.0]), np.vstack([gantry, gantry]))
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(hold)
         elif self.config.base == "free":
@@ -188,16 +192,17 @@ class Simulation:
     def _advance(self, commands: Commands | None, lead: float, end: float) -> tuple[Array, dict[str, Array]]:
         """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
         commanded = commands is not None and self.config.drive == "servo"
-        changes = {lead + float(t): k for k, t in enumerate(commands.times)} if commands is not None and commanded else {}
+        times = commands.times if commands is not None and commanded else []
+        changes = {self._on_grid(lead + float(t)): k for k, t in enumerate(times)}
         every = max(1, round(self.config.contact_period / self.config.logged_every))  # on a step: Drake solves each step once
         steps = np.arange(0, round(end / self.config.logged_every) + 1, every)
-        sampling = self.config.contact_period > 0 and self.config.base == "free"
+        sampling = self.config.contact_period > 0 and self.config.base == "free" and not self.config.uses_cenic
         samples = steps * self.config.logged_every if sampling else np.empty(0)
         forces: list[Array] = []
         sampled: list[float] = []
         self.simulator.Initialize()
         due = set(samples.tolist())
-        for t in sorted(due | {c for c in changes if c < end} | {end}):
+        for t in sorted(due | {c for c in changes if c < end} | {self._on_grid(end)}):
             self.simulator.AdvanceTo(t)
             if t in due:
                 forces.append(self._foot_forces(self._plant_context))
@@ -236,7 +241,7 @@ class Simulation:
 
     def _torque(self, t: Array, q: Array, v: Array, commands: Commands | None, lead: float) -> Array | None:
         """Torque of the servos on the joints [N m]: motor less viscous friction, and Coulomb friction, from the logs."""
-        if self.config.drive == "servo" and self.config.time_step == 0 and self.config.integrator != "cenic":
+        if self.config.drive == "servo" and self.config.time_step == 0 and not self.config.uses_cenic:
             force = self._log("generalized_force")[1][:, self._v - self.plant.num_positions()]
             return np.asarray(force - self._law.damping * v)
         actuation = self._log("net_actuation")[1]

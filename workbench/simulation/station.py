@@ -68,7 +68,7 @@ def _add_model(builder: RobotDiagramBuilder, model: RobotModel) -> ModelInstance
 def _add_drive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, config: SimulationConfig) -> None:
     diagram = builder.builder()
     if config.drive == "servo":
-        implicit = config.time_step > 0 or config.integrator == "cenic"
+        implicit = config.time_step > 0 or config.uses_cenic
         bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle")
         for port in ("goal_position", "moving_speed", "torque_enable"):
             diagram.ExportInput(bank.GetInputPort(port), port)
