@@ -6,7 +6,7 @@ the bench races against (`bench`). A run goes through stages, each of which take
 is where physics that the model does not have can be put in:
 
     firmware (what is sent) ->
-    description (links, joints, feet) -> mjcf (MuJoCo's model) -> play (with the servo bank) -> capture (what is seen)
+    description (links, joints, feet) -> mjcf (MuJoCo's model) -> player (with the servo bank) -> capture (what is seen)
 """
 
 from studies.other_engine.capture import Camera, Capture, film
@@ -14,7 +14,7 @@ from studies.other_engine.description import Description, describe
 from studies.other_engine.firmware import commands_from_rows
 from studies.other_engine.mjcf import to_mjcf
 from studies.other_engine.motive_file import write_motive_csv
-from studies.other_engine.play import Rollout, play
+from studies.other_engine.player import Rollout, play
 from studies.other_engine.servo import Reference, ServoBank
 
 __all__ = [

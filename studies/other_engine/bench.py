@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from studies.other_engine.description import describe
 from studies.other_engine.mjcf import compile_model
-from studies.other_engine.play import play
+from studies.other_engine.player import play
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from studies.other_engine.play import Rollout
+from studies.other_engine.player import Rollout
 
 Array = NDArray[np.float64]
 _AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])

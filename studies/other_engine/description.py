@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class ContactShape:
     """A sphere or box: centre p (3,) [m] and R (3, 3) in its link's frame; half: half its extents along its own axes (3,)
-    [m], of a sphere three times the radius; friction and stiffness [N/m], NaN where the file does not say."""
+    [m], of a sphere three times the radius; friction, stiffness [N/m] and Hunt-Crossley dissipation [s/m], NaN where the
+    file does not say."""
 
     kind: str
     p: Array
@@ -30,6 +31,7 @@ class ContactShape:
     half: Array
     friction: float
     stiffness: float
+    dissipation: float
 
     def bottom(self, p_WL: Array, R_WL: Array) -> float:
         """Height of its lowest point where its link is at p_WL (3,), R_WL (3, 3) [m]."""
@@ -135,10 +137,12 @@ def _shapes(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidBo
             continue
         friction: Any = properties.GetPropertyOrDefault("material", "coulomb_friction", None)
         stiffness: Any = properties.GetPropertyOrDefault("material", "point_contact_stiffness", math.nan)
+        dissipation: Any = properties.GetPropertyOrDefault("material", "hunt_crossley_dissipation", math.nan)
         X_LG = inspector.GetPoseInFrame(geometry)
         out.append(ContactShape(
             kind, np.asarray(X_LG.translation()), np.asarray(X_LG.rotation().matrix()), half,
             friction=math.nan if friction is None else friction.dynamic_friction(),
             stiffness=float(stiffness),
+            dissipation=float(dissipation),
         ))
     return tuple(out)

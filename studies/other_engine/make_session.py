@@ -21,7 +21,7 @@ from studies.other_engine.capture import Camera, Capture, film, pivots_for
 from studies.other_engine.excitation import MotionRows, stand_motion, sway_motion, varied_walk
 from studies.other_engine.firmware import commands_from_rows, read_rows
 from studies.other_engine.motive_file import write_motive_csv
-from studies.other_engine.play import Rollout, play
+from studies.other_engine.player import Rollout, play
 from workbench.robot import RobotModel, ServoConstants, data_file, load_servo_constants, puppy_model
 
 REST_AFTER = 0.5
