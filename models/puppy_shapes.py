@@ -124,9 +124,9 @@ def f3() -> Shape:
 def cm530() -> Shape:
     """CM-530, 101 x 69 x 32 mm: long side along x, buttons up, origin in the middle of the box."""
     pieces = [
-        Solid(box((-50.5, 50.5), (-34.5, 34.5), (-16, 10), 5), WHITE),
-        Solid(box((-48.5, 48.5), (-32.5, 32.5), (10, 16), 6), FRAME),
-        Solid(box((-44, 14), (-25, 25), (16, 16.4), 3), DARK, False),
+        Solid(box((-50.5, 50.5), (-34.5, 34.5), (-16, 10), 5), DARK),
+        Solid(box((-48.5, 48.5), (-32.5, 32.5), (10, 16), 6), GREY),
+        Solid(box((-44, 14), (-25, 25), (16, 16.4), 3), BLACK, False),
         Solid(box((-38, 6), (14, 21), (16.4, 16.6)), BLUE, False),
         Solid(box((18, 44), (-26, -14), (16, 18.5), 1), RED, False),
         Solid(box((24, 38), (-24, -16), (18.5, 20), 1), BLACK, False),
