@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -28,18 +30,21 @@ def rms_distance(a: Array, b: Array, use: Mask) -> float:
     return float(rms(np.linalg.norm(a[use] - b[use], axis=1)))
 
 
-def noise_at_rest(x: Array, resting: Mask, least: int = 5) -> Array:
-    """RMS about the mean over the frames at rest: (n,) for columns (N, n); NaN below `least` frames.
+def noise_at_rest(rests: Sequence[Array], least: int = 5) -> Array:
+    """RMS about the mean of channels at rest, (n,); NaN below `least` frames. Unbiased in the variance.
 
-    Unbiased for white noise (n - 1 in place of n).
+    rests: frames at rest (N_k, n) of each take k; each has its own mean, the noise is one for all. Half a second of rest tells
+    noise to a tenth, so that takes of one capture are better pooled.
     """
-    rest = x[resting]
-    count = np.isfinite(rest).sum(axis=0)
-    out = np.full(x.shape[1], np.nan)
-    enough = count >= least
-    if enough.any():
-        out[enough] = np.nanstd(rest[:, enough], axis=0, ddof=1)
-    return out
+    squares, freedom = np.zeros(rests[0].shape[1]), np.zeros(rests[0].shape[1])
+    for x in rests:
+        seen = np.isfinite(x)
+        count = seen.sum(axis=0)
+        mean = np.where(seen, x, 0.0).sum(axis=0) / np.maximum(count, 1)
+        squares += np.square(np.where(seen, x - mean, 0.0)).sum(axis=0)
+        freedom += np.maximum(count - 1, 0)
+    known = freedom >= least - 1
+    return np.sqrt(np.divide(squares, freedom, out=np.full(len(squares), np.nan), where=known))
 
 
 def correlation(a: Array, b: Array, use: Mask) -> Array:
@@ -65,7 +70,7 @@ def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array, most: float = 
     shown = use[:, None] & np.isfinite(b)
     moves = np.where(shown, b, -np.inf).max(axis=0) - np.where(shown, b, np.inf).min(axis=0)
     ready = moves > np.where(noise > 0, 5 * noise, 1e-3)
-    step = float(np.median(np.diff(time)))
+    step = max(float(np.median(np.diff(time))), 1 / 240)
     shifts = np.arange(-int(most / step) - 1, int(most / step) + 2) * step
     cost = np.full((len(shifts), a.shape[1]), np.nan)
     for j in np.flatnonzero(ready):
@@ -111,14 +116,19 @@ def turned(quat_WB: Array, since_start: Array) -> float:
     return float(travelled(np.column_stack([heading(quat_WB), np.zeros((len(quat_WB), 2))]), since_start)[0])
 
 
-def planar_speed(time: Array, p_WB: Array, window: float = 0.1) -> Array:
-    """Speed in the plane (N,) [m/s]: slope of a straight line over `window` [s] (Savitzky and Golay's first derivative)."""
+def speed(time: Array, x: Array, window: float = 0.1) -> Array:
+    """Norm of the rate of columns (N, m), gaps bridged: (N,), NaN where nothing was seen.
+
+    The slope of a straight line over `window` [s] (Savitzky and Golay's first derivative).
+    """
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(time)))
-    length = min(max(3, 2 * round(window / step / 2) + 1), len(time) - (len(time) + 1) % 2)
-    filled = np.column_stack([_filled(time, p_WB[:, i]) for i in range(2)])
-    return np.asarray(np.linalg.norm(savgol_filter(filled, length, 1, deriv=1, delta=step, axis=0), axis=1))
+    length = min(2 * max(1, round(window / step / 2)) + 1, len(time) - 1 + len(time) % 2)
+    if length < 3 or not np.isfinite(x).any(axis=0).all():
+        return np.full(len(time), np.nan)
+    bridged = np.column_stack([np.interp(time, time[np.isfinite(c)], c[np.isfinite(c)]) for c in x.T])
+    return np.asarray(np.linalg.norm(savgol_filter(bridged, length, 1, deriv=1, delta=step, axis=0), axis=1))
 
 
 def smoothness(time: Array, speed: Array, cutoff: float = 10.0, threshold: float = 0.05, padding: int = 4) -> float:
@@ -142,8 +152,3 @@ def smoothness(time: Array, speed: Array, cutoff: float = 10.0, threshold: float
     if len(frequency) < 2:
         return float("nan")
     return -float(np.hypot(np.diff(frequency) / (frequency[-1] - frequency[0]), np.diff(spectrum)).sum())
-
-
-def _filled(time: Array, x: Array) -> Array:
-    seen = np.isfinite(x)
-    return np.interp(time, time[seen], x[seen]) if seen.any() else np.zeros_like(x)

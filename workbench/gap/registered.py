@@ -1,0 +1,121 @@
+"""A session's recordings, read and brought into the model's frame and clock; damaged takes are named and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from workbench.gap.comparison import aligned
+from workbench.gap.session import Session, TakeSpec
+from workbench.motion.commands import Commands
+from workbench.recording.observe import observe
+from workbench.recording.read import read_recording
+from workbench.recording.recording import Measurement, Recording
+from workbench.recording.registration import register
+from workbench.recording.take import Take
+from workbench.recording.take_from import named_by_model, take_from_recording
+from workbench.recording.tracks import check_assets
+from workbench.recording.yaw import session_yaw
+from workbench.robot import InputError, RobotModel
+
+Progress = Callable[[str, float | None], None]
+LeftOut = tuple[tuple[str, str], ...]
+
+
+def no_progress(what: str, done: float | None = None) -> None:
+    """Says nothing."""
+
+
+@dataclass(frozen=True)
+class ReadTake:
+    """A take as it stands in its file, with the robot as it was then and what went out on the bus."""
+
+    spec: TakeSpec
+    model: RobotModel
+    recording: Recording
+    commands: Commands | None
+
+    @property
+    def duration(self) -> float:
+        """Time from the first command to the recording's end, if it began with the recording [s]."""
+        return float(self.recording.time[-1] - (self.spec.starts_at or 0.0))
+
+
+@dataclass(frozen=True)
+class RegisteredTake(ReadTake):
+    """A take in the model's frame. recorded: zeroed at rest as seen; measurement: how a rollout is looked at in the same way."""
+
+    measurement: Measurement
+    recorded: Take
+
+    def observed(self, rollout: Take) -> Take:
+        """A rollout of this take as the recording would show it: on its clock, zeroed in the same way (a log is not)."""
+        if not self.recorded.zeroed:
+            return aligned(rollout, self.recorded)
+        return observe(rollout, self.measurement, self.model, self.recorded.time)[0]
+
+
+def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
+    """All recordings of a session, and those left out with the reason. InputError where none remains, or where a recording has
+    an asset to which the session gives no link: that is the session's error, not a damaged take."""
+    read: list[ReadTake] = []
+    left: list[tuple[str, str]] = []
+    for spec in session.takes:
+        model = session.model_of(spec)
+        try:
+            recording = readable(spec.recording, model)
+        except InputError as e:
+            left.append((spec.name, str(e)))
+            continue
+        if recording.rigid_bodies:
+            check_assets(recording, model)
+        commands = spec.commands(model) or recording.commands
+        if commands is None:
+            raise InputError(session.path, f"take '{spec.name}': motion: is missing, and the recording has no commands")
+        read.append(ReadTake(spec, model, recording, commands))
+    return read, remaining(session, read, tuple(left))
+
+
+def readable(path: Path, model: RobotModel) -> Recording:
+    """A recording that can be compared: InputError where it cannot be read, or has neither rigid bodies nor joints."""
+    recording = read_recording(path)
+    if recording.channels:
+        return named_by_model(recording, model)
+    if not recording.rigid_bodies:
+        found = f"{len(recording.markers)} markers" if recording.markers else "nothing"
+        raise InputError(path, f"expected rigid bodies or joint channels, found {found}")
+    return recording
+
+
+def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) -> LeftOut:
+    """`left_out`; InputError where no take is left."""
+    if takes:
+        return left_out
+    if not left_out:
+        raise InputError(session.path, "takes: expected at least one")
+    raise InputError(session.path, "no take can be used: " + "; ".join(f"{name}: {why}" for name, why in left_out))
+
+
+def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mapping[str, Take],
+                   progress: Progress = no_progress) -> tuple[list[RegisteredTake], LeftOut]:
+    """Registers each take against its rollout (by the take's name), with one yaw for all of them."""
+    captured = [t for t in takes if t.recording.rigid_bodies]
+    yaw = session_yaw([t.recording for t in captured], session.model, [t.commands for t in captured]).yaw if captured else None
+    registered: list[RegisteredTake] = []
+    left: list[tuple[str, str]] = []
+    for i, t in enumerate(takes):
+        progress(f"registering {t.spec.name}", i / len(takes))
+        try:
+            registered.append(register_take(t, rollouts[t.spec.name], yaw))
+        except InputError as e:
+            left.append((t.spec.name, str(e)))
+    return registered, remaining(session, registered, tuple(left))
+
+
+def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:
+    """Registers one take against what a simulation (or another recording) says. InputError where it cannot be."""
+    spec, model, recording, commands = take.spec, take.model, take.recording, take.commands
+    measurement = register(recording, model, commands, predicted, spec.starts_at, yaw, spec.base)
+    recorded = take_from_recording(recording, measurement, model, name=spec.name, base=spec.base)
+    return RegisteredTake(spec, model, recording, commands, measurement, replace(recorded, commands=commands))
