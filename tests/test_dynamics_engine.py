@@ -59,8 +59,10 @@ def random_states(model: RobotModel, count: int, moving_base: bool) -> RobotTraj
     quat = rng.normal(size=(count, 4))
     quat = continuous(quat / np.linalg.norm(quat, axis=1, keepdims=True)) if moving_base else np.tile([1.0, 0, 0, 0], (count, 1))
     return RobotTrajectory(
-        np.arange(float(count)), model.joints, rng.uniform(-2, 2, (count, n)), rng.normal(0, 5, (count, n)), rng.normal(0, 80, (count, n)),
-        rng.normal(size=(count, 3)) * moving_base, quat, rng.normal(0, 3, (count, 6)) * moving_base, rng.normal(0, 20, (count, 6)) * moving_base)
+        np.arange(float(count)), model.joints,
+        rng.uniform(-2, 2, (count, n)), rng.normal(0, 5, (count, n)), rng.normal(0, 80, (count, n)),
+        rng.normal(size=(count, 3)) * moving_base, quat,
+        rng.normal(0, 3, (count, 6)) * moving_base, rng.normal(0, 20, (count, 6)) * moving_base)
 
 
 def set_state(m: mujoco.MjModel, d: mujoco.MjData, model: RobotModel, t: RobotTrajectory, i: int, free: bool) -> np.ndarray:

@@ -7,33 +7,56 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+STICKING = 0.02
+"""Slip [m/s] about which friction turns from any direction to against the slip."""
+AGAINST_SLIP = 100.0
+"""How much dearer force is that does not obey the slip: it is used only where the wrench asks for it."""
 _CHUNK = 4096
-_ITERATIONS = 60
+_ITERATIONS, _HALVINGS = 60, 30
 
 
-def share_forces(wrench: Array, arms: Array, friction: Array, cost: Array, scale: Array) -> tuple[Array, Array]:
+def share_forces(wrench: Array, arms: Array, slip: Array, friction: Array, cost: Array, scale: Array) -> tuple[Array, Array]:
     """Forces f (N, C, 3) [N] in W, each in its cone |f_xy| <= friction f_z, that leave least of a wrench, and what
     they leave, (N, 6).
 
-    wrench: (N, 6) [moment N m, force N] about the point from which arms (N, C, 3) [m] lead to the contacts. friction: (C,)
-    or (N, C). cost: (N, C) [1/N²] of force at each point; infinite: no contact there. scale: (6,), units in which the
-    residual is weighed. NaN rows stay NaN.
+    wrench: (N, 6) [moment N m, force N] about the point from which arms (N, C, 3) [m] lead to the contacts. slip: (N, C, 2)
+    [m/s], velocity along the floor. friction: (C,). cost: (N, C) [1/N²] of force at each point; infinite: no contact there.
+    scale: (6,), units in which the residual is weighed. NaN rows stay NaN.
 
     Minimises ½|r|² + ½ sum cost_c |f_c|² with r = (wrench - G f) / scale. Given r, each force is G_c' r / cost_c projected on
     its circular cone (no pyramid), so that one equation in the six unknowns r remains, r + G P(G' r / cost) = wrench / scale:
     the gradient of a strongly convex, piecewise smooth function. Newton's method with a line search finds its zero, for
     all samples at once (Qi and Sun, Math. Programming 58, 1993).
+
+    What is down can push in many ways that move the robot alike. Where a point slides, friction works against the slip: each
+    point has two cones, a cheap one that narrows to the ray against the slip as it gets faster, and the whole one,
+    dearer by AGAINST_SLIP, so that the residual is what the whole cone leaves.
     """
     N, C = arms.shape[:2]
     forces, residual = np.full((N, C, 3), np.nan), np.full((N, 6), np.nan)
-    mu = np.broadcast_to(friction, (N, C))
-    good = np.flatnonzero(np.isfinite(wrench).all(axis=1) & np.isfinite(arms).all(axis=(1, 2)))
+    known = [np.isfinite(x.reshape(N, -1)).all(axis=1) for x in (wrench, arms, slip)]
+    good = np.flatnonzero(np.all(known, axis=0))
     for start in range(0, len(good), _CHUNK):
         rows = good[start:start + _CHUNK]
         G = grasp(arms[rows]) / scale[:, None]  # (r, C, 6, 3)
-        f, r = _solve(wrench[rows] / scale, G, mu[rows], 1 / cost[rows])
-        forces[rows], residual[rows] = f, r * scale
+        drag, rest = _drag(slip[rows], friction)
+        G_drag = G.copy()
+        G_drag[..., 2] += (G[..., :2] @ drag[..., None])[..., 0]
+        ease = 1 / cost[rows]
+        cones = np.concatenate([G_drag, G], axis=1), np.concatenate([rest, np.broadcast_to(friction, ease.shape)], axis=1)
+        f, r = _solve(wrench[rows] / scale, *cones, np.concatenate([ease, ease / AGAINST_SLIP], axis=1))
+        lawful, any_ = f[:, :C], f[:, C:]
+        forces[rows], residual[rows] = lawful + any_, r * scale
+        forces[rows, :, :2] += drag * lawful[..., 2:]
     return forces, residual
+
+
+def _drag(slip: Array, friction: Array) -> tuple[Array, Array]:
+    """Friction of a sliding point per normal force (N, C, 2), and the coefficient (N, C) that is left for any direction: all of
+    it where the point sticks, none where it surely slides."""
+    speed = np.linalg.norm(slip, axis=2)
+    size = np.hypot(speed, STICKING)
+    return -(friction / size)[..., None] * slip, friction * (1 - speed / size)
 
 
 def grasp(arms: Array) -> Array:
@@ -46,40 +69,44 @@ def grasp(arms: Array) -> Array:
 
 
 def _solve(w: Array, G: Array, mu: Array, ease: Array) -> tuple[Array, Array]:
+    """Forces (N, K, 3) and residual (N, 6) for wrenches w (N, 6), grasp matrices G (N, K, 6, 3) and ease (N, K), 1 / cost."""
+    flat = np.ascontiguousarray(G.transpose(0, 2, 1, 3)).reshape(len(G), 6, -1)
     r = np.zeros_like(w)
-    f, value, gradient = _dual(r, w, G, mu, ease)
+    f, value, gradient = _dual(r, w, flat, mu, ease)
     tolerance = 1e-10 * (1 + np.abs(w).max(axis=1))
     for _ in range(_ITERATIONS):
-        open_ = np.flatnonzero(np.abs(gradient).max(axis=1) > tolerance)
-        if not len(open_):
+        rows = np.flatnonzero(np.abs(gradient).max(axis=1) > tolerance)
+        if not len(rows):
             break
-        Go = G[open_]
-        D = _projection_slope(_pull(r[open_], Go), mu[open_]) * ease[open_][..., None, None]
-        H = np.eye(6) + np.einsum("ncij,ncjk,nclk->nil", Go, D, Go, optimize=True)
-        step = -np.linalg.solve(H, gradient[open_][..., None])[..., 0]
-        slope = np.sum(step * gradient[open_], axis=1)
-        length = np.ones(len(open_))
-        for _ in range(30):  # Armijo
-            trial = r[open_] + length[:, None] * step
-            ft, vt, gt = _dual(trial, w[open_], Go, mu[open_], ease[open_])
-            short = vt > value[open_] + 1e-4 * length * slope + 1e-14 * np.abs(value[open_])
-            if not short.any():
+        D = _projection_slope(_pull(r[rows], flat[rows]), mu[rows]) * ease[rows][..., None, None]
+        GD = (G[rows] @ D).transpose(0, 2, 1, 3).reshape(len(rows), 6, -1)
+        step = -np.linalg.solve(np.eye(6) + GD @ flat[rows].transpose(0, 2, 1), gradient[rows][..., None])[..., 0]
+        slope = np.sum(step * gradient[rows], axis=1)
+        length = 1.0
+        for _ in range(_HALVINGS):  # Armijo's rule; what satisfies it is done
+            trial = r[rows] + length * step
+            f_trial, v_trial, g_trial = _dual(trial, w[rows], flat[rows], mu[rows], ease[rows])
+            good = v_trial <= value[rows] + 1e-4 * length * slope + 1e-14 * np.abs(value[rows])
+            done = rows[good]
+            r[done], f[done], value[done], gradient[done] = trial[good], f_trial[good], v_trial[good], g_trial[good]
+            rows, step, slope = rows[~good], step[~good], slope[~good]
+            if not len(rows):
                 break
-            length[short] /= 2
-        r[open_], f[open_], value[open_], gradient[open_] = trial, ft, vt, gt
-    return f, w - np.einsum("ncij,ncj->ni", G, f)
+            length /= 2
+    return f, w - (flat @ f.reshape(len(f), -1, 1))[..., 0]
 
 
-def _pull(r: Array, G: Array) -> Array:
-    return np.asarray(np.einsum("ncij,ni->ncj", G, r))
+def _pull(r: Array, flat: Array) -> Array:
+    """G' r (N, K, 3)."""
+    return np.asarray((r[:, None] @ flat).reshape(len(r), -1, 3))
 
 
-def _dual(r: Array, w: Array, G: Array, mu: Array, ease: Array) -> tuple[Array, Array, Array]:
+def _dual(r: Array, w: Array, flat: Array, mu: Array, ease: Array) -> tuple[Array, Array, Array]:
     """Forces, value and gradient of ½|r|² + ½ sum ease |P(G'r)|² - w'r."""
-    p = project(_pull(r, G), mu)
+    p = project(_pull(r, flat), mu)
     f = p * ease[..., None]
     value = np.sum(r * r, axis=1) / 2 + np.sum(p * f, axis=(1, 2)) / 2 - np.sum(w * r, axis=1)
-    return f, value, r + np.einsum("ncij,ncj->ni", G, f) - w
+    return f, value, r + (flat @ f.reshape(len(f), -1, 1))[..., 0] - w
 
 
 def project(z: Array, mu: Array) -> Array:

@@ -44,9 +44,10 @@ class _Solution:
 class InverseDynamics:
     """Inverse dynamics of one robot. Builds its plant once; not for several threads at a time.
 
-    base: "free", feet on a level floor, or "fixed", held level (or as the SDF mounts it). friction: of foot on ground; None:
-    the model's ground, else the SDF's feet, else 0.5. servo_friction: whether the motor torque includes the servo's own
-    Coulomb and viscous friction. gravity [m/s²] in W. InputError for a base that the model lacks or that cannot float.
+    base: "free", feet on a level floor, or "fixed", held level (or as the SDF mounts it), or moved along a path. friction:
+    of foot on ground; None: the model's ground, else the SDF's feet, else 0.5. servo_friction: whether the motor torque
+    includes the servo's own Coulomb and viscous friction. gravity [m/s²] in W. InputError for a base that the model lacks or
+    that cannot float.
     """
 
     def __init__(self, model: RobotModel, base: Literal["free", "fixed"] = "free", friction: float | None = None,
@@ -131,7 +132,8 @@ class InverseDynamics:
         weight = self.machine.mass * float(np.linalg.norm(self.machine.gravity)) or 1.0
         length = float(np.sqrt(np.nanmean(np.sum(arms**2, axis=2)))) if np.isfinite(arms).any() else 1.0
         scale = np.repeat([weight * length, weight], 3)
-        forces, residual = share_forces(wrench, arms, self.friction, dear * REGULARISATION / weight**2, scale)
+        slip = self.machine.velocities(trajectory, places)[:, :, :2]
+        forces, residual = share_forces(wrench, arms, slip, self.friction, dear * REGULARISATION / weight**2, scale)
         torque = torque - self.machine.torque_of(trajectory, places, forces)
         return _Solution(torque, forces, residual, wrench * 0.0)
 
@@ -140,7 +142,7 @@ class InverseDynamics:
             return np.empty((len(trajectory.time), 0))
         places, points = self.machine.places(trajectory), self.machine.points
         floors = floor_under(places, points) if floor is None else np.full(len(points.feet), float(floor))
-        return dearness(trajectory.time, places, points, floors, stance)
+        return dearness(places, self.machine.velocities(trajectory, places), points, floors, stance)
 
     def _result(self, name: str, trajectory: RobotTrajectory, solution: _Solution, torque_sigma: Array, residual_sigma: Array,
                 problems: list[str]) -> InverseDynamicsResult:
@@ -148,12 +150,12 @@ class InverseDynamics:
         torque_left, speed_left = torque_margin(self._servos, motor, trajectory.v), speed_margin(self._servos, trajectory.v)
         loads = {j: servo_load(s, motor[:, i], torque_left[:, i], speed_left[:, i])
                  for i, (j, s) in enumerate(zip(self.model.joints, self._servos))}
-        points = self.machine.points
-        contact = {foot: solution.forces[:, points.foot == f].sum(axis=1) for f, foot in enumerate(points.feet)}
+        feet = self.machine.points.feet if self.base == "free" else ()
+        contact = {foot: solution.forces[:, self.machine.points.foot == f].sum(axis=1) for f, foot in enumerate(feet)}
         return InverseDynamicsResult(
             name=name, base=self.base, time=trajectory.time, joints=self.model.joints,
             q=trajectory.q, v=trajectory.v, a=trajectory.a, torque=solution.torque, motor_torque=motor,
-            contact=contact if self.base == "free" else {}, base_wrench_residual=solution.residual, support=solution.support,
+            contact=contact, base_wrench_residual=solution.residual, support=solution.support,
             torque_margin=torque_left, speed_margin=speed_left, torque_sigma=torque_sigma, residual_sigma=residual_sigma,
             loads=loads, problems=tuple(problems))
 
@@ -206,12 +208,12 @@ class InverseDynamics:
         return out
 
     def _base_path(self, take: Take) -> tuple[Array, Array]:
-        if (take.base == "fixed") != (self.base == "fixed"):
+        if (take.base == "free") != (self.base == "free"):
             raise InputError(take.name, f"base: the take's is {take.base}, these inverse dynamics are for a {self.base} one")
-        if self.base == "fixed":
+        if take.base == "fixed":
             return np.tile(self.machine.mount[0], (len(take), 1)), np.tile(self.machine.mount[1], (len(take), 1))
         if take.p_WB is None or take.quat_WB is None:
-            raise InputError(take.name, f"base: the take has no pose of '{self.model.base}', which a free base needs")
+            raise InputError(take.name, f"base: the take has no pose of '{self.model.base}', which a moving base needs")
         return take.p_WB, take.quat_WB
 
     def _note_gaps(self, take: Take, trajectory: RobotTrajectory, problems: list[str]) -> None:
@@ -232,7 +234,7 @@ class InverseDynamics:
 
 def inverse_dynamics(model: RobotModel, take: Take, **choices: object) -> InverseDynamicsResult:
     """Inverse dynamics of one take, on the base it says; choices as in `InverseDynamics.of_take`."""
-    return InverseDynamics(model, "fixed" if take.base == "fixed" else "free").of_take(take, **choices)  # type: ignore[arg-type]
+    return InverseDynamics(model, "free" if take.base == "free" else "fixed").of_take(take, **choices)  # type: ignore[arg-type]
 
 
 def _normal(random: np.random.Generator, sigma: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -107,24 +108,37 @@ class Machine:
         centres[:, :, 2] -= points.radius
         return centres
 
+    def velocities(self, trajectory: RobotTrajectory, places: Array) -> Array:
+        """Velocities in W (N, C, 3) [m/s] of the links' material at the feet's places (N, C, 3) [m]."""
+        omega, v = trajectory.V_WB[:, None, :3], trajectory.V_WB[:, None, 3:]
+        out = v + np.cross(omega, places - trajectory.p_WB[:, None])
+        for k, carried, origin, axis in self._axes(trajectory):
+            turning = (axis * trajectory.v[:, k, None])[:, None]
+            out[:, carried] += np.cross(turning, places[:, carried] - origin[:, None])
+        return np.asarray(out)
+
     def torque_of(self, trajectory: RobotTrajectory, places: Array, forces: Array) -> Array:
-        """Joint torques (N, n) [N m] that contact forces (N, C, 3) [N] in W at places (N, C, 3) amount to: J' f."""
+        """Joint torques (N, n) [N m] that contact forces (N, C, 3) [N] in W at places (N, C, 3) [m] amount to: J' f."""
+        out = np.zeros((len(trajectory.time), len(self.joints)))
+        for k, carried, origin, axis in self._axes(trajectory):
+            moment = np.cross(places[:, carried] - origin[:, None], forces[:, carried]).sum(axis=1)
+            out[:, k] = np.sum(axis * moment, axis=1)
+        return out
+
+    def _axes(self, trajectory: RobotTrajectory) -> Iterator[tuple[int, list[int], Array, Array]]:
+        """Joints under which there are feet: column, indices of the places they carry, origin (N, 3) [m] and axis (N, 3) in W."""
         R_WB = rotations(trajectory.quat_WB)
         kinematics = self.model.kinematics
         poses = kinematics.forward(trajectory.q, self.joints)
-        out = np.zeros((len(trajectory.time), len(self.joints)))
         for k, joint in enumerate(self.joints):
-            frame = kinematics.frames[joint]
             carried = [c for c, link in enumerate(self.points.links) if joint in kinematics.chain(link)]
             if not carried:
                 continue
+            frame = kinematics.frames[joint]
             p_BL, R_BL = poses[frame.child]
-            R_LM = frame.X_MB_R.T  # M on the child, at the joint's origin
-            p_WM = trajectory.p_WB + np.einsum("nij,nj->ni", R_WB, p_BL - R_BL @ R_LM @ frame.X_MB_p)
-            axis_W = np.einsum("nij,nj->ni", R_WB, R_BL @ R_LM @ frame.axis)
-            moment = np.cross(places[:, carried] - p_WM[:, None], forces[:, carried]).sum(axis=1)
-            out[:, k] = np.sum(axis_W * moment, axis=1)
-        return out
+            R_BM = R_BL @ frame.X_MB_R.T  # M on the child, at the joint's origin
+            origin = trajectory.p_WB + np.einsum("nij,nj->ni", R_WB, p_BL - R_BM @ frame.X_MB_p)
+            yield k, carried, origin, np.einsum("nij,nj->ni", R_WB, R_BM @ frame.axis)
 
 
 def rotations(quat: Array) -> Array:

@@ -40,7 +40,7 @@ class InverseDynamicsResult:
     noise makes; zero where none was given.
 
     With more than one foot down, how far feet squeeze against each other leaves no trace in the motion: `torque` and
-    `contact` are those of the smallest forces. The residual does not depend on it.
+    `contact` are those of the smallest forces that fit the feet's slip (contact.py). The residual does not depend on it.
     """
 
     name: str

@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 TOUCH = 3e-3
 """Points up to this far above the floor may carry load [m]."""
-LIFTING = 0.1
-"""Points that rise or fall faster than this carry none [m/s]."""
-SHARP = 1e-3
+LIFTING = 0.3
+"""Points that rise or fall faster than this carry none [m/s]; they cross TOUCH within 10 ms."""
+SHARP = 5e-4
 """Height above the floor [m] at which force is twice as dear as on it: of a tilted foot the lower edge carries."""
 REACH = 0.01
 """A foot's own floor may lie this far above the lowest foot's [m]: leg lengths and rest angles are not known better."""
@@ -34,24 +34,24 @@ def floor_under(places: Array, points: FootPoints) -> Array:
         return np.minimum(floors, np.min(floors, where=np.isfinite(floors), initial=np.inf) + REACH)
 
 
-def dearness(time: Array, places: Array, points: FootPoints, floor: Array,
+def dearness(places: Array, velocities: Array, points: FootPoints, floor: Array,
              stance: Mapping[str, NDArray[np.bool_]] | None) -> Array:
     """How dear force is at each point (N, C): 1 on the floor, rising with the height above it, infinite without contact.
 
-    Without `stance` a point is in contact if it is within TOUCH of its foot's floor (F,) [m] and slower than LIFTING. With
-    `stance`, foot -> (N,) bool, a foot is down when it says so, and its floor is where its lowest point is.
+    places, velocities: (N, C, 3) [m, m/s] in W. Without `stance` a point is in contact if it is within TOUCH of its foot's
+    floor (F,) [m] and slower than LIFTING. With `stance`, foot -> (N,) bool, a foot is down when it says so, and its floor is
+    where its lowest point is.
     """
     height = places[:, :, 2] - floor[points.foot]
     if stance is None:
-        speed = np.abs(np.gradient(places[:, :, 2], time, axis=0)) if len(time) > 1 else np.zeros_like(height)
-        touching = (height < TOUCH) & (speed < LIFTING)
+        touching = (height < TOUCH) & (np.abs(velocities[:, :, 2]) < LIFTING)
     else:
         touching = np.zeros(height.shape, dtype=bool)
         for foot, down in stance.items():
             if foot not in points.feet:
                 raise InputError(None, f"stance: the robot has no foot '{foot}'; its feet: {' '.join(points.feet) or 'none'}")
-            if np.shape(down) != time.shape:
-                raise InputError(None, f"stance, {foot}: expected a value for each of {len(time)} samples, got {np.shape(down)}")
+            if np.shape(down) != (len(places),):
+                raise InputError(None, f"stance, {foot}: expected shape {(len(places),)}, a value a sample, got {np.shape(down)}")
             own = points.foot == points.feet.index(foot)
             height[:, own] -= height[:, own].min(axis=1, keepdims=True)
             touching[:, own] = np.asarray(down, dtype=bool)[:, None] & (height[:, own] < TOUCH)
