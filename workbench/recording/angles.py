@@ -44,7 +44,7 @@ def joint_angles(tracks: Tracks, model: RobotModel, yaw: float, base: str) -> An
 def angle_sigma(angles: Angles, noise: Array, rate: float) -> Array:
     """Standard deviation of each sample (N, n) [rad]: the noise (n,) at rest, and in mended samples the error of a straight
     line under the joint's own angular acceleration a, a t(T - t)/2."""
-    step = max(1, int(round(0.025 * rate)))
+    step = max(1, round(0.025 * rate))
     q = angles.q
     sigma = np.broadcast_to(noise, q.shape).copy()
     if len(q) > 2 * step and angles.seconds_squared.any():
@@ -53,14 +53,6 @@ def angle_sigma(angles: Angles, noise: Array, rate: float) -> Array:
         acceleration = np.sqrt(np.maximum(mean_square - 6 * noise**2 * (rate / step) ** 4, 0))
         sigma = np.hypot(sigma, acceleration * angles.seconds_squared / 2)
     return np.where(np.isfinite(q), sigma, np.nan)
-
-
-@dataclass(frozen=True)
-class BasePose:
-    """Base link's frame B in the take's world W: p (N, 3) [m], quat (N, 4) wxyz."""
-
-    p: Array
-    quat: Array
 
 
 def base_row(tracks: Tracks, model: RobotModel) -> int | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 LONGEST_MENDED = 0.05
-"""Gaps up to this long [s] are filled. In longer ones a walking servo can start, stop and turn back: nothing is invented there."""
+"""Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop: nothing is invented there."""
 _SPIKE = 0.06
 _ARM = 0.1  # [m] a rotation weighs as much as the way of a point this far off
 
@@ -45,7 +46,7 @@ def distance(p: Array, q: Array, p2: Array, q2: Array) -> Array:
 def _without_spikes(tracks: Tracks, longest: float) -> Tracks:
     """Blanks short runs that leap away and back, faster than any servo moves a link."""
     p, q, problems = tracks.p.copy(), tracks.q.copy(), list(tracks.problems)
-    most = max(1, int(round(longest * tracks.rate)))
+    most = max(1, round(longest * tracks.rate))
     for i, asset in enumerate(tracks.assets):
         seen = np.flatnonzero(tracks.seen[i])
         if len(seen) < 3:
@@ -54,7 +55,7 @@ def _without_spikes(tracks: Tracks, longest: float) -> Tracks:
         steady = np.diff(seen) <= most
         leaps = np.flatnonzero((step > _SPIKE) & steady)
         lost = 0
-        for a, b in zip(leaps[:-1], leaps[1:]):
+        for a, b in pairwise(leaps):
             before, after = seen[a], seen[b + 1]
             back = distance(p[i, before], q[i, before], p[i, after], q[i, after])
             if b - a <= most and back < 0.5 * min(step[a], step[b]):
@@ -66,7 +67,7 @@ def _without_spikes(tracks: Tracks, longest: float) -> Tracks:
     return replace(tracks, p=p, q=q, problems=tuple(problems))
 
 
-def gaps_of(seen: NDArray[np.bool_]) -> Array:
+def gaps_of(seen: NDArray[np.bool_]) -> NDArray[np.int_]:
     """Runs of False in (N,): (G, 2) first frame and one past the last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], seen, [True]]).astype(np.int8)))
     return edges.reshape(-1, 2)

@@ -29,12 +29,14 @@ class Pivots:
     residual: Mapping[str, float]
 
 
-def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, rest_pose: Mapping[str, float]) -> Pivots:
+def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, rest_pose: Mapping[str, float],
+                rest_rotation: Array) -> Pivots:
     """Linear least squares of all pivots together (3 unknowns each), through the kinematic tree.
 
-    With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame, which is
-    linear in all pivots. What turns with no joint, above all across the machine, is seen weakly or not at all; there the
-    link's centre of mass decides (a prior of 3 cm), and the sigma says so. Droop: q is the measured angle plus `rest_pose`.
+    With B the base and P_A the pivot of asset A on link L: p_PbPa = R_WB (p_BL(q) + R_BL(q) p_LPa - p_BPb) in each frame,
+    which is linear in all pivots. What turns with no joint, above all across the machine, is seen weakly or not at all; there
+    the link's centre of mass decides (a prior of 3 cm), and the sigma says so. The recorded zeros stand for `rest_pose`
+    [rad] and the base's tilt `rest_rotation` (4,).
     """
     k = model.kinematics
     root = base_row(tracks, model)
@@ -47,7 +49,7 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     poses = k.forward(np.nan_to_num(q), angles.joints)
     p_B, R_B = poses[model.base]
     known = {j: np.isfinite(q[:, c]) for c, j in enumerate(angles.joints)}
-    R_WB = quat.matrix(turned_quaternion(tracks.q[root, use], -yaw))
+    R_WB = quat.matrix(quat.multiply(turned_quaternion(tracks.q[root, use], -yaw), rest_rotation))
     size = 3 * len(assets)
     N, rhs = np.zeros((size, size)), np.zeros(size)
     rows: dict[int, tuple[Array, Array]] = {}
@@ -79,7 +81,8 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
     information = weight * N + prior
     solution = np.linalg.solve(information, weight * rhs + prior @ centers.ravel()).reshape(-1, 3)
     covariance = np.linalg.inv(information)
-    residual = {assets[i]: float(np.sqrt(np.mean((R_BL @ solution[i] - solution[root] - y) ** 2))) for i, (R_BL, y) in rows.items()}
+    residual = {assets[i]: float(np.sqrt(np.mean((R_BL @ solution[i] - solution[root] - y) ** 2)))
+                for i, (R_BL, y) in rows.items()}
     spread = np.sqrt(np.diag(covariance)).reshape(-1, 3)
     return Pivots(dict(zip(assets, solution)), dict(zip(assets, spread)), residual)
 

@@ -48,9 +48,9 @@ class Measurement:
     axes, about up, positive to the left [rad]. origin: the base link's origin at rest in the capture's axes turned into
     the model's (z up) [m]. pivots: asset -> p_LP_L (3,) [m], the asset's pivot in its link's frame. rest: asset -> (p, quat wxyz)
     in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
-    rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), and rest_rotation (4,) wxyz: the base's
-    tilt there; a recorded zero is this pose. joint_starts: what each joint alone says of the start [s].
-    The rest are standard deviations.
+    rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the
+    base's tilt there; a recorded zero is this pose. joint_starts: what each joint alone says of the start [s].
+    pivot_residual: asset -> RMS [m] by which its positions miss the kinematic tree. The rest are standard deviations.
     """
 
     starts_at: float
@@ -66,3 +66,4 @@ class Measurement:
     starts_at_sigma: float = float("nan")
     yaw_sigma: float = float("nan")
     pivot_sigma: Mapping[str, Array] = field(default_factory=dict)
+    pivot_residual: Mapping[str, float] = field(default_factory=dict)

@@ -16,6 +16,7 @@ from workbench.recording.pivots import base_origin, find_pivots
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.start import StartEstimate, find_start, lagged_reference
 from workbench.recording.take import Take
+from workbench.recording.take_from import named_by_model
 from workbench.recording.tracks import Tracks, capture_axes, check_assets, tracks_of
 from workbench.recording.yaw import YawEstimate, yaw_of
 from workbench.robot import InputError, RobotModel
@@ -38,10 +39,11 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
     predicted: a simulated take of the same commands; if it is not zeroed, the pose and tilt in which it rests are taken as the
     pose that the recorded zeros mean. Without it the commands through a lag stand in. starts_at [s], yaw [rad]: given
     instead of found (the yaw of a session: `session_yaw`). base: "free" or "fixed". Clock rate 1 and marker frames are taken as
-    stated. Logs carry their own commands and clock; their start is the first row. InputError where a start cannot be found.
+    stated. Logs carry
+    their own commands and clock. InputError where a start cannot be found.
     """
     if recording.kind != "motive":
-        return Measurement(starts_at=float(recording.time[0]) if starts_at is None else starts_at)
+        return _register_log(recording, model, starts_at)
     check_assets(recording, model)
     tracks = mend(tracks_of(recording), model)
     heading = YawEstimate(yaw, float("nan"), {}) if yaw is not None else yaw_of([tracks], model, [commands], base)
@@ -49,13 +51,30 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
     start = _start(recording, tracks, angles, commands, predicted, starts_at)
     resting = tracks.time < start.time - _SETTLED
     rest = _rest_of(predicted)
-    found = find_pivots(tracks, angles, model, heading.yaw, rest.pose)
+    found = find_pivots(tracks, angles, model, heading.yaw, rest.pose, rest.rotation)
     return Measurement(
         starts_at=start.time, starts_at_sigma=start.sigma, joint_starts=start.by_joint, yaw=heading.yaw, yaw_sigma=heading.sigma,
         origin=base_origin(tracks, model, heading.yaw, found.pivots, resting, rest.rotation),
-        pivots=found.pivots, pivot_sigma=found.sigma, rest=_rest_poses(tracks, resting),
+        pivots=found.pivots, pivot_sigma=found.sigma, pivot_residual=found.residual,
+        rest=_rest_poses(tracks, resting),
         noise=dict(zip(angles.joints, noise_at_rest(angles.q, resting))), position_noise=_position_noise(tracks, resting),
         rest_pose=rest.pose, rest_rotation=rest.rotation)
+
+
+def _register_log(recording: Recording, model: RobotModel, starts_at: float | None) -> Measurement:
+    """A log's clock is its own; SAGE's first command may come before or after the first measurement."""
+    recording = named_by_model(recording, model)
+    first = float(recording.metadata.get("first command", recording.time[0]))
+    noise = {}
+    for joint in model.joints:
+        position = recording.channels.get(f"position.{joint}")
+        if position is not None:
+            steps = np.abs(np.diff(position[np.isfinite(position)]))
+            steps = steps[steps > 1e-9]
+            resolution = float(steps.min()) if len(steps) else 0.0  # one count of the encoder
+            still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
+            noise[joint] = float(np.fmax(still, resolution / np.sqrt(12)))
+    return Measurement(starts_at=first if starts_at is None else starts_at, noise=noise)
 
 
 def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Commands | None, predicted: Take | None,

@@ -32,21 +32,23 @@ class StartEstimate:
 
 def lagged_reference(commands: Commands, rate: float = 1000.0, lead: float = 0.3) -> Take:
     """A stand-in for a simulated take: the servos' reference through a critically damped second-order lag."""
-    from scipy.signal import cont2discrete, lfilter
+    from scipy.signal import lfilter
 
     time = np.arange(-lead, commands.end + 0.5, 1 / rate)
-    num, den, _ = cont2discrete(([_LAG**2], [1, 2 * _LAG, _LAG**2]), 1 / rate, method="zoh")
-    q = lfilter(num.ravel(), den, commands.reference(time), axis=0)
-    return Take(name="reference", source="reference", time=time, joints=commands.joints, q=np.asarray(q), starts_at=0.0, zeroed=True,
-                commands=commands)
+    keep = np.exp(-_LAG / rate)
+    q = commands.reference(time)
+    for _ in range(2):
+        q = np.asarray(lfilter([1 - keep], [1, -keep], q, axis=0))
+    return Take(name="reference", source="reference", time=time, joints=commands.joints, q=q, starts_at=0.0,
+                zeroed=True, commands=commands)
 
 
 def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, predicted: Take) -> StartEstimate:
     """Aligns each measured joint q (N, n) [rad] (zero at rest) at `time` (N,) with `predicted` (zeroed, 0 = first command).
 
-    First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each joint on
-    its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply each
-    one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly).
+    First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each
+    joint on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply
+    each one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly).
     """
     columns = [(i, predicted.column(j)) for i, j in enumerate(joints) if j in predicted.joints]
     shift = predicted.starts_at

@@ -34,8 +34,8 @@ class Take:
     p_WB (N, 3), quat_WB (N, 4) wxyz: pose of the base link's frame B in the world W. bodies: rigid bodies by asset,
     in the take's world axes. torque: (N, n) [N m] on the joints. v: (N, n) [rad/s].
     contact: foot -> ground reaction (N, 3) [N] in W. `problems`: what was mended, marked or left out, a line each.
-    mended: (N,) frames whose gaps were filled. off_axis: (N, n, 3) [rad] what of each joint's rotation its servo does not turn, as a rotation
-    vector in the base's axes in the neutral pose (forward, left, up).
+    mended: (N,) frames whose gaps were filled. off_axis: (N, n, 3) [rad] what of each joint's rotation its servo does not
+    turn, as a rotation vector in the base's axes in the neutral pose (forward, left, up).
     """
 
     name: str
@@ -100,12 +100,16 @@ class Take:
             if good.sum() < 2:
                 return out
             inside = (time >= self.time[good][0]) & (time <= self.time[good][-1])
-            out[inside] = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))(time[inside]).as_quat(scalar_first=True)
+            path = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))
+            out[inside] = path(time[inside]).as_quat(scalar_first=True)
             out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
             return out
 
+        off = self.off_axis
         return replace(
-            self, time=time, q=linear(self.q), q_sigma=linear(self.q_sigma), v=linear(self.v), p_WB=linear(self.p_WB),
+            self, time=time, q=linear(self.q),  # type: ignore[arg-type]
+            off_axis=None if off is None else linear(off.reshape(len(off), -1)).reshape(len(time), *off.shape[1:]),  # type: ignore[union-attr]
+            q_sigma=linear(self.q_sigma), v=linear(self.v), p_WB=linear(self.p_WB),
             quat_WB=slerp(self.quat_WB), torque=linear(self.torque), mended=None,
             bodies={k: BodyTrack(p=linear(b.p), quat=slerp(b.quat)) for k, b in self.bodies.items()},  # type: ignore[arg-type]
             contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]

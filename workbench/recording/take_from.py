@@ -31,8 +31,8 @@ def take_from_recording(recording: Recording, measurement: Measurement, model: R
     if recording.kind == "motive":
         check_assets(recording, model)
         take = take_from_tracks(mend(tracks_of(recording), model), measurement, model, label, base)
-        return replace(take, problems=(*recording.problems, *take.problems), commands=recording.commands)
-    raise InputError(recording.source, f"no take can be made of a recording of kind '{recording.kind}'")
+        return replace(take, problems=(*recording.problems, *take.problems))
+    return _take_of_log(recording, measurement, model, label, base)
 
 
 def take_from_tracks(tracks: Tracks, measurement: Measurement, model: RobotModel, name: str, base: str) -> Take:
@@ -53,3 +53,38 @@ def take_from_tracks(tracks: Tracks, measurement: Measurement, model: RobotModel
         base=base, q_sigma=angle_sigma(angles, noise, tracks.rate), p_WB=p_WB, quat_WB=quat_WB, off_axis=angles.off_axis,
         bodies={a: BodyTrack(p[i], q[i]) for i, a in enumerate(tracks.assets)}, mended=tracks.mended,
         problems=(*tracks.problems, *angles.problems))
+
+
+def _take_of_log(recording: Recording, measurement: Measurement, model: RobotModel, name: str, base: str) -> Take:
+    """A servo log's positions are the servo's own angles: not zeroed, noise from its resolution."""
+    recording = named_by_model(recording, model)
+    commands = recording.commands
+    if commands is None:
+        raise InputError(recording.source, "holds several programmes; choose one as FILE#PROGRAMME")
+    joints = tuple(j for j in model.joints if f"position.{j}" in recording.channels)
+    if not joints:
+        raise InputError(recording.source, "expected a position of at least one joint")
+    q = np.column_stack([recording.channels[f"position.{j}"] for j in joints])
+    v = None
+    if all(f"velocity.{j}" in recording.channels for j in joints):
+        v = np.column_stack([recording.channels[f"velocity.{j}"] for j in joints])
+    sigma = np.array([measurement.noise.get(j, np.nan) for j in joints])
+    return Take(name=name, source="recording", time=recording.time, joints=joints, q=q, v=v, starts_at=measurement.starts_at,
+                base=base, q_sigma=np.where(np.isfinite(q), sigma, np.nan), commands=commands.reordered(model.joints),
+                problems=recording.problems)
+
+
+def named_by_model(recording: Recording, model: RobotModel) -> Recording:
+    """A log with the model's joint names: a BAM log's one joint is the model's one; others must be the model's by name."""
+    joints = tuple(dict.fromkeys(c.partition(".")[2] for c in recording.channels if "." in c))
+    if recording.kind == "bam_log":
+        if len(model.joints) != 1:
+            raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
+        mine, theirs = model.joints[0], joints[0]
+        channels = {c.replace(f".{theirs}", f".{mine}"): values for c, values in recording.channels.items()}
+        commands = recording.commands and replace(recording.commands, joints=(mine,))
+        return replace(recording, channels=channels, commands=commands)
+    unknown = [j for j in joints if j not in model.joints]
+    if unknown:
+        raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
+    return recording

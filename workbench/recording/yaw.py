@@ -112,7 +112,8 @@ def _axis_evidence(tracks: Tracks, joint: SeenJoint) -> list[_Evidence]:
     return [_Evidence(joint.name, float(angle), noise / (values[2] * len(r)) / level**2)]
 
 
-def _faces_backwards(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], yaw: float, base: str) -> bool:
+def _faces_backwards(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], yaw: float,
+                     base: str) -> bool:
     layout = sum(_layout(t, model, yaw) for t in takes) / len(takes)
     if abs(layout) > _CLEAR:
         return layout < 0
@@ -140,8 +141,7 @@ def _layout(tracks: Tracks, model: RobotModel, yaw: float) -> float:
 
 
 def _following(tracks: Tracks, model: RobotModel, commands: Commands | None, yaw: float, base: str) -> float:
-    """Sum over joints of how far they turned with (positive) or against their commands, by the largest excursion of each; needs no
-    start, as it compares the order of the highest and lowest angles with that of the commanded ones."""
+    """Sum over joints [rad] of how far they turned to the side to which commands turn them further; needs no start."""
     assert commands is not None
     total = 0.0
     for joint in seen_joints(tracks, model, base)[0]:
