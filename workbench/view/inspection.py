@@ -17,6 +17,8 @@ from workbench.robot.yaml_file import read_yaml
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
+_SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units")
+"""Of a Motive header: what other fields of the inspection say."""
 
 
 @dataclass(frozen=True)
@@ -73,21 +75,22 @@ def inspect_file(file: str | Path) -> Inspection:
     if name.startswith("package://"):
         return _model(name)
     if path.is_dir():
-        return _firmware_tables(path)
-    if not path.is_file():
+        return _firmware_tables(path) if (path / "pos.txt").is_file() else _recording(path)
+    whole = path if path.is_file() else Path(name.partition("#")[0])  # FILE.mtn#PAGE, FILE.npz#PROGRAMME
+    if not whole.is_file():
         raise InputError(path, "file not found")
-    return _reader(path)(path)
+    return _reader(whole, part=whole != path)(path)
 
 
-def _reader(path: Path) -> Callable[[Path], Inspection]:
-    """The function that knows files of this kind."""
+def _reader(path: Path, part: bool) -> Callable[[Path], Inspection]:
+    """The function that knows files of this kind, or the `part` of one that is named."""
     suffix = path.suffix.lower()
     if suffix in (".npz", ".json"):
         return _recording
     if suffix in (".yaml", ".yml"):
         return _yaml
     if suffix == ".mtn":
-        return _motion_file
+        return _motion if part else _motion_file
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
         first = next((line for line in stream if line.strip()), "").strip()
     if first.startswith("<"):
@@ -102,17 +105,21 @@ def _reader(path: Path) -> Callable[[Path], Inspection]:
 
 
 def _recording(path: Path) -> Inspection:
-    from workbench.recording import read_recording
+    from workbench.recording.mending import mend
+    from workbench.recording.read import read_recording
+    from workbench.recording.tracks import tracks_of
 
     r = read_recording(path)
+    found = mend(tracks_of(r)).problems if r.rigid_bodies else ()
     missing = {name: np.isnan(body.p).any(axis=1) for name, body in r.rigid_bodies.items()}
     missing |= {name: np.isnan(p).any(axis=1) for name, p in r.markers.items()}
     missing |= {name: np.isnan(values) for name, values in r.channels.items()}
     joints = tuple(dict.fromkeys(c.partition(".")[2] for c in r.channels if "." in c))
-    metadata = {k: v for k, v in r.metadata.items() if v}
+    metadata = {k: v for k, v in r.metadata.items() if v and k not in _SAID}
     return Inspection(
         str(path), r.kind, r.version or None, r.units or None, _finite(r.rate), len(r.time), _duration(r.time),
-        tuple(r.rigid_bodies), tuple(r.markers), joints, *_gaps(missing), details=metadata, problems=r.problems)
+        tuple(r.rigid_bodies), tuple(r.markers), joints, *_gaps(missing), details=metadata,
+        problems=tuple(dict.fromkeys((*r.problems, *found))))
 
 
 def _rollout(path: Path) -> Inspection:
@@ -160,8 +167,6 @@ def _motion_file(path: Path) -> Inspection:
 
 
 def _firmware_tables(folder: Path) -> Inspection:
-    if not (folder / "pos.txt").is_file():
-        raise InputError(folder, "a folder; expected a file, or a folder of firmware tables (pos.txt and others)")
     from workbench.device.firmware_tables import read_tables
 
     table = read_tables(folder)
