@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+from studies.other_engine import Rollout
 from workbench.motion.commands import Commands
+from workbench.recording import Take
 from workbench.robot import EffectSpec, Ground, RobotModel, ServoConstants
 
 FRICTIONLESS = ServoConstants(
@@ -70,3 +73,10 @@ def commands(
     on = np.ones((n, 1), dtype=bool) if enabled is None else np.array(enabled, dtype=bool)[:, None]
     return Commands(np.array(times), ("swing",), np.array(goals, dtype=float)[:, None], np.full((n, 1), speed), on, end,
                     np.full(n, -1))
+
+
+def as_take(run: Rollout, base: str = "body_link") -> Take:
+    """The other engine's run as a simulated take of the workbench."""
+    p, R = run.poses(run.time, (base,))[base]
+    quat = Rotation.from_matrix(R).as_quat(scalar_first=True)
+    return Take("other engine", "simulation", run.time, run.joints, run.q, starts_at=0.0, p_WB=p, quat_WB=quat)

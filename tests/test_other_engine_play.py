@@ -8,10 +8,13 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from studies.other_engine import describe, play
 from studies.other_engine.bench import NativePlayer, Race, fastest_within, joint_error, race
-from studies.other_engine.firmware import commands_from_rows
+from studies.other_engine.firmware import commands_from_rows, read_rows
 from studies.other_engine.mjcf import compile_model
 from studies.other_engine.servo import ServoBank
-from tests.other_engine_models import CROOKED, FRICTIONLESS, commands, joint, link, model_of, pendulum, sphere
+from tests.other_engine_models import CROOKED, FRICTIONLESS, as_take, commands, joint, link, model_of, pendulum, sphere
+from tests.shared_data import shared
+from workbench.gap.session import load_session
+from workbench.recording import read_recording, register, take_from_recording
 from workbench.robot import EffectSpec, InputError
 
 AX12 = FRICTIONLESS.updated({"compliance_margin": 1, "punch": 32, "coulomb_friction": 0.06, "viscous_friction": 0.01,
@@ -135,6 +138,26 @@ def test_play_refuses_effects_unknown_bases_and_robots_that_cannot_float(tmp_pat
     weld = '<joint name="weld" type="fixed"><parent>world</parent><child>base</child></joint>'
     with pytest.raises(InputError, match="cannot float"):
         play(model_of(tmp_path / "bolted.sdf", CROOKED + weld), some, 0.1)
+
+
+@pytest.mark.parametrize(("name", "allowed"), [("stand", 1.15), ("walk", 1.5)])
+def test_practice_session_with_nothing_hidden_is_reproduced(name, allowed):
+    session = load_session(shared("practice/p0_nothing_hidden/session.yaml"))
+    folder = session.path.parent
+    spec = next(t for t in session.takes if t.name == name)
+    rows = read_rows(folder / f"motions/{name}.csv")
+    poses = commands_from_rows(*rows, cycles=spec.cycles)
+    run = play(session.model, poses, poses.end + 0.5, base=spec.base)
+    recording = read_recording(folder / f"takes/{name}.csv")
+    seen = register(recording, session.model, poses, as_take(run), base=spec.base)
+    take = take_from_recording(recording, seen, session.model, base=spec.base)
+    for seen_joint in take.joints:
+        ours = run.q[:, run.joints.index(seen_joint)]
+        error = take.q[:, take.column(seen_joint)] - np.interp(take.since_start, run.time, ours - ours[0])
+        rms = np.sqrt(np.nanmean(error[take.since_start > 0] ** 2))
+        assert rms < allowed * np.sqrt(2) * np.deg2rad(0.12), f"{seen_joint}: {np.rad2deg(rms):.3f} deg"
+    walked = np.linalg.norm((take.p_WB[-5] - take.p_WB[5])[:2])
+    assert np.linalg.norm(np.ptp(run.qpos[[0, -1]][:, :2], axis=0)) * (name == "walk") == pytest.approx(walked, abs=0.02)
 
 
 @pytest.fixture

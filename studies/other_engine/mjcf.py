@@ -77,6 +77,8 @@ def compile_model(
     load = 9.81 * model.body_subtreemass[1] / 4
     for link in description.links:
         A = model.body_invweight0[model.body(link.name).id, 0]
+        if A == 0:  # held on the stand: what touches it brings its own stiffness
+            continue
         for k, shape in enumerate(link.shapes):
             stiffness, dissipation = _in_series(shape, ground)
             rate = math.sqrt(stiffness * (1 - IMPEDANCE) * A)
