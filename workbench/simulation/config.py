@@ -1,7 +1,5 @@
 """Every choice of a simulation, in one typed place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 BASES = ("free", "fixed", "path")
@@ -10,7 +8,7 @@ CONTACTS = ("point", "hydroelastic")
 APPROXIMATIONS = ("lagged", "sap", "similar")
 
 
-@dataclass(frozen=True)
+@dataclass(unsafe_hash=True)  # not frozen: Drake's YAML loader fills an instance in
 class SimulationConfig:
     """Loadable by `pydrake.common.yaml.yaml_load_typed`.
 
@@ -36,6 +34,10 @@ class SimulationConfig:
     contact_period: float = 1 / 120
 
     def __post_init__(self) -> None:
+        self.check()
+
+    def check(self) -> None:
+        """ValueError names a field out of range; called again when a station is made, as loaders and callers may set fields."""
         for name, allowed in (("base", BASES), ("drive", DRIVES), ("contact", CONTACTS), ("approximation", APPROXIMATIONS)):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name}: expected one of {', '.join(allowed)}, got {getattr(self, name)!r}")

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
+from pydrake.trajectories import PiecewisePolynomial
 
 from workbench.motion.commands import Commands
+from workbench.motion.smoothing import interpolate
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.servo import ServoLaw
@@ -55,7 +57,7 @@ class Simulation:
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
             trajectory: tuple[Array, Array] | None = None, path: Take | None = None, name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
-        default: the commands' ramped reference). duration [s] after the first command (default: to the end). lead [s] of rest
+        default: smoothly through the commands' poses). duration [s] after the first command (default: to the end). lead [s] of rest
         before it. path: take whose base moves this one (base "path"). Returns a Take with time 0 at the first command.
         """
         if self.config.drive == "playback":
@@ -73,7 +75,7 @@ class Simulation:
         base_path = self._base_path_to_follow(path, lead, duration)
         self._rest_in_neutral(None if base_path is None else base_path[1][0])
         if base_path is not None:
-            self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(linear_trajectory(*base_path))
+            self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
         self._follow(commands, trajectory, lead, duration)
         contact = self._advance(commands, lead, lead + duration)
         return self._take(commands, lead, contact, name)
@@ -132,6 +134,7 @@ class Simulation:
             self._rest = key, self.context.Clone()
         self.context.SetTimeStateAndParametersFrom(self._rest[1])
         self.context.SetTime(0.0)
+        self._hold_neutral()  # the inputs' values are no part of what was restored
         for name in _LOGS:
             if self.diagram.HasSubsystemNamed(name):
                 self.diagram.GetSubsystemByName(name).FindMutableLog(self.context).Clear()
@@ -169,7 +172,11 @@ class Simulation:
 
     def _update_reference(self, times: Array, rows: Array) -> None:
         columns = reference_columns(self.plant, self.model)
-        self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(linear_trajectory(times, rows[:, columns]))
+        self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(self._ahead(times, rows[:, columns]))
+
+    def _ahead(self, times: Array, rows: Array) -> PiecewisePolynomial:
+        """A reference one step early: the implicit controllers of a discrete plant act on the state at the end of the step."""
+        return linear_trajectory(np.asarray(times) - self.config.time_step, rows)
 
     def _follow(self, commands: Commands | None, trajectory: tuple[Array, Array] | None, lead: float, duration: float) -> None:
         """Hands a trajectory to the drives that follow one; a trajectory that does not start in neutral is approached during
@@ -181,8 +188,11 @@ class Simulation:
         if trajectory is None:
             if commands is None:
                 return
-            times = np.arange(0.0, duration + 1e-9, self.config.logged_every)
-            trajectory = times, commands.reference(times)
+            if self.config.drive == "ideal":
+                trajectory = smooth_through_poses(commands, self.config.logged_every)
+            else:
+                times = np.arange(0.0, duration + 1e-9, self.config.logged_every)
+                trajectory = times, commands.reference(times)
         times, rows = np.asarray(trajectory[0], dtype=float) - trajectory[0][0] + lead, np.asarray(trajectory[1], dtype=float)
         if lead > 0:
             s = np.linspace(0, 1, 20)[:-1]
@@ -258,6 +268,16 @@ class Simulation:
             enabled = commands.enabled[row]
         error = self._log("reference")[1] - q
         return np.asarray(self._law.motor_torque(error, v, enabled) - self._law.viscous * v + drake)
+
+
+def smooth_through_poses(commands: Commands, step: float) -> tuple[Array, Array]:
+    """The motion behind a table: cubics from neutral through each goal at the end of its dwell, at rest at both ends.
+
+    Times (K,) [s] every `step`, angles (K, n) [rad]."""
+    arrivals = np.concatenate([[0.0], commands.times[1:], [commands.end]])
+    rows = np.vstack([np.zeros(len(commands.joints)), commands.goals])
+    smooth = interpolate(arrivals, commands.joints, rows, step)
+    return smooth.time, smooth.q
 
 
 _LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log")

@@ -34,6 +34,7 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
     after the port they write down: "state_log", "net_actuation_log", "reference_log".
     """
     config = config or SimulationConfig()
+    config.check()
     model = model or puppy_model()
     if model.effects:
         raise InputError(None, f"effect '{model.effects[0].effect}' is not known to this version of the simulation")
