@@ -106,7 +106,7 @@ class InverseDynamics:
         solution = self._solve(trajectory, dear)
         sigma = np.where(seen, noise.q, 0.0)
         if take.q_sigma is not None:
-            given = self._columns(take, take.q_sigma)
+            given = self._columns(take.joints, take.q_sigma, np.nan)
             sigma = np.where(np.isfinite(given), given, sigma)
         torque_spread, residual_spread = np.zeros_like(q), np.zeros((len(take), 6))
         random = np.random.default_rng(0)
@@ -173,18 +173,15 @@ class InverseDynamics:
     def _completed(self, trajectory: RobotTrajectory) -> tuple[RobotTrajectory, list[str]]:
         """All joints in the model's order; those that the trajectory lacks at zero."""
         self._check_joints("trajectory", trajectory.joints)
-        at = {j: i for i, j in enumerate(trajectory.joints)}
-        missing = [j for j in self.model.joints if j not in at]
-        N = len(trajectory.time)
-        q, v, a = (np.column_stack([values[:, at[j]] if j in at else np.zeros(N) for j in self.model.joints])
-                   for values in (trajectory.q, trajectory.v, trajectory.a))
+        missing = [j for j in self.model.joints if j not in trajectory.joints]
+        q, v, a = (self._columns(trajectory.joints, values, 0.0) for values in (trajectory.q, trajectory.v, trajectory.a))
         full = replace(trajectory, joints=self.model.joints, q=q, v=v, a=a)
         return full, [f"{', '.join(missing)}: not given; held at zero"] if missing else []
 
     def _angles(self, take: Take, rest: Mapping[str, float], problems: list[str]) -> tuple[Array, NDArray[np.bool_]]:
         """Angles (N, n) [rad] of all joints, and which of them were seen (n,)."""
         self._check_joints(take.name, take.joints)
-        q = self._columns(take, take.q)
+        q = self._columns(take.joints, take.q, np.nan)
         seen = np.asarray(np.isfinite(q).any(axis=0))
         unseen = [j for j, s in zip(self.model.joints, seen) if not s]
         held = np.zeros_like(q)
@@ -200,11 +197,12 @@ class InverseDynamics:
                 problems.append("angles count from the rest before the first command, which is taken as zero")
         return np.where(seen, q, held), seen
 
-    def _columns(self, take: Take, values: Array) -> Array:
-        out = np.full((len(take), len(self.model.joints)), np.nan)
+    def _columns(self, joints: tuple[str, ...], values: Array, missing: float) -> Array:
+        """Values (N, len(joints)) in the model's order (N, n)."""
+        out = np.full((len(values), len(self.model.joints)), missing)
         for i, joint in enumerate(self.model.joints):
-            if joint in take.joints:
-                out[:, i] = values[:, take.column(joint)]
+            if joint in joints:
+                out[:, i] = values[:, joints.index(joint)]
         return out
 
     def _base_path(self, take: Take) -> tuple[Array, Array]:
