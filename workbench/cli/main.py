@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("inspect", "simulate", "export")
+VERBS = ("inspect", "simulate", "compare", "export")
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -1,0 +1,54 @@
+"""`workbench compare SESSION` and `workbench compare A B`: how far takes differ."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.options import add_model, add_out, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "compare",
+        help="compare recordings with the simulation, or any two takes",
+        description="Compares every take of a session with its simulation, or any two recordings, motions or rollouts with each "
+        "other, and writes comparison.json and report.html: error of each joint and of the body's path, with the recording's "
+        "noise, the simulation's numerical floor and the spread between contact models.",
+    )
+    parser.add_argument("a", metavar="SESSION|A", help="session.yaml; or a recording, motion or rollout")
+    parser.add_argument("b", metavar="B", nargs="?", help="what to compare A with: a recording, motion or rollout")
+    add_model(parser)
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")
+    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of A and B; a session says it itself")
+    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_out(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compares, writes, and prints the table."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.gap.compare_files import compare_files
+    from workbench.gap.compare_session import compare_session
+    from workbench.gap.session import load_session
+    from workbench.simulation import SimulationConfig
+    from workbench.view.comparison_report import write_comparison
+
+    config = SimulationConfig(contact=args.contact)
+    with output_directory(args.out) as folder, Progress("compare") as progress:
+        if args.b is None:
+            session = load_session(args.a)
+            model, title = session.model, f"Session {session.path}"
+            comparison = compare_session(session, config, progress=progress)
+        else:
+            model, title = load_model(args.model), f"{args.a} and {args.b}"
+            comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base, progress=progress)
+        written = write_comparison(comparison, model, folder, title, progress)
+    print(comparison.table())
+    for name, reason in comparison.left_out:
+        print(f"workbench compare: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
+    return 0
