@@ -21,7 +21,8 @@ def test_a_batch_on_a_dask_cluster_gives_the_same_takes():
     local = simulate_batch(jobs, n_jobs=1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        with distributed.Client(n_workers=2, threads_per_worker=1, dashboard_address=None), joblib.parallel_config(backend="dask"):
+        client = distributed.Client(n_workers=2, threads_per_worker=1, dashboard_address=None)
+        with client, joblib.parallel_config(backend="dask"):
             remote = simulate_batch(jobs, n_jobs=2)
     for a, b in zip(local, remote):
         assert a.name == b.name

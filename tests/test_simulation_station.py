@@ -114,7 +114,7 @@ def test_playback_shows_a_take_as_it_was(puppy, walked):
 
 def test_the_fast_servo_is_the_full_law_where_that_is_proportional(puppy, walk):
     proportional = ServoConstants(compliance_slope=None, compliance_margin=None, punch=None, proportional_gain=5.0)
-    model = replace(puppy, servos={j: proportional for j in puppy.joints})
+    model = replace(puppy, servos=dict.fromkeys(puppy.joints, proportional))
     full, fast = (Simulation(model, SimulationConfig(drive=d, base="fixed")).run(walk, 0.6) for d in ("servo", "fast_servo"))
     assert np.degrees(np.abs(full.q - fast.q).max()) < 0.35  # the step: explicit against implicit
     finer = [Simulation(model, SimulationConfig(drive=d, base="fixed", time_step=2.5e-4)).run(walk, 0.6)
@@ -138,7 +138,8 @@ def test_other_solvers_agree_on_a_robot_held_in_the_air(puppy, walk, config):
 def test_batches_give_the_same_takes_on_one_and_two_processes(puppy, walk):
     jobs = [Job(puppy, SimulationConfig(base="fixed"), walk, 0.1 * (1 + i % 2), name=str(i)) for i in range(4)]
     seen = []
-    one, two = simulate_batch(jobs, n_jobs=1), simulate_batch(jobs, n_jobs=2, progress=lambda done, total: seen.append((done, total)))
+    one = simulate_batch(jobs, n_jobs=1)
+    two = simulate_batch(jobs, n_jobs=2, progress=lambda done, total: seen.append((done, total)))
     assert [t.name for t in two] == ["0", "1", "2", "3"]
     assert all(same(a, b) for a, b in zip(one, two))
     assert seen == [(i, 4) for i in (1, 2, 3, 4)]

@@ -110,7 +110,8 @@ def load_servo_constants(path: str | Path) -> ServoConstants:
         raise InputError(path, f"key '{missing[0]}' is missing")
     law = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
     try:
-        return ServoConstants(**(dict.fromkeys(law) | _as_known(content)))
+        constants: dict[str, Any] = dict.fromkeys(law) | _as_known(content)
+        return ServoConstants(**constants)
     except ValueError as e:
         raise InputError(path, str(e)) from None
 

@@ -112,7 +112,8 @@ class ServoBank(LeafSystem):
         x = self._state.Eval(context)
         error = context.get_discrete_state_vector().value() - x[self._q]
         size = np.abs(error)
-        torque = np.copysign(np.minimum(self._offset + self._slope * size, self.law.full_torque) * (size > self.law.margin), error)
+        size = np.minimum(self._offset + self._slope * size, self.law.full_torque) * (size > self.law.margin)
+        torque = np.copysign(size, error)
         on = self._command(context)[1]
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             torque = np.where(on, torque, self.law.back_emf * x[self._x_v])
@@ -195,10 +196,11 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
     `moving_speed` inputs are left to connect.
 
-    Call it on a plant that is not yet finalized, as the servos change its joints; it finalizes the plant. `period` [s] of the goal ramp: the plant's step, or 1 ms in a continuous one.
-    Takes the plant's applied_generalized_force input and, for implicit friction, desired_state of the instances that hold
-    the joints. `friction`: "implicit" (discrete plants, the default there, and CENIC) or "bristle" (continuous plants with
-    an integrator whose error control sees the bristles; CENIC's does not, steps over them and slides on without friction).
+    Call it on a plant that is not yet finalized, as the servos change its joints; it finalizes the plant. `period` [s] of
+    the goal ramp: the plant's step, or 1 ms in a continuous one. Takes the plant's applied_generalized_force input and, for
+    implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
+    default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
+    CENIC's does not: it steps over them and slides on without friction).
     """
     if model.effects:
         raise InputError(None, f"effect '{model.effects[0].effect}' has to be added by workbench.simulation, not by AddServos")

@@ -57,8 +57,10 @@ class Simulation:
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
             trajectory: tuple[Array, Array] | None = None, path: Take | None = None, name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
-        default: smoothly through the commands' poses). duration [s] after the first command (default: to the end). lead [s] of rest
-        before it. path: take whose base moves this one (base "path"). Returns a Take with time 0 at the first command.
+        default: smoothly through the commands' poses).
+
+        duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
+        this one (base "path"). Returns a Take with time 0 at the first command.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -202,8 +204,8 @@ class Simulation:
     def _advance(self, commands: Commands | None, lead: float, end: float) -> tuple[Array, dict[str, Array]]:
         """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
         commanded = commands is not None and self.config.drive == "servo"
-        times = commands.times if commands is not None and commanded else []
-        changes = {self._on_grid(lead + float(t)): k for k, t in enumerate(times)}
+        times = commands.times.tolist() if commands is not None and commanded else []
+        changes = {self._on_grid(lead + t): k for k, t in enumerate(times)}
         every = max(1, round(self.config.contact_period / self.config.logged_every))  # on a step: Drake solves each step once
         steps = np.arange(0, round(end / self.config.logged_every) + 1, every)
         sampling = self.config.contact_period > 0 and self.config.base == "free" and not self.config.uses_cenic

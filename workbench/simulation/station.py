@@ -52,7 +52,7 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(model.base, instance), RigidTransform([0, 0, 1.0]))
     elif config.base == "path":
         AddGantry(builder, model.base, instance)
-    plant.SetUseSampledOutputPorts(False)  # a step solved for a log serves the update that follows: faster than copies in the state
+    plant.SetUseSampledOutputPorts(False)  # a step solved for a log serves the update that follows; faster than sampling
     _add_drive(builder, plant, model, config)
     if config.base == "path":
         ConnectPath(builder)
