@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from workbench.gap.metrics import heading, travelled, turned
 from workbench.recording.take import Take
-from workbench.view.playback import since_start
+from workbench.view.playback import names_of, since_start
 from workbench.view.stance import Stance
 from workbench.view.style import OTHERS, RECORDED, SIMULATED, legend_above, new_figure, styled
 
@@ -30,13 +30,12 @@ class _Body:
     roll: Array
     pitch: Array
     forward: float
-    left: float
     turn: float
 
 
 @styled
 def body_path(simulated: Take, recorded: Take | None = None, others: Mapping[str, Take] | None = None) -> Figure:
-    """Path of the base link in the plane, seen from above (x forward to the right, y left upwards), and its heading over time.
+    """Path of the base link in the plane, seen from above (x forward to the right, y left upwards), and its heading.
 
     All paths begin where the robot stood. `others`: more runs by label, as thinner lines (other contact models, other
     steps). Takes without a base pose are left out.
@@ -90,9 +89,10 @@ def body_attitude(simulated: Take, recorded: Take | None = None, others: Mapping
 def footfalls(
     simulated: Stance, recorded: Stance | None = None, *, span: tuple[float, float], unseen: Stance | None = None,
 ) -> Figure:
-    """A bar while a foot stands, simulated under measured, and each foot's duty factor over `span` [s since the first command].
+    """A bar while a foot stands, simulated under measured, and each foot's duty factor.
 
-    unseen: intervals in which the recording did not see a foot; hatched, and left out of its duty factor.
+    span: [s since the first command]. unseen: intervals in which the recording did not see a foot; hatched, and left out
+    of its duty factor.
     """
     feet = [foot for foot in FOOT_ORDER if foot in simulated] + [foot for foot in simulated if foot not in FOOT_ORDER]
     figure = new_figure(10, 0.55 * len(feet) + 1.5)
@@ -137,10 +137,11 @@ FOOT_ORDER = ("flb", "frb", "blb", "brb")
 
 
 def _runs(simulated: Take, recorded: Take | None, others: Mapping[str, Take] | None) -> list[tuple[str, Take, str, float]]:
+    names = names_of(simulated, recorded)
     runs = [(label, take, OTHERS[i % len(OTHERS)], 1.3) for i, (label, take) in enumerate((others or {}).items())]
     if recorded is not None:
-        runs.append(("measured", recorded, RECORDED, 2.4))
-    return [*runs, ("simulated", simulated, SIMULATED, 2.0)]
+        runs.append((names[1], recorded, RECORDED, 2.4))
+    return [*runs, (names[0], simulated, SIMULATED, 2.0)]
 
 
 def _body(take: Take) -> _Body | None:
@@ -157,8 +158,9 @@ def _body(take: Take) -> _Body | None:
     turn = heading(take.quat_WB)
     roll, pitch = np.degrees(tilt - np.nanmean(tilt[rest], axis=0)).T
     moved = travelled(take.p_WB, time)
-    return _Body(time, 100 * (take.p_WB - take.p_WB[rest].mean(axis=0)), np.degrees(turn - np.nanmean(turn[rest])), roll, pitch,
-                 100 * float(moved[0]), 100 * float(moved[1]), float(np.degrees(turned(take.quat_WB, time))))
+    return _Body(
+        time=time, path=100 * (take.p_WB - take.p_WB[rest].mean(axis=0)), heading=np.degrees(turn - np.nanmean(turn[rest])),
+        roll=roll, pitch=pitch, forward=100 * float(moved[0]), turn=float(np.degrees(turned(take.quat_WB, time))))
 
 
 def _whole_seconds(axes: Axes, body: _Body, colour: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from workbench.gap.comparison import Channel
+from workbench.gap.comparison import Channel, by_error
 from workbench.view.style import COMMAND, ERROR, FLOOR, NOISE, RECORDED, SIMULATED, new_figure, styled
 
 LIMIT = 1.3
@@ -21,10 +21,10 @@ def joint_errors(
 ) -> Figure:
     """RMS error of each joint, the largest over noise first, against what noise and numerics alone would make.
 
-    channels: joint -> error, noise, floor, spread in SI; shown times `scale` in `unit`. A bar beyond `limit` times the root of
-    noise² + floor² is orange: there is something left to explain.
+    channels: joint -> error, noise, floor, spread in SI; shown times `scale` in `unit`. A bar beyond `limit` times the
+    root of noise² + floor² is orange: there is something left to explain.
     """
-    order = sorted(channels, key=lambda j: (-np.nan_to_num(channels[j].over_noise, posinf=1e9), j))
+    order = by_error({joint: channel.over_noise for joint, channel in channels.items()})
     figure = new_figure(9, 0.34 * len(order) + 1.6)
     axes = figure.subplots()
     for row, joint in enumerate(order):

@@ -19,8 +19,9 @@ from workbench.view.strip_figure import film_strip
 from workbench.view.style import styled
 
 __all__ = [
-    "EncodedFigure", "Stance", "base_wrench", "body_attitude", "body_path", "encode", "film_strip", "footfalls", "joint_errors",
-    "joint_grid", "joint_overlay", "joint_torques", "phase_portrait", "save_figure", "servo_margins", "stance_of", "unseen_of",
+    "EncodedFigure", "Stance", "base_wrench", "body_attitude", "body_path", "encode", "film_strip", "footfalls",
+    "joint_errors", "joint_grid", "joint_overlay", "joint_torques", "phase_portrait", "save_figure", "servo_margins",
+    "stance_of", "unseen_of",
 ]
 
 LARGEST_SVG = 200_000

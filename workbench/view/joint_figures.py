@@ -13,7 +13,7 @@ from workbench.dynamics.derivatives import differentiate
 from workbench.gap.comparison import aligned
 from workbench.gap.metrics import rms
 from workbench.recording.take import Take
-from workbench.view.playback import since_start
+from workbench.view.playback import names_of, since_start
 from workbench.view.stance import Stance, leg_foot
 from workbench.view.style import (
     COMMAND,
@@ -73,7 +73,7 @@ def joint_grid(
     simulated: Take, recorded: Take | None = None, *, noise: Mapping[str, float] | None = None,
     joints: Sequence[str] | None = None, stance: Stance | None = None, span: tuple[float, float] | None = None,
 ) -> Figure:
-    """All joints, small, in rows of three (a leg each in the thesis's order), each with its RMS error over `noise` [rad]."""
+    """All joints, small, in rows of three (a leg each in the thesis's order), each with its RMS error and `noise` [rad]."""
     simulated = _zeroed_like(simulated, recorded)
     joints = tuple(joints or simulated.joints)
     low, high = span or _shared_span(simulated, recorded)
@@ -109,7 +109,8 @@ def phase_portrait(joint: str, simulated: Take, recorded: Take | None = None) ->
     simulated = _zeroed_like(simulated, recorded)
     figure = new_figure(6.5, 5.5)
     axes = figure.subplots()
-    for take, colour, label, size in ((recorded, RECORDED, "measured", 2.2), (simulated, SIMULATED, "simulated", 1.4)):
+    names = names_of(simulated, recorded)
+    for take, colour, label, size in ((recorded, RECORDED, names[1], 2.2), (simulated, SIMULATED, names[0], 1.4)):
         if take is None or joint not in take.joints:
             continue
         use = since_start(take) >= 0
@@ -128,7 +129,8 @@ def _draw_joint(axes: Axes, joint: str, simulated: Take, recorded: Take | None, 
         clock = since_start(simulated)
         reference = np.degrees(commands.reference(clock)[:, commands.column(joint)])
         axes.plot(clock, reference, color=COMMAND, linewidth=0.7 * width, linestyle=(0, (4, 2)), label="command", zorder=2)
-    for take, colour, label, size in ((recorded, RECORDED, "measured", width), (simulated, SIMULATED, "simulated", 0.8 * width)):
+    names = names_of(simulated, recorded)
+    for take, colour, label, size in ((recorded, RECORDED, names[1], width), (simulated, SIMULATED, names[0], 0.8 * width)):
         if take is not None and joint in take.joints:
             angle = np.degrees(take.q[:, take.column(joint)])
             axes.plot(since_start(take), angle, color=colour, label=label, linewidth=size, zorder=3)
@@ -141,15 +143,16 @@ def _draw_error(axes: Axes, joint: str, simulated: Take, recorded: Take, noise: 
     says = [f"{float(rms(error[clock >= 0])):.2f}° RMS"]
     band = np.degrees(np.hypot(noise or 0.0, floor or 0.0))
     if np.isfinite(band) and band > 0:
-        axes.axhspan(-2 * band, 2 * band, color=NOISE, linewidth=0, zorder=1.5, label="±2σ")
+        axes.axhspan(-2 * band, 2 * band, color=NOISE, linewidth=0, zorder=1.5)
     for value, what in ((noise, "noise"), (floor, "numerical floor")):
         if value is not None and np.isfinite(value):
             says.append(f"{what} {np.degrees(value):.2f}°")
     axes.axhline(0, color="#999999", linewidth=0.8)
     axes.plot(clock, error, color=ERROR, linewidth=1.1, zorder=3)
     axes.set_ylabel("error [deg]")
-    axes.set_title(f"measured less simulated: {', '.join(says)}" + (" (band: ±2σ of both)" if band > 0 else ""), fontsize=11,
-                   fontweight="normal")
+    names = names_of(simulated, recorded)
+    title = f"{names[1]} less {names[0]}: {', '.join(says)}" + (" (band: ±2σ of both)" if band > 0 else "")
+    axes.set_title(title, fontsize=11, fontweight="normal")
 
 
 def _shade(axes: Axes, stance: Array, label: str | None) -> None:

@@ -9,12 +9,24 @@ from importlib.resources import files
 
 from workbench.view.style import ACCENT, RECORDED, SIMULATED
 
+LIBRARY = "library"
+"""Path under which a page has each mesh once, unseen."""
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A mesh of the library, shown at `path`; colours: rgba of its parts."""
+
+    path: str
+    mesh: str
+    colours: list[list[float]]
+
 
 @dataclass(frozen=True)
 class Legend:
-    """What the page says about itself: names of the takes, the forces' scale [N per m of arrow], the grid's spacing [m],
+    """What the page says about itself: names of the robots, the forces' scale [N per m of arrow], the grid's spacing [m],
     the first frame's time since the first command [s], when poses were commanded [s], and the middle [m] and half width [m] of
-    the floor that is walked on, and how far beside the recorded robot is set on demand [m]."""
+    the floor that is walked on, and how far beside the recorded robot is set on demand [m]; meshes to copy."""
 
     title: str
     simulated: str
@@ -26,6 +38,7 @@ class Legend:
     middle: tuple[float, float]
     reach: float
     aside: float
+    copies: list[Copy]
 
 
 def with_overlay(html: str, legend: Legend) -> str:
@@ -40,14 +53,18 @@ def with_overlay(html: str, legend: Legend) -> str:
 def _overlay(legend: Legend) -> str:
     alone = legend.recorded is None
     rows = [_switch("simulated traces/simulated", "#BBBBBB" if alone else SIMULATED,
-                    legend.simulated if alone else f"simulated: {legend.simulated}")]
+                    legend.simulated)]
     if not alone:
-        rows.append(_switch("recorded traces/recorded", RECORDED, f"recorded: {legend.recorded}"))
+        rows.append(_switch("recorded traces/recorded", RECORDED, str(legend.recorded)))
     if legend.newtons_per_metre is not None:
         rows.append(_switch("forces", ACCENT, f"contact force, 10 N is {1000 / legend.newtons_per_metre:.0f} cm"))
     template = files("workbench.view").joinpath("assets/replay.html").read_text(encoding="utf-8")
-    settings = {"start": round(legend.start, 6), "poses": [round(t, 4) for t in legend.poses],
-                "middle": [round(x, 4) for x in legend.middle], "reach": round(legend.reach, 4), "aside": round(legend.aside, 3)}
+    copies = [[c.path, c.mesh, [[round(x, 3) for x in rgba] for rgba in c.colours]] for c in legend.copies]
+    settings = {
+        "start": round(legend.start, 6), "poses": [round(t, 4) for t in legend.poses],
+        "middle": [round(x, 4) for x in legend.middle], "reach": round(legend.reach, 4), "aside": round(legend.aside, 3),
+        "library": LIBRARY, "copies": copies,
+    }
     return (
         template.replace("%TITLE%", escape(legend.title))
         .replace("%ROWS%", "\n".join(rows))

@@ -43,6 +43,14 @@ def since_start(take: Take) -> Array:
     return take.since_start if np.isfinite(take.starts_at) else np.asarray(take.time - take.time[0])
 
 
+def names_of(simulated: Take, recorded: Take | None) -> tuple[str, str]:
+    """What a legend calls the two takes: simulated and measured, or, of two simulations, by their own names."""
+    if recorded is None or recorded.source != "simulation":
+        return "simulated", "measured"
+    a, b = simulated.name, recorded.name
+    return (a, b) if a != b else (f"{a} (1)", f"{b} (2)")
+
+
 def common_span(takes: list[Take], lead: float = 0.3) -> tuple[float, float]:
     """First and last time [s] since the first command that all takes cover, at most `lead` before the first command.
     Takes that share no time give the first one's span."""
@@ -54,8 +62,8 @@ def common_span(takes: list[Take], lead: float = 0.3) -> tuple[float, float]:
 def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback] | None = None) -> Playback:
     """The take at `time` (F,) [s] since the first command.
 
-    Gaps hold the last pose that was seen. `like`: another take of the same motion, and its playback at the same times. Joints
-    that this take lacks follow it, and where that one stood before the first command this one is laid over it.
+    Gaps hold the last pose that was seen. `like`: another take of the same motion, and its playback at the same times.
+    Joints that this take lacks follow it, and where that one stood before the first command this one is laid over it.
     """
     clock = since_start(take)
     q = _joints(take, model, time, clock, like)

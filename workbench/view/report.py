@@ -103,7 +103,7 @@ class Provenance:
 
 @dataclass
 class Report:
-    """A page under construction. headline: the result in one sentence. key_numbers: (label, value, remark), the few that matter.
+    """A page under construction. headline: the result in one sentence. key_numbers: (label, value, remark), few.
 
     Example: `Report("Walk", "It walks 9 % too far.").add(Section("Path", [Picture(body_path(take))])).write("report.html")`
     """
@@ -148,7 +148,8 @@ class Report:
 
 def _section(section: Section) -> str:
     anchor = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-")
-    return f'<section id="{anchor}"><h2>{escape(section.title)}</h2>\n' + "\n".join(map(_render, section.parts)) + "</section>"
+    parts = "\n".join(map(_render, section.parts))
+    return f'<section id="{anchor}"><h2>{escape(section.title)}</h2>\n{parts}</section>'
 
 
 def _render(part: Part) -> str:
@@ -222,5 +223,7 @@ def _version(package: str) -> str:
         return "not installed"
 
 
-_NUMBER = re.compile(r"|[–—]|[<>≤≥±≈]?\s*[+\-−]?[\d.,]+(\s*(±\s*[\d.,]+|×|%|[a-zA-Z°/²³µ]{1,6}|to\s*[+\-−]?[\d.,]+))*")
+_NUMBER = re.compile(
+    r"|[–—]|[<>≤≥±≈]?\s*[+\-−]?[\d.,]+(\s*(±\s*[\d.,]+|×|%|[a-zA-Z°/²³µ]{1,6}|to\s*[+\-−]?[\d.,]+))*"
+)
 """What counts as a number in a table's cell: blank, a dash, or digits with sign, tolerance and unit."""

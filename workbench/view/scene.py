@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 from workbench.recording.take import Take
 from workbench.robot.files import write_whole
 from workbench.robot.model import RobotModel
-from workbench.view.overlay import Legend, with_overlay
-from workbench.view.playback import Playback, common_span, play, since_start
-from workbench.view.shapes import RobotShapes, robot_shapes
+from workbench.view.overlay import LIBRARY, Copy, Legend, with_overlay
+from workbench.view.playback import Playback, common_span, names_of, play, since_start
+from workbench.view.shapes import RobotShapes, VisualShape, robot_shapes
 from workbench.view.style import ACCENT, RECORDED, SIMULATED, rgb
 
 Array = NDArray[np.float64]
@@ -51,9 +51,9 @@ def write_replay(
 ) -> ReplayFile:
     """Writes the replay; the same takes give the same bytes.
 
-    simulated: solid, with its contact forces as arrows. recorded: translucent, laid over it where both stood before the first
-    command. In gaps it holds the last pose seen; joints nobody measured follow the simulation. InputError where `path` cannot
-    be written.
+    simulated: solid, with its contact forces as arrows. recorded: translucent, laid over it where both stood before the
+    first command. In gaps it holds the last pose seen; joints nobody measured follow the simulation. The forces are
+    averaged over a frame. InputError where `path` cannot be written.
     """
     takes = [simulated] if recorded is None else [simulated, recorded]
     first, last = common_span(takes)
@@ -66,10 +66,11 @@ def write_replay(
     newtons_per_metre = scene.add_forces("forces", simulated, played)
     if ghost is not None:
         scene.add_robot("recorded", ghost, RECORDED, alpha=GHOST_ALPHA, own_colours=False)
+    names = names_of(simulated, recorded)
     legend = Legend(
-        title or simulated.name, simulated=simulated.name, recorded=None if recorded is None else recorded.name,
+        title or simulated.name, simulated=names[0], recorded=None if recorded is None else names[1],
         newtons_per_metre=newtons_per_metre, grid=GRID, start=float(time[0]), poses=_poses(simulated),
-        middle=scene.middle, reach=scene.reach, aside=1.6 * scene.shapes.height)
+        middle=scene.middle, reach=scene.reach, aside=1.6 * scene.shapes.height, copies=scene.copies)
     written = write_whole(Path(path), with_overlay(scene.html(), legend))
     return ReplayFile(written, written.stat().st_size, len(time), rate)
 
@@ -85,6 +86,12 @@ class _Scene:
         self.reach = shapes.height + 0.5 * float(np.linalg.norm(self.high - self.low))
         self.meshcat = _quiet_meshcat()
         self.animation = MeshcatAnimation(rate)
+        self.copies: list[Copy] = []
+        for name, parts in shapes.meshes.items():
+            for k, part in enumerate(parts):
+                vertices, faces = np.asfortranarray(part.vertices.T), np.asfortranarray(part.faces.T)
+                self.meshcat.SetTriangleMesh(f"/{LIBRARY}/{name}/{k}", vertices, faces, part.rgba)
+        self.meshcat.SetProperty(f"/{LIBRARY}", "visible", False)
         self._add_world()
 
     def add_robot(self, prefix: str, played: Playback, colour: str, alpha: float, own_colours: bool) -> None:
@@ -102,15 +109,23 @@ class _Scene:
                 p, R = np.einsum("fij,fj->fi", R_PW, p - p_WP), R_PW @ R
             self._animate(at[link], p, R)
             for i, shape in enumerate(self.shapes.visuals[link]):
-                tint = shape.rgba if own_colours else _tinted(shape.rgba, colour, alpha)
-                part = f"{at[link]}/shape{i}"
-                self.meshcat.SetObject(part, shape.shape, tint)
-                self.meshcat.SetTransform(part, shape.X_LG)
-                if not own_colours:  # meshes bring colours of their own
-                    self.meshcat.SetProperty(part, "color", [*_linear(tint), tint.a()])
+                self._add_shape(f"{at[link]}/shape{i}", shape, None if own_colours else (colour, alpha))
         ribbon = _ribbon(played.base_p[:, :2], width=0.004)
         if ribbon is not None:
             self.meshcat.SetTriangleMesh(f"/traces/{prefix}", *ribbon, Rgba(*rgb(colour), 0.9))
+
+    def _add_shape(self, path: str, shape: VisualShape, house: tuple[str, float] | None) -> None:
+        """In its own colours, or in a house colour and alpha. A mesh is copied by the page, which has each file once."""
+
+        def tint(rgba: Rgba) -> Rgba:
+            return rgba if house is None else _tinted(rgba, *house)
+
+        if shape.mesh is None:
+            self.meshcat.SetObject(path, shape.shape, tint(shape.rgba))
+        else:
+            colours = [tint(part.rgba) for part in self.shapes.meshes[shape.mesh]]
+            self.copies.append(Copy(path, shape.mesh, [[c.r(), c.g(), c.b(), c.a()] for c in colours]))
+        self.meshcat.SetTransform(path, shape.X_LG)
 
     def add_forces(self, prefix: str, take: Take, played: Playback) -> float | None:
         """An arrow at each foot, as long as its force; newtons per metre of arrow, None where the take has no forces."""
@@ -210,7 +225,7 @@ def _add_grid(meshcat: Meshcat, low: Array, high: Array) -> None:
 
 
 def _ribbon(path: Array, width: float) -> tuple[Array, NDArray[np.int32]] | None:
-    """A path (F, 2) [m] as a strip of triangles on the floor, as WebGL draws lines one pixel wide; None if it stays in place."""
+    """A path (F, 2) [m] as triangles on the floor, as WebGL draws lines one pixel wide; None if it stays in place."""
     path = path[kept_keys(path / 0.0005)]
     path = path[np.concatenate([[True], np.linalg.norm(np.diff(path, axis=0), axis=1) > 1e-4])]
     if len(path) < 2:
@@ -257,11 +272,6 @@ def _tinted(rgba: Rgba, colour: str, alpha: float) -> Rgba:
     shade = 0.6 + 0.5 * (0.299 * rgba.r() + 0.587 * rgba.g() + 0.114 * rgba.b())
     r, g, b = (min(1.0, shade * c) for c in rgb(colour))
     return Rgba(r, g, b, alpha * rgba.a())
-
-
-def _linear(colour: Rgba) -> list[float]:
-    """sRGB to the linear light that meshcat's "color" property takes."""
-    return [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (colour.r(), colour.g(), colour.b())]
 
 
 def _poses(take: Take) -> list[float]:

@@ -25,8 +25,8 @@ _PARTS = {"t": ("top joints", OTHERS[2]), "m": ("middle joints", SIMULATED), "b"
 def joint_torques(
     time: Array, joints: Sequence[str], torques: Mapping[str, Array], *, limit: Mapping[str, float] | None = None,
 ) -> Figure:
-    """Torque on every joint over time, in rows of three. time: (N,) [s] since the first command. torques: label -> (N, n) [N m],
-    at most three (simulated, from the measurement, …). limit: joint -> torque not to exceed [N m], dashed."""
+    """Torque on every joint over time, in rows of three. time: (N,) [s] since the first command. torques: label -> (N, n)
+    [N m], at most three (simulated, from the measurement, …). limit: joint -> torque not to exceed [N m], dashed."""
     figure, grid = panels(len(joints), columns=3, width=12, height=1.9)
     for axes, (i, joint) in zip(grid, enumerate(joints)):
         for colour, (label, values) in zip((SIMULATED, RECORDED, ACCENT), torques.items()):
@@ -47,8 +47,8 @@ def joint_torques(
 
 @styled
 def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array, v: Array) -> Figure:
-    """What the motion asks of each servo. Left: motor torque over joint speed of all samples, inside what the servo can give
-    at its supply voltage. Right: the largest share of it that each joint uses, and of the no-load speed.
+    """What the motion asks of each servo. Left: motor torque over joint speed of all samples, inside what the servo can
+    give at its supply voltage. Right: the largest share of it that each joint uses, and of the no-load speed.
 
     motor_torque: (N, n) [N m], what motor and gear must give, with reflected inertia and friction. v: (N, n) [rad/s].
     """
@@ -70,7 +70,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
             plane.plot(np.degrees(v[few, use]).ravel(), motor_torque[few, use].ravel(), ".", markersize=2, alpha=0.35,
                        color=colour, rasterized=True)
             plane.plot([], [], "o", color=colour, markersize=6, label=label)
-    reach = max(1.2 * float(np.nanmax(np.abs(motor_torque))), 0.5)
+    reach = max(1.2 * float(np.nanmax(np.abs(motor_torque), initial=0)), 0.5)
     plane.set_ylim(-reach, reach)
     plane.set_xlabel("joint speed [deg/s]")
     plane.set_ylabel("motor torque [N m]")
@@ -133,7 +133,7 @@ def _shares(model: RobotModel, joints: Sequence[str], torque: Array, v: Array) -
     back_emf = np.array([s.back_emf for s in servos])
     left = np.maximum(full - back_emf * v * np.sign(torque), 0.05 * full)
     fastest = full / back_emf
-    return np.nanmax(np.abs(torque) / left, axis=0), np.nanmax(np.abs(v) / fastest, axis=0)
+    return np.nanmax(np.abs(torque) / left, axis=0, initial=0), np.nanmax(np.abs(v) / fastest, axis=0, initial=0)
 
 
 def _part(joint: str) -> str:

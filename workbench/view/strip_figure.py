@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.recording.take import Take
 from workbench.robot.model import RobotModel
-from workbench.view.playback import Playback, common_span, play
+from workbench.view.playback import Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 from workbench.view.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
 
@@ -28,19 +28,21 @@ def film_strip(
     first, last = span or common_span(takes, lead=0.0)
     time = np.concatenate([[first - 0.1], np.linspace(first, last, instants)])  # the first stands for the rest
     played = play(simulated, model, time)
-    films = [(played, SIMULATED, "simulated", 1.0)]
+    names = names_of(simulated, recorded)
+    films = [(played, SIMULATED, names[0], 1.0)]
     if recorded is not None:
-        films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, "measured", 0.75))
-    feet = robot_shapes(model).feet
+        films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
+    shapes = robot_shapes(model)
+    reach = 80 * shapes.height
     figure = new_figure(12, 2.9)
     grid = figure.subplots(1, instants, sharey=True)
     for k, axes in enumerate(np.atleast_1d(grid), start=1):
         axes.axhline(0, color=COMMAND, linewidth=1.0, zorder=1)
         middle = played.base_p[k, 0]
         for film, colour, label, alpha in films:
-            _draw_sticks(axes, model, film, k, feet, colour, alpha)
+            _draw_sticks(axes, model, film, k, shapes.feet, colour, alpha)
             axes.plot([], [], color=colour, label=label)
-        axes.set_xlim(100 * middle - 18, 100 * middle + 18)
+        axes.set_xlim(100 * middle - reach, 100 * middle + reach)
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(f"{time[k]:.1f} s", fontsize=12)
         axes.set_xlabel("forward [cm]")
