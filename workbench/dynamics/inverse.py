@@ -87,24 +87,27 @@ class InverseDynamics:
         return self.of(trajectory, name=motion.name)
 
     def of_take(self, take: Take, window: float | None = None, stance: Stance | None = None, floor: float | None = None,
-                rest: Mapping[str, float] | None = None, draws: int = DRAWS) -> InverseDynamicsResult:
+                rest: Mapping[str, float] | None = None, draws: int | None = None) -> InverseDynamicsResult:
         """Of a take, its positions smoothed and differentiated by cubics over `window` [s] (None: 0.1, or 0.02 if simulated).
 
         stance, floor as in `of`. rest: joint -> its angle at rest [rad], added where the take is zeroed. Joints that the take
         did not see are held at their commanded angle, or zero. Gaps give NaN. The uncertainties come from `draws` copies of
         the take with noise added: q_sigma, or where the take has none the scatter about the smooth path, independent
         between joints (so feet come out somewhat noisier than rigid bodies that were tracked each for itself). The choice of
-        stance and the smoothing's bias are not in them.
+        stance and the smoothing's bias are not in them. draws None: 8, or none if the take is simulated and has no noise.
         """
         problems: list[str] = []
-        window = window or (SIMULATED_WINDOW if take.source == "simulation" else RECORDED_WINDOW)
+        simulated = take.source == "simulation"
+        window = window or (SIMULATED_WINDOW if simulated else RECORDED_WINDOW)
+        if draws is None:
+            draws = 0 if simulated and take.q_sigma is None else DRAWS
         q, seen = self._angles(take, rest or {}, problems)
         p, quat = self._base_path(take)
         trajectory, noise = smoothed(take.time, self.model.joints, q, p, quat, window)
         self._note_gaps(take, trajectory, problems)
         dear = self._dearness(trajectory, stance, floor)
         solution = self._solve(trajectory, dear)
-        sigma = np.where(seen, noise.q, 0.0)
+        sigma = np.broadcast_to(np.where(seen, noise.q, 0.0), q.shape)
         if take.q_sigma is not None:
             given = self._columns(take.joints, take.q_sigma, np.nan)
             sigma = np.where(np.isfinite(given), given, sigma)
