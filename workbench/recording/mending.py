@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
+from workbench.recording.recording import Recording
 from workbench.recording.swaps import unswap
-from workbench.recording.tracks import Tracks
+from workbench.recording.tracks import Tracks, tracks_of
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -27,6 +28,14 @@ def mend(tracks: Tracks, model: RobotModel | None = None, longest: float = LONGE
     tracks = unswap(tracks, model)
     tracks = _without_spikes(tracks, longest)
     return _filled(tracks, longest)
+
+
+def survey(recording: Recording) -> tuple[str, ...]:
+    """What `mend` finds in a recording, a line each, without any model; for markers, how much of each is unseen."""
+    if recording.rigid_bodies:
+        return mend(tracks_of(recording)).problems
+    unseen = {name: int(np.isnan(p).any(axis=1).sum()) for name, p in recording.markers.items()}
+    return tuple(f"{name}: {n} of {len(recording.time)} frames unseen" for name, n in unseen.items() if n)
 
 
 def _continuous_signs(tracks: Tracks) -> Tracks:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -38,11 +39,14 @@ def read_motive(path: str | Path) -> Recording:
     problems += _missing(source, header, mapped, frames)
     bodies: dict[str, BodyTrack] = {}
     markers: dict[str, Array] = {}
+    raw = {a.name for a in header.assets if a.kind == "Marker"}
     for asset in header.assets:
         if asset.kind in _BODIES and (asset.rotation or asset.position):
-            bodies[_unused(asset.name, bodies, "")] = _track(source, header, asset, table, scale)
+            bodies[_unused(asset.name, bodies)] = _track(source, header, asset, table, scale)
         elif asset.position:
-            markers[_unused(asset.name, markers, asset.kind)] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
+            namesake = asset.kind != "Marker" and asset.name in raw  # a solved marker makes way for the raw one
+            name = _unused(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
+            markers[name] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
     metadata = dict(header.metadata)
     metadata |= {f"Parent of {child}": parent for child, parent in header.parents.items()}
     if header.timecode is not None:
@@ -122,12 +126,9 @@ def _missing(source: str, header: MotiveHeader, mapped: mmap.mmap, frames: NDArr
     return problems
 
 
-def _unused(name: str, taken: dict[str, BodyTrack] | dict[str, Array], kind: str) -> str:
-    """The name, made different where two assets share one (a solved and a raw marker do)."""
-    if name not in taken:
-        return name
-    name = f"{name} ({kind})" if kind else name
-    n, out = 2, name
+def _unused(name: str, taken: Collection[str]) -> str:
+    """The name, numbered where two assets share it."""
+    out, n = name, 2
     while out in taken:
         out, n = f"{name} {n}", n + 1
     return out

@@ -32,7 +32,7 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
     """
     source = str(path)
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
             fields = {key: np.asarray(content[key], dtype=float) for key in content.files}
     except (OSError, ValueError, zipfile.BadZipFile, EOFError) as e:
         raise InputError(source, f"not a whole npz of number arrays: {e}") from None

@@ -16,40 +16,55 @@ Array = NDArray[np.float64]
 _ARM = 0.1
 _LEAP = 0.01  # [m] both leaps together; less is no matter
 _FAR_BETTER = 0.3  # exchanged, the two must fit this much better
+_NEAR = 3  # frames over which a velocity still tells where a body goes
 
 
 def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
     """Puts back labels that change places. A change is seen where each of two bodies goes on where the other was;
     the frames between two changes are exchanged back. Of an odd number of changes either the start or the end is wrong:
     the robot's tree decides (joints keep their links together), or without a model the start is believed."""
-    seen = tracks.seen
-    last = _last_seen(seen)
-    n = len(tracks.time)
+    known = _Seen(tracks)
+    step = [known.miss(i, i, known.anywhere) for i in range(len(tracks.assets))]
     events: list[tuple[int, int, int]] = []
-    step = [_distance(tracks, i, np.arange(n), i, last[i]) for i in range(len(tracks.assets))]
     for a, b in combinations(range(len(tracks.assets)), 2):
-        stay = step[a] + step[b]
-        maybe = np.flatnonzero((stay > _LEAP) & seen[a] & seen[b])  # NaN where nothing came before
-        if len(maybe):
-            cross = _distance(tracks, a, maybe, b, last[b][maybe]) + _distance(tracks, b, maybe, a, last[a][maybe])
-            events += [(int(f), a, b) for f in maybe[cross < _FAR_BETTER * stay[maybe]]]
-    if not events:
-        return tracks
-    return _exchanged(tracks, sorted(events), model)
+        stay = step[a] + step[b]  # NaN where nothing came before or comes after
+        maybe = np.flatnonzero((stay > _LEAP) & (known.seen[a] | known.seen[b]))
+        cross = known.miss(a, b, maybe) + known.miss(b, a, maybe)
+        events += [(int(f), a, b) for f in maybe[cross < _FAR_BETTER * stay[maybe]]]
+    return _exchanged(tracks, sorted(events), model) if events else tracks
 
 
-def _last_seen(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(A, N) the last frame before each at which the body was seen; -1 if none."""
-    at = np.where(seen, np.arange(seen.shape[1]), -1)
-    out = np.full(seen.shape, -1, dtype=np.int64)
-    out[:, 1:] = np.maximum.accumulate(at, axis=1)[:, :-1]
-    return out
+class _Seen:
+    """Each body's last samples before every frame and its first from there on, so that a gap beside a change does not hide it."""
+
+    def __init__(self, tracks: Tracks) -> None:
+        n = len(tracks.time)
+        self.tracks, self.seen, self.anywhere = tracks, tracks.seen, np.arange(n)
+        at = np.where(self.seen, self.anywhere, -1)
+        self.last = np.full(self.seen.shape, -1)
+        self.last[:, 1:] = np.maximum.accumulate(at, axis=1)[:, :-1]
+        at = np.where(self.seen, self.anywhere, n)
+        self.next = np.minimum.accumulate(at[:, ::-1], axis=1)[:, ::-1]
+
+    def miss(self, a: int, b: int, frames: NDArray[np.int64]) -> Array:
+        """How far [m] body a's next sample is from where b was, or was going; NaN where one of them is not known."""
+        t = self.tracks
+        after, before = self.next[a, frames], self.last[b, frames]
+        good = (after < len(t.time)) & (before >= 0)
+        out = np.full(len(frames), np.nan)
+        after, before = after[good], before[good]
+        earlier = self.last[b, before]
+        earlier = np.where((earlier >= 0) & (before - earlier <= _NEAR) & (after - before <= _NEAR), earlier, before)
+        ahead = ((after - before) / np.maximum(before - earlier, 1))[:, None]
+        p, q = t.p[b, before], t.q[b, before]
+        q_on = q + ahead * (q - t.q[b, earlier])
+        on = _apart(t, a, after, p + ahead * (p - t.p[b, earlier]), q_on / np.linalg.norm(q_on, axis=1, keepdims=True))
+        out[good] = np.minimum(on, _apart(t, a, after, p, q))
+        return out
 
 
-def _distance(tracks: Tracks, a: int, frames: NDArray[np.int64], b: int, others: NDArray[np.int64]) -> Array:
-    d = np.linalg.norm(tracks.p[a, frames] - tracks.p[b, others], axis=1)
-    d += _ARM * quat.angle_between(tracks.q[a, frames], tracks.q[b, others])
-    return np.where(others >= 0, d, np.nan)
+def _apart(tracks: Tracks, a: int, frames: NDArray[np.int64], p: Array, q: Array) -> Array:
+    return np.asarray(np.linalg.norm(tracks.p[a, frames] - p, axis=1) + _ARM * quat.angle_between(tracks.q[a, frames], q))
 
 
 def _exchanged(tracks: Tracks, events: list[tuple[int, int, int]], model: RobotModel | None) -> Tracks:

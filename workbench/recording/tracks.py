@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class Tracks:
         """Row of an asset."""
         return self.assets.index(asset)
 
-    @property
+    @cached_property
     def seen(self) -> NDArray[np.bool_]:
         """(A, N) where both position and rotation are known."""
         return np.asarray(np.isfinite(self.p).all(axis=-1) & np.isfinite(self.q).all(axis=-1))
