@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import yaml
+from scipy.spatial.transform import Rotation
+
+from workbench.gap.session import load_session
+from workbench.recording import BodyTrack, Measurement, observe, write_motive
+from workbench.simulation import Simulation, SimulationConfig
 
 SERVO = """\
 model: AX-12A
@@ -19,7 +26,7 @@ coulomb_friction: 0.06
 viscous_friction: 1e-2
 reflected_inertia: 6.5e-3
 """
-MOTION = "time,one,three,two\n0,0,0,0\n0.3,20,-10,30\n0.6,-20,10,-15\n0.9,0,0,0\n"
+MOTION = "time,one,three,two\n0,0,0,0\n0.3,25,-15,30\n0.6,-20,12,-25\n0.9,0,0,0\n"
 
 
 def _link(name: str, z: float) -> str:
@@ -61,3 +68,28 @@ def write_session(folder: Path, content: dict | str | None = None, fixed: bool =
     content = session_content() if content is None else content
     (folder / "session.yaml").write_text(content if isinstance(content, str) else yaml.safe_dump(content, sort_keys=False))
     return folder / "session.yaml"
+
+
+STARTS_AT = 0.4137
+
+
+def record_arm(folder: Path, name: str = "wave", friction: float = 0.06, seed: int = 0, base: str = "fixed") -> Path:
+    """Makes takes/NAME.csv: the arm's motion with another Coulomb friction in joint `three`, as cameras see it, with noise."""
+    session = load_session(write_session(folder))
+    model = session.model
+    worn = model.servo("three").updated({"coulomb_friction": friction})
+    commands = session.takes[0].commands(model)
+    assert commands is not None
+    take = Simulation(replace(model, servos={**model.servos, "three": worn}), SimulationConfig(base=base)).run(
+        commands, commands.end + 0.6, 0.3)
+    rng = np.random.default_rng(seed)
+    measurement = Measurement(
+        starts_at=STARTS_AT, yaw=0.3, origin=np.array([0.5, -0.2, 0.1]),
+        pivots={a: rng.normal(0, 0.01, 3) + np.array([0, 0, 0.04]) for a in model.rigid_bodies})
+    time = np.arange(0, STARTS_AT + commands.end + 0.5, 1 / 120)
+    bodies = {}
+    for asset, track in observe(take, measurement, model, time)[1].items():
+        turn = Rotation.from_rotvec(rng.normal(0, np.deg2rad(0.12), (len(time), 3)))
+        quat = (turn * Rotation.from_quat(track.quat, scalar_first=True)).as_quat(scalar_first=True)
+        bodies[asset] = BodyTrack(track.p + rng.normal(0, 1e-4, track.p.shape), quat)
+    return write_motive(folder / f"takes/{name}.csv", bodies, 120.0)

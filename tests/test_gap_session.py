@@ -139,7 +139,7 @@ def test_refuses_a_motion_of_another_robot_or_out_of_range(tmp_path):
     (tmp_path / "motions/wave.csv").write_text(MOTION.replace("three", "four"))
     with pytest.raises(InputError, match=r"wave\.csv.*four"):
         load_session(path)
-    (tmp_path / "motions/wave.csv").write_text(MOTION.replace("30", "170"))
+    (tmp_path / "motions/wave.csv").write_text(MOTION.replace("0.3,25,-15,30", "0.3,25,-15,170"))
     with pytest.raises(InputError, match=r"wave\.csv.*two"):
         load_session(path)
 

@@ -110,6 +110,7 @@ def _run(t: ReadTake) -> Run:
 
 
 def _compared(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:
-    return compare_takes(
+    compared = compare_takes(
         t.recorded, t.observed(rollouts.nominal), t.model, finer=[t.observed(r) for r in rollouts.finer],
         other_contact=[t.observed(r) for r in rollouts.other_contact], noise=noise)
+    return replace(compared, starts_at_sigma=t.measurement.starts_at_sigma)

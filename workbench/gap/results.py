@@ -55,15 +55,17 @@ class Pair:
 class TakeComparison:
     """One take, recorded and simulated; both zeroed alike and on the recording's clock, here with their motion and forces.
 
-    Of the base link: body (its path, from where it rested), distance (straight, in the plane) and forward [m], heading
-    (change, positive to the left) [rad], speed (distance over the commands' time) [m/s], smoothness (spectral arc length).
-    joint_smoothness: each joint's. *_phases: how each foot stood, by its height; force_phases: by the simulated forces.
+    starts_at_sigma: how sure the start is [s]. Of the base link: body (its path, from where it rested), distance (straight, in
+    the plane) and forward [m], heading (change, positive to the left) [rad], speed (distance over the commands' time) [m/s],
+    smoothness (spectral arc length). joint_smoothness: each joint's. *_phases: how each foot stood, by its height;
+    force_phases: by the simulated forces.
     """
 
     name: str
     recorded: Take
     simulated: Take
     joints: Mapping[str, Channel]
+    starts_at_sigma: float = NAN
     body: Channel | None = None
     distance: Pair | None = None
     forward: Pair | None = None
@@ -87,6 +89,7 @@ class TakeComparison:
     def as_dict(self) -> dict[str, Any]:
         """The contract's entry of one take, in degrees, metres and seconds, with more of our own."""
         out: dict[str, Any] = {"name": self.name, "starts_at": _plain(self.starts_at), "base": self.recorded.base}
+        out["starts_at_sigma"] = _plain(self.starts_at_sigma)
         out["joints"] = {j: _channel(self.joints[j], "deg") for j in self.joints_by_error()}
         if self.body is not None:
             out["body"] = _channel(self.body, "m")
@@ -137,7 +140,8 @@ class Comparison:
         """The same for a person: a line for each take, then its joints, the worst first."""
         lines = []
         for take in self.takes:
-            head = [f"{take.name}: first command at {take.starts_at:.4f} s"]
+            sigma = f" ± {1e3 * take.starts_at_sigma:.1f} ms" if math.isfinite(take.starts_at_sigma) else ""
+            head = [f"{take.name}: first command at {take.starts_at:.4f} s{sigma}"]
             if take.body is not None:
                 head.append(f"body {_mm(take.body.error)} mm (noise {_mm(take.body.noise)}, floor {_mm(take.body.floor)})")
             if take.distance is not None:
