@@ -35,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from workbench.recording.rollout_table import save_rollout
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
+    from workbench.view.figures import save_figure
+    from workbench.view.rollout_figures import rollout_figures
     from workbench.view.scene import write_replay
 
     model = load_model(args.model)
@@ -44,7 +46,9 @@ def run(args: argparse.Namespace) -> int:
     with output_directory(args.out) as folder, Progress("simulate") as progress:
         take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
         progress("writing")
-        save_rollout(take, folder / "rollout.csv")
-        write_replay(folder / "replay.html", model, take, title=f"{motion.name}, {args.contact} contact, {args.drive} drive")
-    print(f"wrote {args.out}: rollout.csv, replay.html")
+        title = f"{motion.name}, {args.contact} contact, {args.drive} drive"
+        written = [save_rollout(take, folder / "rollout.csv")]
+        written += [write_replay(folder / "replay.html", model, take, title=title).path]
+        written += [save_figure(figure, folder / f"{name}.png") for name, figure in rollout_figures(take, model).items()]
+    print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
     return 0

@@ -1,0 +1,52 @@
+"""`workbench inverse-dynamics INPUT`: what a motion asks of servos and ground."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.options import add_model, add_out, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "inverse-dynamics",
+        help="joint torques, contact forces, base wrench residual, servo margins",
+        description="From a take or a motion: the torque of each joint, contact forces inside the friction cone, the wrench on "
+        "the base that no such contact supplies, and what is left of each servo's torque and speed. A motion on a free base is "
+        "first simulated with ideal joints, because alone it does not say how the body moves.",
+    )
+    parser.add_argument("input", metavar="INPUT", help="a motion, a rollout, a recording, or a session.yaml with --take")
+    parser.add_argument("--take", metavar="NAME", help="take of the session")
+    parser.add_argument("--motion", metavar="FILE", help="motion that was played in the recording, if it does not say itself")
+    add_model(parser)
+    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of a motion or recording (default: free)")
+    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_out(parser, default="runs/inverse-dynamics")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Computes, writes the table and the figures, and prints the margins."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.dynamics import save_inverse_dynamics
+    from workbench.gap.forces import forces_of_file, forces_of_take
+    from workbench.view.figures import save_figure
+    from workbench.view.forces import force_figures, margin_table
+
+    with output_directory(args.out) as folder, Progress("inverse-dynamics") as progress:
+        if args.take:
+            model, result = forces_of_take(args.input, args.take, progress)
+        else:
+            model = load_model(args.model)
+            result = forces_of_file(args.input, model, args.base, args.cycles, args.motion, progress)
+        progress("writing")
+        written = [save_inverse_dynamics(result, folder / "inverse_dynamics.csv")]
+        written += [save_figure(figure, folder / f"{name}.png") for name, figure in force_figures(result, model).items()]
+    for problem in result.problems:
+        print(f"workbench inverse-dynamics: warning: {problem}", file=sys.stderr)
+    print(margin_table(result))
+    print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
+    return 0
