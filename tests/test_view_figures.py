@@ -9,8 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import capture, small_robot, swing
-from workbench.gap.comparison import Channel, compare_takes
+from workbench.gap.comparison import compare_takes
 from workbench.gap.footfalls import FootPhases, force_phases
+from workbench.gap.results import Channel
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel, ServoConstants
 from workbench.view import figures

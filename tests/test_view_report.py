@@ -55,7 +55,8 @@ def full_report(tmp_path: Path) -> Report:
     figure = Figure()
     figure.subplots().plot([0, 1])
     return Report(
-        "Walk <1>", "It walks `x` & turns.", summary="First.\n\nSecond **bold**.", key_numbers=[("distance", "24 cm", "floor 1 cm")],
+        "Walk <1>", "It walks `x` & turns.", summary="First.\n\nSecond **bold**.",
+        key_numbers=[("distance", "24 cm", "floor 1 cm")],
         provenance=Provenance.of(model, seed=7, seconds=1.25, config="point contact"),
     ).add(Section("Seen", [Replay(replay.path, "ghost", film_strip(model, take, seen))])).add(Section("Numbers & names", [
         Text("A paragraph."),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from workbench.gap.comparison import Channel, by_error
+from workbench.gap.results import Channel, by_error
 from workbench.view.style import COMMAND, ERROR, FLOOR, NOISE, RECORDED, SIMULATED, new_figure, styled
 
 LIMIT = 1.3
@@ -24,7 +24,7 @@ def joint_errors(
     channels: joint -> error, noise, floor, spread in SI; shown times `scale` in `unit`. A bar beyond `limit` times the
     root of noise² + floor² is orange: there is something left to explain.
     """
-    order = by_error({joint: channel.over_noise for joint, channel in channels.items()})
+    order = by_error(channels, {joint: channel.over_noise for joint, channel in channels.items()})
     figure = new_figure(9, 0.34 * len(order) + 1.6)
     axes = figure.subplots()
     for row, joint in enumerate(order):
