@@ -10,7 +10,6 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from tests.shared_data import shared
 from workbench.dynamics import InverseDynamics, RobotTrajectory
-from workbench.dynamics.trajectory import continuous
 from workbench.robot import ConfigureParser, Ground, RobotModel, puppy_model, resource_dir
 
 
@@ -57,7 +56,7 @@ def random_states(model: RobotModel, count: int, moving_base: bool) -> RobotTraj
     rng = np.random.default_rng(3)
     n = len(model.joints)
     quat = rng.normal(size=(count, 4))
-    quat = continuous(quat / np.linalg.norm(quat, axis=1, keepdims=True)) if moving_base else np.tile([1.0, 0, 0, 0], (count, 1))
+    quat = quat / np.linalg.norm(quat, axis=1, keepdims=True) if moving_base else np.tile([1.0, 0, 0, 0], (count, 1))
     return RobotTrajectory(
         np.arange(float(count)), model.joints,
         rng.uniform(-2, 2, (count, n)), rng.normal(0, 5, (count, n)), rng.normal(0, 80, (count, n)),

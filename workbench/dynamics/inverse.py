@@ -18,7 +18,7 @@ from workbench.dynamics.stance import dearness, floor_under
 from workbench.dynamics.trajectory import RobotTrajectory, smoothed
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
-from workbench.recording.take import Take
+from workbench.recording import Take, quaternions
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]
@@ -87,11 +87,13 @@ class InverseDynamics:
         return self.of(trajectory, name=motion.name)
 
     def of_take(self, take: Take, window: float | None = None, stance: Stance | None = None, floor: float | None = None,
-                rest: Mapping[str, float] | None = None, draws: int | None = None) -> InverseDynamicsResult:
+                rest: Mapping[str, float] | None = None, rest_rotation: Array | None = None,
+                draws: int | None = None) -> InverseDynamicsResult:
         """Of a take, its positions smoothed and differentiated by cubics over `window` [s] (None: 0.1, or 0.02 if simulated).
 
-        stance, floor as in `of`. rest: joint -> its angle at rest [rad], added where the take is zeroed. Joints that the take
-        did not see are held at their commanded angle, or zero. Gaps give NaN. The uncertainties come from `draws` copies of
+        stance, floor as in `of`. rest: joint -> angle [rad] and rest_rotation (4,) wxyz: the pose and tilt in which a zeroed
+        take rested (a Measurement's rest_pose and rest_rotation). Joints that the take did not see are held at their
+        commanded angle, or zero. Gaps give NaN. The uncertainties come from `draws` copies of
         the take with noise added: q_sigma, or where the take has none the scatter about the smooth path, independent
         between joints (so feet come out somewhat noisier than rigid bodies that were tracked each for itself). The choice of
         stance and the smoothing's bias are not in them. draws None: 8, or none if the take is simulated and has no noise.
@@ -103,6 +105,8 @@ class InverseDynamics:
             draws = 0 if simulated and take.q_sigma is None else DRAWS
         q, seen = self._angles(take, rest or {}, problems)
         p, quat = self._base_path(take)
+        if take.zeroed and take.base != "fixed" and rest_rotation is not None:
+            quat = quaternions.multiply(quat, rest_rotation)
         trajectory, noise = smoothed(take.time, self.model.joints, q, p, quat, window)
         self._note_gaps(take, trajectory, problems)
         dear = self._dearness(trajectory, stance, floor)
@@ -244,8 +248,7 @@ def _normal(random: np.random.Generator, sigma: Array) -> Array:
 
 def _turned(quat: Array, rotation: Array) -> Array:
     """Quaternions wxyz (N, 4) turned by small rotation vectors (N, 3) [rad] in W."""
-    w, v = quat[:, :1], quat[:, 1:]
-    return np.asarray(quat + np.hstack([-np.sum(rotation * v, axis=1, keepdims=True), rotation * w + np.cross(rotation, v)]) / 2)
+    return quat + quaternions.multiply(np.hstack([np.zeros((len(rotation), 1)), rotation / 2]), quat)
 
 
 def _pooled(variance: Array, samples: int) -> Array:

@@ -15,6 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from workbench.dynamics.trajectory import RobotTrajectory
+from workbench.recording import quaternions
 from workbench.robot import FEET, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import rotation_about
 
@@ -98,7 +99,7 @@ class Machine:
 
     def places(self, trajectory: RobotTrajectory) -> Array:
         """Lowest points of the feet's spheres in W: (N, C, 3) [m]."""
-        R_WB = rotations(trajectory.quat_WB)
+        R_WB = quaternions.matrix(trajectory.quat_WB)
         poses = self.model.kinematics.forward(trajectory.q, self.joints)
         points = self.points
         centres = np.empty((len(trajectory.time), len(points.links), 3))
@@ -127,7 +128,7 @@ class Machine:
 
     def _axes(self, trajectory: RobotTrajectory) -> Iterator[tuple[int, list[int], Array, Array]]:
         """Joints under which there are feet: column, indices of the places they carry, origin (N, 3) [m] and axis (N, 3) in W."""
-        R_WB = rotations(trajectory.quat_WB)
+        R_WB = quaternions.matrix(trajectory.quat_WB)
         kinematics = self.model.kinematics
         poses = kinematics.forward(trajectory.q, self.joints)
         for k, joint in enumerate(self.joints):
@@ -139,15 +140,6 @@ class Machine:
             R_BM = R_BL @ frame.X_MB_R.T  # M on the child, at the joint's origin
             origin = trajectory.p_WB + np.einsum("nij,nj->ni", R_WB, p_BL - R_BM @ frame.X_MB_p)
             yield k, carried, origin, np.einsum("nij,nj->ni", R_WB, R_BM @ frame.axis)
-
-
-def rotations(quat: Array) -> Array:
-    """Rotation matrices (N, 3, 3) of unit quaternions wxyz (N, 4); NaN stays."""
-    w, x, y, z = quat.T
-    return np.stack([
-        np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1),
-        np.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1),
-        np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1)], axis=-2)
 
 
 def _unmount(plant: MultibodyPlant, base: str) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.dynamics.derivatives import Derivatives, differentiate
+from workbench.recording import quaternions
 from workbench.robot import InputError
 
 Array = NDArray[np.float64]
@@ -65,7 +66,7 @@ def smoothed(time: Array, joints: tuple[str, ...], q: Array, p_WB: Array, quat_W
              ) -> tuple[RobotTrajectory, Noise]:
     """From samples of q (N, n), p_WB (N, 3) and quat_WB (N, 4) at times (N,), each smoothed and differentiated over `window`
     [s] by `differentiate`, and the noise that their scatter shows."""
-    quat = continuous(quat_WB)
+    quat, _ = quaternions.continuous(quat_WB)
     parts = differentiate(time, np.column_stack([q, p_WB, quat]), window)
     n = q.shape[1]
     joint, place, turn = (_columns(parts, which) for which in (slice(n), slice(n, n + 3), slice(n + 3, n + 7)))
@@ -80,30 +81,12 @@ def angular_motion(quat: Array, first: Array, second: Array) -> tuple[Array, Arr
     """Unit quaternion, angular velocity [rad/s] and acceleration [rad/s²] in W from a quaternion wxyz (N, 4) of any length and
     its time derivatives: with u = q/|q|, omega = 2 vec(u' u*), alpha = 2 vec(u'' u*)."""
     square = np.sum(quat**2, axis=1, keepdims=True)
-    inverse = quat * np.array([1.0, -1, -1, -1]) / square
-    rate, curve = _product(first, inverse), _product(second, inverse)
+    inverse = quaternions.conjugate(quat) / square
+    rate, curve = quaternions.multiply(first, inverse), quaternions.multiply(second, inverse)
     omega = 2 * rate[:, 1:]
     alpha = 2 * curve[:, 1:] - 2 * rate[:, :1] * omega  # the second term is the change of |q|, which is not motion
     return quat / np.sqrt(square), omega, alpha
 
 
-def continuous(quat: Array) -> Array:
-    """The same rotations with signs that do not jump; NaN stays."""
-    quat = np.asarray(quat, dtype=float)
-    seen = np.flatnonzero(np.isfinite(quat).all(axis=1))
-    out = np.full_like(quat, np.nan)
-    if len(seen):
-        q = quat[seen]
-        flips = np.sum(q[1:] * q[:-1], axis=1) < 0
-        out[seen] = q * np.where(np.concatenate([[0], np.cumsum(flips)]) % 2, -1.0, 1.0)[:, None]
-    return out
-
-
 def _columns(d: Derivatives, which: slice) -> Derivatives:
     return Derivatives(d.value[:, which], d.first[:, which], d.second[:, which], d.noise[which])
-
-
-def _product(a: Array, b: Array) -> Array:
-    """Hamilton product of quaternions wxyz (N, 4)."""
-    aw, av, bw, bv = a[:, :1], a[:, 1:], b[:, :1], b[:, 1:]
-    return np.hstack([aw * bw - np.sum(av * bv, axis=1, keepdims=True), aw * bv + bw * av + np.cross(av, bv)])
