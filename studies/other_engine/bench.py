@@ -90,7 +90,8 @@ def race(
 ) -> list[Race]:
     """MuJoCo's error and speed at each step [s]; errors are against its own rollout at the step `converged`.
 
-    Only the rollout is timed, the best of `repeats`, with the model built and settled.
+    Only the rollout is timed, the best of `repeats`, with the model built and settled. On a free base keep the duration
+    under a second: after that walking has amplified every difference, and the error no longer tells of the step.
     """
     finest = NativePlayer(model, commands, duration, base, converged)
     exact = finest.run()

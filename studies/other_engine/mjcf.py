@@ -19,7 +19,7 @@ HELD_AT = 1.0
 """Height of the root link's origin on the stand [m]."""
 IMPEDANCE = 0.5
 """MuJoCo's d of contacts. The virtual mass is d / (1 - d) of the foot's own: MuJoCo's default of 0.9 makes it nine times
-as heavy while it touches, which moves the puppy's walk (26 cm in six seconds; 21 to 23 from 0.05 to 0.5)."""
+as heavy while it touches, which shows where feet slip: 26 cm of a slipping walk where 0.05 to 0.5 give 21 to 23."""
 PUNCH_WIDTH = 1e-4
 """Error over which the punch rises, where MuJoCo's actuators make the servo law [rad]."""
 DEFAULT_STIFFNESS = 1e5
@@ -71,7 +71,8 @@ def compile_model(
     MuJoCo's contact is a linear spring and damper with a virtual mass. At impedance d, time constant t and damping ratio z
     its stiffness is 1 / ((1 - d) A t² z²), where A is the inverse mass that the foot shows (`body_invweight0`): solved for
     t. z is what Hunt and Crossley's damping, which grows with the force, comes to under a quarter of the weight, but at
-    least 1: no foot rings. MuJoCo wants t to be two steps or more, which limits z first and then the stiffness.
+    least 1, so that no foot rings, and at most 2, so that the contact is the same at all steps up to 1 ms: MuJoCo makes t
+    two steps or more.
     """
     model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep, drives))
     load = 9.81 * model.body_subtreemass[1] / 4
@@ -83,7 +84,7 @@ def compile_model(
             stiffness, dissipation = _in_series(shape, ground)
             rate = math.sqrt(stiffness * (1 - IMPEDANCE) * A)
             damping = load * dissipation / (2 * math.sqrt(stiffness / A))
-            damping = max(1.0, min(damping, 1 / (2 * timestep * rate)))
+            damping = min(max(damping, 1.0), 2.0)
             model.geom(_geom_name(link, k)).solref[:] = max(1 / (damping * rate), 2 * timestep), damping
     return model
 
