@@ -103,7 +103,9 @@ def test_turning_comes_from_quaternions_of_either_sign() -> None:
     quat = (spin * tilt).as_quat(scalar_first=True)
     quat[::3] *= -1
     d = differentiate(t, quaternions.continuous(quat)[0], 0.05)
-    u, omega, alpha = angular_motion(d.value * 1.7, d.first * 1.7, d.second * 1.7)  # length does not matter
+    s, s1, s2 = (1.5 + np.sin(3 * t))[:, None], 3 * np.cos(3 * t)[:, None], -9 * np.sin(3 * t)[:, None]  # length does not matter
+    stretched = s * d.value, s1 * d.value + s * d.first, s2 * d.value + 2 * s1 * d.first + s * d.second
+    u, omega, alpha = angular_motion(*stretched)
     np.testing.assert_allclose(np.abs(np.sum(u * quat, axis=1))[5:-5], 1, atol=1e-6)
     np.testing.assert_allclose(omega[5:-5], np.outer(0.5 + 1.2 * t, [0, 0, 1])[5:-5], atol=2e-4)
     np.testing.assert_allclose(alpha[5:-5], np.outer(np.full(len(t), 1.2), [0, 0, 1])[5:-5], atol=0.02)
@@ -141,6 +143,9 @@ def test_stated_uncertainty_is_the_scatter_of_the_error(model: RobotModel, walk:
     if base == "free":
         error = result.base_wrench_residual - clean.base_wrench_residual
         assert 0.6 < rms((error / result.residual_sigma)[8:-8]) < 1.5
+        turned = replace(take, quat_WB=noisy.quat_WB, q_sigma=np.zeros(take.q.shape))
+        alone = solver.of_take(turned, window=0.1, draws=8)
+        assert 0.5 < rms((alone.torque - clean.torque)[8:-8]) / rms(alone.torque_sigma[8:-8]) < 2
     guessed = solver.of_take(replace(noisy, q_sigma=None), window=0.1, draws=8)  # from the scatter alone
     np.testing.assert_allclose(np.median(guessed.torque_sigma, axis=0), np.median(result.torque_sigma, axis=0), rtol=0.4)
 
