@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -101,12 +102,22 @@ def test_a_reader_that_has_seen_enough_is_no_error(tmp_path: Path) -> None:
 def test_progress_is_plain_lines_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     from workbench.cli.progress import Progress
 
-    with Progress("simulate") as progress:
+    with Progress("simulate", quiet=0) as progress:
         for k in range(1000):
             progress("walking", k / 1000)
         progress("drawing")
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition(" (")[0] for line in lines] == ["workbench simulate: walking 0 %", "workbench simulate: drawing"]
+
+
+def test_progress_of_a_short_run_is_silent_and_of_a_long_one_comes_by_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    from workbench.cli.progress import Progress
+
+    with Progress("simulate", quiet=0.05) as progress:
+        progress("walking")
+        assert capsys.readouterr().err == ""
+        time.sleep(0.3)  # at one thing all the time
+        assert capsys.readouterr().err == "workbench simulate: walking (0 s)\n"
 
 
 def _inspect_raises(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:

@@ -3,38 +3,65 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from typing import TextIO
 
+QUIET = 1.5
+"""Runs shorter than this say nothing [s], so that their errors stand alone."""
+
 
 class Progress:
-    """Call it as `progress(what)` or `progress(what, done)` with done in 0..1.
+    """Call it as `progress(what)` or `progress(what, done)` with done in 0..1, inside its `with` block.
 
-    On a terminal one line that is rewritten at most ten times a second; elsewhere a plain line for each new `what`, and
-    one every five seconds within it. Use it as a context manager: the line is cleared at the end.
+    On a terminal one line that is rewritten at most ten times a second and cleared at the end; elsewhere a plain line for each
+    new `what`, and one every five seconds within it.
     """
 
-    def __init__(self, verb: str, stream: TextIO | None = None) -> None:
+    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float = QUIET) -> None:
         self._verb = verb
         self._stream = sys.stderr if stream is None else stream
         self._tty = self._stream.isatty()
         self._started = time.monotonic()
         self._last = -float("inf")
-        self._what = ""
+        self._now: tuple[str, float | None] = "", None
+        self._shown = ""
+        self._speaks = quiet <= 0
+        self._lock = threading.Lock()
+        self._timer = threading.Timer(quiet, self._speak)
+        self._timer.daemon = True
 
     def __enter__(self) -> Progress:
+        self._timer.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._tty and self._what:
-            self._stream.write("\r\x1b[2K")
-            self._stream.flush()
+        self._timer.cancel()
+        with self._lock:
+            self._speaks = False
+            if self._tty and self._shown:
+                self._stream.write("\r\x1b[2K")
+                self._stream.flush()
 
     def __call__(self, what: str, done: float | None = None) -> None:
+        with self._lock:
+            self._now = what, done
+            if self._speaks:
+                self._show()
+
+    def _speak(self) -> None:
+        """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
+        with self._lock:
+            self._speaks = True
+            if self._now[0]:
+                self._show()
+
+    def _show(self) -> None:
+        what, done = self._now
         now = time.monotonic()
-        if what == self._what and now - self._last < (0.1 if self._tty else 5.0):
+        if what == self._shown and now - self._last < (0.1 if self._tty else 5.0):
             return
-        self._what, self._last = what, now
+        self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"
         line = f"workbench {self._verb}: {what}{share} ({now - self._started:.0f} s)"
         self._stream.write(f"\r\x1b[2K{line[:110]}" if self._tty else f"{line}\n")

@@ -57,4 +57,4 @@ def _of_recording(session: Session, spec: TakeSpec, progress: Progress) -> Inver
     (rollouts,) = roll_out([run], SimulationConfig(), progress=progress, n_jobs=1, floors=False)
     (take,), _ = register_takes(session, [read], {spec.name: rollouts.nominal}, progress)
     progress("inverse dynamics", None)
-    return InverseDynamics(read.model, spec.base).of_take(take.recorded, rest=take.measurement.rest_pose)
+    return InverseDynamics(read.model, spec.base).of_take(take.recorded, measurement=take.measurement)
