@@ -97,6 +97,27 @@ def test_two_exchanges_that_follow_each_other(made, model):
     np.testing.assert_allclose(take_of(wrong, made, model).q, take_of(made.recording, made, model).q, atol=1e-9)
 
 
+def test_three_labels_that_go_round(made, model):
+    wrong = exchanged(exchanged(made.recording, "FLmid", "FRmid", 80, 360), "BLmid", "FRmid", 150, 360)
+    take = take_of(wrong, made, model)
+    np.testing.assert_allclose(take.q, take_of(made.recording, made, model).q, atol=1e-9)
+    assert any("FLmid and FRmid and BLmid: labels exchanged" in p and "to the end; put back" in p for p in take.problems)
+
+
+@pytest.mark.parametrize("pair", [("FLmid", "FRmid"), ("FLtop", "FLmid"), ("BLtop", "FRmid")])
+def test_labels_that_were_wrong_throughout_are_told_by_the_tree(made, model, pair):
+    take = take_of(exchanged(made.recording, *pair, 0, 360), made, model)
+    np.testing.assert_allclose(take.q, take_of(made.recording, made, model).q, atol=1e-9)
+    assert any("360 frame(s) to the end; put back" in p for p in take.problems)
+
+
+def test_a_body_that_is_on_no_such_link_is_told(made, model):
+    astray = made.recording.rigid_bodies["FLmid"]
+    p = astray.p + 0.2 * np.column_stack([np.sin(made.time), np.cos(2 * made.time), np.sin(3 * made.time)])
+    take = take_of(damaged(made.recording, FLmid=BodyTrack(p, astray.quat)), made, model)
+    assert any("FLtop and FLmid: no joint of the model holds them together" in text for text in take.problems)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_exchanges_flips_and_gaps_together(made, model, seed):
     rng = np.random.default_rng(seed)

@@ -57,8 +57,8 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
         origin=base_origin(tracks, model, heading.yaw, found.pivots, resting, rest.rotation),
         pivots=found.pivots, pivot_sigma=found.sigma, pivot_residual=found.residual,
         rest=_rest_poses(tracks, resting),
-        noise=dict(zip(angles.joints, noise_at_rest(angles.q, resting))), position_noise=_position_noise(tracks, resting),
-        rest_pose=rest.pose, rest_rotation=rest.rotation)
+        noise=dict(zip(angles.joints, noise_at_rest(angles.q, resting & ~tracks.mended))),
+        position_noise=_position_noise(tracks, resting), rest_pose=rest.pose, rest_rotation=rest.rotation)
 
 
 def _register_log(recording: Recording, model: RobotModel, starts_at: float | None) -> Measurement:

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+
+if TYPE_CHECKING:
+    from workbench.recording.recording import Measurement, Recording
+    from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 
@@ -57,6 +62,14 @@ class Take:
     problems: tuple[str, ...] = ()
     mended: NDArray[np.bool_] | None = None
     off_axis: Array | None = None
+
+    @staticmethod
+    def from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
+                       base: str = "free") -> Take:
+        """The take that a recording holds; see `take_from_recording`."""
+        from workbench.recording.take_from import take_from_recording
+
+        return take_from_recording(recording, measurement, model, name, base)
 
     def __len__(self) -> int:
         return len(self.time)
