@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from models.puppy_assembly import links, read_parts
-from models.puppy_sdf import mesh_glb, mesh_obj, read_signs, sdf
+from models.puppy_sdf import mesh_gltf, mesh_obj, read_signs, sdf
 from models.puppy_shapes import foot, part_shapes
 from workbench.robot.files import write_together, write_whole
 
@@ -18,7 +18,7 @@ def build(folder: Path, parts: Path = ROOT / "data/parts.csv", signs: Path = ROO
     table = read_parts(parts)
     corner, radius = table.length["foot_corner"], table.length["foot_radius"]
     shapes = part_shapes(dict(table.size), corner, radius)
-    meshes: dict[str, str | bytes] = {f"{name}.glb": mesh_glb(shape) for name, shape in shapes.items()}
+    meshes: dict[str, str | bytes] = {f"{name}.gltf": mesh_gltf(shape) for name, shape in shapes.items()}
     meshes["foot.obj"] = mesh_obj(foot(corner, radius))
     write_together(folder / "meshes", meshes)
     return write_whole(folder / "puppy.sdf", sdf(links(table.length), table, shapes, read_signs(signs)))

@@ -64,13 +64,15 @@ def read_parts(path: Path) -> PartsTable:
 
 def place(part: str, at: tuple[float, float, float] | Array = (0, 0, 0), x: Array | None = None, y: Array | None = None,
           z: Array | None = None) -> Placement:
-    """A part at a point [m], two of its axes given in the link's frame (the third follows); none: parallel to the link."""
-    if x is None and y is None and z is None:
-        x, y = X, Y
-    if x is None:
+    """A part at a point [m], with its axes x and y, or y and z, given in the link's frame; none: parallel to the link."""
+    if z is None:
+        x, y = (X if x is None else x), (Y if y is None else y)
+    elif y is not None:
         x = np.cross(y, z)
-    elif y is None:
-        y = np.cross(z, x)
+    else:
+        raise ValueError("expected z together with y")
+    assert x is not None
+    assert y is not None
     return Placement(part, np.column_stack([x, y, np.cross(x, y)]), np.asarray(at, dtype=float))
 
 
@@ -81,7 +83,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
     tail_x = -servo_x + (19 + 2 + 26) * MM  # hind servos' backs, gap, F2 of the tail joint
     neck = np.array([servo_x + 19 * MM, 0.0, BODY_Z + 18 * MM])
     tilt = np.deg2rad(35)
-    along, across = np.array([np.sin(tilt), 0, np.cos(tilt)]), np.array([np.cos(tilt), 0, -np.sin(tilt)])
+    along = np.array([np.sin(tilt), 0, np.cos(tilt)])
     tail = np.array([tail_x, 0.0, 0.0])
 
     body = Link("body_link", np.zeros(3), None, None, (
@@ -98,7 +100,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
     tail_link = Link("tail_link", tail, "tail", "body_link", (
         *(place("ax12a", back_servo + s * hip_y * Y, z=-X, y=s * Y) for s in (1, -1)),
         place("f2", z=Y, y=X),
-        place("tail_frame", back_servo + [0, 0, -BODY_Z]),
+        place("tail_frame", back_servo - BODY_Z * Z),
     ))
     neck_link = Link("neck_link", neck, "neck", "body_link", (
         place("f2", z=Y, y=-along), place("f2", along * d["neck_length"], z=Y, y=along),

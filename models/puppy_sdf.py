@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,7 +24,7 @@ LOWER, UPPER = (0 - 512) * COUNT, (1023 - 512) * COUNT  # goal positions 0 and 1
 STIFFNESS, DAMPING = 1e4, 1e2  # N/m and N s/m of one contact sphere (thesis, 6.9)
 FRICTION_STATIC, FRICTION = 0.7, 0.5  # thesis, 6.9; a discrete plant knows the dynamic one alone
 IMPACT_SPEED = 0.1  # m/s at which damping is translated: a foot that comes down at the walk's pace
-HYDROELASTIC_MODULUS = 7e5  # Pa; a foot flat on the ground is then about as stiff as its four spheres together
+HYDROELASTIC_MODULUS = 1e6  # Pa; a foot flat on rigid ground then gives 4.2e4 N/m (measured), its four spheres 4e4 N/m
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def number(value: float) -> str:
     return "0" if float(text) == 0 or abs(float(text)) < 1e-15 else text
 
 
-def numbers(values: Array | list[float]) -> str:
+def numbers(values: Iterable[float]) -> str:
     return " ".join(number(float(v)) for v in values)
 
 
@@ -109,8 +109,8 @@ def sdf(tree: list[Link], table: PartsTable, shapes: Mapping[str, Shape], signs:
         '<?xml version="1.0"?>',
         "<!-- Made by models/build_puppy.py from data/parts.csv and data/joint_signs.csv; do not edit.",
         "     Zero of every joint is the neutral pose, servo goal 512. Feet carry two contact models: foot_sphere_0..3, the",
-        "     thesis's corners, and foot_hydro, compliant hydroelastic. Use one: the workbench's station removes the other by name;",
-        "     a plant that keeps both lets them act at once. -->",
+        "     thesis's corners, and foot_hydro, compliant hydroelastic. Use one set: the workbench's station takes the other",
+        "     away by name; in a plant that keeps both, both act at once and the feet are too stiff. -->",
         '<sdf version="1.9" xmlns:drake="http://drake.mit.edu">',
         '<model name="puppy">',
         f"<pose>0 0 {number(height)} 0 0 0</pose>",
@@ -136,7 +136,7 @@ def _link(link: Link, inertia: Inertia, d: Mapping[str, float], dissipation: flo
     ]
     for i, at in enumerate(link.parts):
         lines.append(f'<visual name="{at.part}_{i}"><pose>{_pose(at)}</pose><geometry><mesh>'
-                     f"<uri>package://puppy/meshes/{at.part}.glb</uri></mesh></geometry></visual>")
+                     f"<uri>package://puppy/meshes/{at.part}.gltf</uri></mesh></geometry></visual>")
     return [*lines, *_collisions(link, d, dissipation), "</link>"]
 
 
@@ -155,10 +155,9 @@ def _collisions(link: Link, d: Mapping[str, float], dissipation: float) -> list[
     """Shapes that can touch: belly, thighs, shanks and feet."""
     if link.name == "body_link":
         return _collision("belly", [-0.03, 0, 0.04], _box(0.10, 0.068, 0.07), dissipation)
-    part = link.name[2:3] if link.parts[0].part != "f2" or link.name[2:] == "b_link" else ""
     if link.name.endswith("m_link"):
         return _collision("thigh", [0, 0, -d["thigh"] / 2], _box(0.032, 0.042, d["thigh"] + 0.022), dissipation)
-    if part != "b" or not link.name.endswith("b_link"):
+    if not link.name.endswith("b_link"):
         return []
     front = link.name[0] == "f"
     tip = -(d["front_shank"] if front else d["back_shank"])
@@ -169,8 +168,8 @@ def _collisions(link: Link, d: Mapping[str, float], dissipation: float) -> list[
     for i, (sx, sy) in enumerate([(-1, -1), (-1, 1), (1, -1), (1, 1)]):
         lines += _collision(f"foot_sphere_{i}", [x + sx * c, sy * c, tip + r], f"<sphere><radius>{number(r)}</radius></sphere>",
                             dissipation)
-    return lines + _collision("foot_hydro", [x, 0, tip], "<mesh><uri>package://puppy/meshes/foot.obj</uri><drake:declare_convex/></mesh>",
-                              dissipation, compliant=True)
+    hull = "<mesh><uri>package://puppy/meshes/foot.obj</uri><drake:declare_convex/></mesh>"
+    return lines + _collision("foot_hydro", [x, 0, tip], hull, dissipation, compliant=True)
 
 
 def _box(x: float, y: float, z: float) -> str:
@@ -178,8 +177,8 @@ def _box(x: float, y: float, z: float) -> str:
 
 
 def _collision(name: str, at: list[float], geometry: str, dissipation: float, compliant: bool = False) -> list[str]:
-    stiffness = (f"<drake:compliant_hydroelastic/><drake:hydroelastic_modulus>{number(HYDROELASTIC_MODULUS)}</drake:hydroelastic_modulus>"
-                 if compliant else f"<drake:point_contact_stiffness>{number(STIFFNESS)}</drake:point_contact_stiffness>")
+    tag, value = ("hydroelastic_modulus", HYDROELASTIC_MODULUS) if compliant else ("point_contact_stiffness", STIFFNESS)
+    stiffness = ("<drake:compliant_hydroelastic/>" if compliant else "") + f"<drake:{tag}>{number(value)}</drake:{tag}>"
     return [
         f'<collision name="{name}"><pose>{numbers(at)} 0 0 0</pose><geometry>{geometry}</geometry><drake:proximity_properties>',
         f"{stiffness}<drake:hunt_crossley_dissipation>{number(dissipation)}</drake:hunt_crossley_dissipation>",
@@ -201,8 +200,9 @@ def _joint(link: Link, axis: str, sign: int, parent_at: Array) -> list[str]:
     ]
 
 
-def mesh_glb(shape: Shape) -> bytes:
-    """glTF of a part, one geometry for each colour, flat shaded; y up as glTF wants, so that Drake shows it z up."""
+def mesh_gltf(shape: Shape) -> bytes:
+    """glTF of a part in one file (Drake's Meshcat shows no .glb), one geometry for each colour, flat shaded; y up as glTF
+    wants, so that Drake shows it z up."""
     scene = trimesh.Scene()
     for colour in sorted({s.colour for s in shape}):
         mesh = trimesh.util.concatenate([s.mesh for s in shape if s.colour == colour])
@@ -211,7 +211,7 @@ def mesh_glb(shape: Shape) -> bytes:
         mesh.visual = trimesh.visual.TextureVisuals(material=trimesh.visual.material.PBRMaterial(
             baseColorFactor=[*colour, 255], metallicFactor=0.0, roughnessFactor=0.7))
         scene.add_geometry(mesh, geom_name="_".join(map(str, colour)))
-    return bytes(scene.export(file_type="glb"))
+    return bytes(trimesh.exchange.gltf.export_gltf(scene, merge_buffers=True, embed_buffers=True)["model.gltf"])
 
 
 def mesh_obj(mesh: trimesh.Trimesh) -> str:

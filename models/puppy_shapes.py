@@ -48,6 +48,12 @@ def disc(radius: float, z: tuple[float, float], at: tuple[float, float] = (0.0, 
     return hull([(at[0] + radius * np.cos(a), at[1] + radius * np.sin(a), h) for a in angle for h in z])
 
 
+def screws(radius: float, circle: float, z: tuple[float, float]) -> Shape:
+    """Heads of four screws on a circle about z [mm], to look at."""
+    at = [(circle * np.cos(a), circle * np.sin(a)) for a in np.deg2rad([45, 135, 225, 315])]
+    return [Solid(disc(radius, z, p, sides=6), BLACK, False) for p in at]
+
+
 def ax12a() -> Shape:
     """AX-12A: z along its axis out of the horn, origin on the axis in mid-body, body towards -y (CAD: x +-16, y -38.5 to 11.5,
     z -19 to 21.9)."""
@@ -68,8 +74,7 @@ def ax12a() -> Shape:
         Solid(box((4, 12), (-36, -29), (-19.6, -19)), WHITE, False),
         Solid(box((-1.5, 1.5), (-16, -14.5), (17, 17.4)), RED, False),
     ]
-    for angle in np.deg2rad([45, 135, 225, 315]):
-        pieces.append(Solid(disc(1.4, (21.9, 22.3), (8 * np.cos(angle), 8 * np.sin(angle)), sides=6), BLACK, False))
+    pieces += screws(1.4, 8, (21.9, 22.3))
     for x in (-16.3, 15.8):
         pieces += [Solid(box((x, x + 0.5), (y - 2, y + 2), (-9, 9)), GREY, False) for y in (-34, -22, -10)]
     return pieces
@@ -86,8 +91,7 @@ def bracket(base: float, half_width: float, plate: tuple[float, float]) -> Shape
         pieces.append(Solid(hull([(*p, h) for p in outline for h in z]), FRAME))
         outer = (23.0, 24.4) if side > 0 else (-24.4, -23.0)
         pieces.append(Solid(disc(3, outer, sides=10), GREY, False))
-        for angle in np.deg2rad([45, 135, 225, 315]):
-            pieces.append(Solid(disc(1.3, outer, (7.5 * np.cos(angle), 7.5 * np.sin(angle)), sides=6), BLACK, False))
+        pieces += screws(1.3, 7.5, outer)
         pieces.append(Solid(box((-5.5, 5.5), (-base + 5, -13), (23.0, 23.15) if side > 0 else (-23.15, -23.0)), GREY, False))
     return pieces
 
@@ -140,14 +144,15 @@ def cm530() -> Shape:
     return pieces
 
 
-def block(x: float, y: float, z: float, colour: tuple[int, int, int], chamfer: float = 1.5) -> Shape:
+def block(size: Iterable[float], colour: tuple[int, int, int], chamfer: float = 1.5) -> Shape:
     """Box of outer size [mm] about its origin."""
+    x, y, z = size
     return [Solid(box((-x / 2, x / 2), (-y / 2, y / 2), (-z / 2, z / 2), min(chamfer, min(x, y) / 4)), colour)]
 
 
 def lbs10() -> Shape:
     """LBS-10, 88 x 36 x 20 mm about its origin, long side along x, with its label and lead."""
-    return [*block(88, 36, 20, BLACK, 4), Solid(box((-30, 30), (-18.2, 18.2), (-6, 6)), BLUE, False),
+    return [*block((88, 36, 20), BLACK, 4), Solid(box((-30, 30), (-18.2, 18.2), (-6, 6)), BLUE, False),
             Solid(box((-52, -44), (4, 10), (-3, 3)), RED, False)]
 
 
@@ -182,7 +187,7 @@ def foot(corner: float, radius: float) -> trimesh.Trimesh:
     """
     ball = trimesh.creation.icosphere(subdivisions=1, radius=radius).vertices
     ball *= radius / np.abs(ball[:, 2]).max()  # reaches down to the sphere's lowest point
-    corners = [ball + [sx * corner, sy * corner, radius] for sx in (-1, 1) for sy in (-1, 1)]
+    corners = [ball + np.array([sx * corner, sy * corner, radius]) for sx in (-1, 1) for sy in (-1, 1)]
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     neck = np.column_stack([8 * MM * np.cos(angle), 8 * MM * np.sin(angle), np.full(12, 14 * MM)])
     mesh: trimesh.Trimesh = trimesh.convex.convex_hull(np.vstack([*corners, neck]))
@@ -196,6 +201,6 @@ def part_shapes(sizes: dict[str, tuple[float, float, float]], corner: float, rad
     }
     plain = {"zig110a": GREEN, "tail_frame": FRAME, "body_frame": FRAME, "body_hardware": GREY, "leg_hardware": GREY}
     shapes = {name: draw() for name, draw in drawn.items()}
-    shapes |= {name: block(*(v / MM for v in sizes[name]), colour) for name, colour in plain.items()}
+    shapes |= {name: block(np.divide(sizes[name], MM), colour) for name, colour in plain.items()}
     shapes["foot"] = [Solid(foot(corner, radius), RUBBER)]
     return shapes
