@@ -64,6 +64,23 @@ def test_signs_are_those_of_the_table_and_mirror_each_other():
             assert signs[f"{end}l{part}"][1] == relation * signs[f"{end}r{part}"][1]
 
 
+def test_signs_are_those_of_the_servos_as_drawn():
+    """Seen from the horn a servo turns counterclockwise: so does what the horn carries; what carries the case turns against."""
+    signs = read_signs(ROOT / "data/joint_signs.csv")
+    tree = {link.name: link for link in links(TABLE.length)}
+    servos = [(link, link.p_BL + at.p_LP, at.R_LP[:, 2]) for link in tree.values() for at in link.parts if at.part == "ax12a"]
+    assert len(servos) == 15
+    for link in tree.values():
+        if link.joint is None:
+            continue
+        axis, sign = signs[link.joint]
+        e = np.eye(3)["xy".index(axis)]
+        (found,) = [(owner, horn) for owner, p, horn in servos if owner.name in (link.name, link.parent)
+                    and abs(horn @ e) > 0.99 and np.linalg.norm(np.cross(p - link.p_BL, e)) < 1e-9]
+        owner, horn = found
+        assert sign == round(float(horn @ e)) * (1 if owner.name == link.parent else -1), link.joint
+
+
 def test_masses_are_near_those_measured_on_the_same_parts():
     masses = puppy_model().kinematics.masses
     for leg in ("fl", "fr", "bl", "br"):
