@@ -15,9 +15,10 @@ from workbench.robot import FEET, RobotModel
 
 Array = NDArray[np.float64]
 
-LIFT = 0.0075
-"""A foot is off the ground above this share of the height at which the base rests: 1.3 mm for a puppy, twice what capture
-noise makes of a foot's height. On simulated walks the duty factor then lies within 0.04 of that from contact forces."""
+LIFT = 0.005
+"""A foot is off the ground above this share of the height at which the base rests: 1 mm for a puppy, five times what capture
+noise makes of a foot's height (0.2 mm in the practice sessions). On simulated walks the duty factor then lies within 0.04
+above that from contact forces."""
 SHORTEST = 0.03
 """Stance or swing shorter than this [s] is chatter, not a step."""
 

@@ -100,8 +100,7 @@ def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) ->
 def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mapping[str, Take],
                    progress: Progress = no_progress) -> tuple[list[RegisteredTake], LeftOut]:
     """Registers each take against its rollout (by the take's name), with one yaw for all of them."""
-    captured = [t for t in takes if t.recording.rigid_bodies]
-    yaw = session_yaw([t.recording for t in captured], session.model, [t.commands for t in captured]).yaw if captured else None
+    yaw = _yaw(session, [t for t in takes if t.recording.rigid_bodies])
     registered: list[RegisteredTake] = []
     left: list[tuple[str, str]] = []
     for i, t in enumerate(takes):
@@ -111,6 +110,16 @@ def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mappin
         except InputError as e:
             left.append((t.spec.name, str(e)))
     return registered, remaining(session, registered, tuple(left))
+
+
+def _yaw(session: Session, captured: Sequence[ReadTake]) -> float | None:
+    """One for all takes that cameras saw; None without any."""
+    if not captured:
+        return None
+    try:
+        return session_yaw([t.recording for t in captured], session.model, [t.commands for t in captured]).yaw
+    except InputError as e:
+        raise InputError(e.source or session.path, e.problem) from None
 
 
 def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:
