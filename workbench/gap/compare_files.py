@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -16,32 +14,12 @@ from workbench.gap.registered import Progress, ReadTake, RegisteredTake, no_prog
 from workbench.gap.results import Comparison
 from workbench.gap.session import Base, TakeSpec
 from workbench.motion.motion import load_motion
-from workbench.recording.rollout_table import is_rollout, load_rollout
+from workbench.recording.file_kind import file_kind
+from workbench.recording.rollout_table import load_rollout
 from workbench.recording.take import Take
 from workbench.recording.tracks import check_assets
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
-
-Kind = Literal["recording", "motion", "rollout"]
-
-
-def file_kind(path: str | Path) -> Kind:
-    """What a file holds, by its content. InputError where there is no such file."""
-    path = Path(str(path).partition("#")[0])
-    if path.suffix.lower() == ".mtn":
-        return "motion"
-    if path.is_dir():
-        return "recording"  # a SAGE programme is a folder
-    try:
-        with path.open("rb") as f:
-            first = f.readline(100_000).decode("utf-8-sig", errors="replace").strip()
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
-    if is_rollout(first):
-        return "rollout"
-    cells = [c.strip() for c in next(csv.reader([first]), [])]
-    plain = "time" in cells and not any("." in c for c in cells)
-    return "motion" if plain or _numbers(cells) else "recording"
 
 
 def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *, cycles: int = 1,
@@ -117,13 +95,6 @@ def _bridged(take: Take) -> Take:
         if seen.any():
             column[~seen] = np.interp(take.time[~seen], take.time[seen], column[seen])
     return replace(take, q=np.nan_to_num(q))
-
-
-def _numbers(cells: list[str]) -> bool:
-    try:
-        return bool([float(c) for c in cells])
-    except ValueError:
-        return False
 
 
 def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:

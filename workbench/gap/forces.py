@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from workbench.dynamics import InverseDynamics, InverseDynamicsResult, inverse_dynamics
-from workbench.gap.compare_files import file_kind
 from workbench.gap.compare_session import Run, roll_out
 from workbench.gap.registered import Progress, no_progress, read_takes, register_takes
 from workbench.gap.session import Base, Session, TakeSpec, load_session
 from workbench.motion import load_motion
+from workbench.recording.file_kind import file_kind
 from workbench.recording.rollout_table import load_rollout
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
@@ -57,4 +57,5 @@ def _of_recording(session: Session, spec: TakeSpec, progress: Progress) -> Inver
     (rollouts,) = roll_out([run], SimulationConfig(), progress=progress, n_jobs=1, floors=False)
     (take,), _ = register_takes(session, [read], {spec.name: rollouts.nominal}, progress)
     progress("inverse dynamics", None)
-    return InverseDynamics(read.model, spec.base).of_take(take.recorded, measurement=take.measurement)
+    m = take.measurement
+    return InverseDynamics(read.model, spec.base).of_take(take.recorded, rest=m.rest_pose, rest_rotation=m.rest_rotation)

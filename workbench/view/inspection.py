@@ -91,17 +91,15 @@ def _reader(path: Path, part: bool) -> Callable[[Path], Inspection]:
         return _yaml
     if suffix == ".mtn":
         return _motion if part else _motion_file
+    from workbench.recording.file_kind import file_kind
+
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
         first = next((line for line in stream if line.strip()), "").strip()
     if first.startswith("<"):
         return lambda p: _model(str(p))
     if first.startswith("# joints:"):
         return lambda p: _firmware_tables(p.parent)
-    if first.startswith("# workbench rollout"):
-        return _rollout
-    cells = [c.strip() for c in first.split(",")]
-    plain_columns = "time" in cells and not any("." in c or c.startswith("Format") for c in cells)
-    return _motion if plain_columns or _all_numbers(cells) else _recording
+    return {"rollout": _rollout, "motion": _motion, "recording": _recording}[file_kind(path)]
 
 
 def _recording(path: Path) -> Inspection:
@@ -231,10 +229,6 @@ def _duration(time: Any) -> float | None:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _all_numbers(cells: list[str]) -> bool:
-    return all(re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|nan", c, re.IGNORECASE) for c in cells)
 
 
 def _names(names: tuple[str, ...] | list[Any]) -> str:
