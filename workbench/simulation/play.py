@@ -5,22 +5,47 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from workbench.motion import Motion, interpolate_motion
 from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation.batch import Job
+from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
 
+Array = NDArray[np.float64]
+LEAD = 0.3
+"""Rest before the first command [s]."""
 
-def play_motion(simulation: Simulation, motion: Motion, cycles: int = 1, lead: float = 0.3,
-                progress: Callable[[float], None] | None = None) -> Take:
-    """Plays a motion `cycles` times after `lead` [s] of rest.
 
-    A servo gets the firmware's commands, rounded as there. An ideal joint follows the angles themselves, by a smooth cubic, as in
-    the thesis's inverse dynamics. progress: called with the share of the time that is done, 0 to 1.
+def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int = 1, duration: float | None = None,
+               lead: float = LEAD) -> Job:
+    """A motion played `cycles` times, or for `duration` [s] of that, after `lead` [s] of rest.
+
+    A servo gets the firmware's commands, rounded as there. An ideal joint follows the angles themselves, by a smooth cubic, as
+    in the thesis's inverse dynamics.
     """
     commands = motion.commands(cycles)
-    end = lead + commands.end
+    trajectory = smooth_trajectory(model, config, motion, cycles) if config.drive == "ideal" else None
+    return Job(model, config, commands, commands.end if duration is None else duration, lead, trajectory, name=motion.name)
+
+
+def smooth_trajectory(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int) -> tuple[Array, Array]:
+    """Times (N,) [s] and angles (N, n) [rad] in the model's order of joints; those that the motion lacks at zero."""
+    smooth = interpolate_motion(motion, cycles, step=max(config.time_step, 1e-3))
+    angles = np.zeros((len(smooth.time), len(model.joints)))
+    for joint in smooth.joints:
+        angles[:, model.joints.index(joint)] = smooth.q[:, smooth.column(joint)]
+    return smooth.time, angles
+
+
+def play_motion(simulation: Simulation, motion: Motion, cycles: int = 1, progress: Callable[[float], None] | None = None) -> Take:
+    """The take of `motion_job` on a station that exists. progress: called with the share of the time that is done, 0 to 1."""
+    job = motion_job(simulation.model, simulation.config, motion, cycles)
+    assert job.duration is not None
+    end = job.lead + job.duration
 
     def report(context: Context) -> None:
         assert progress is not None
@@ -29,12 +54,6 @@ def play_motion(simulation: Simulation, motion: Motion, cycles: int = 1, lead: f
     if progress is not None:
         simulation.simulator.set_monitor(report)
     try:
-        if simulation.config.drive != "ideal":
-            return simulation.run(commands, lead=lead, name=motion.name)
-        smooth = interpolate_motion(motion, cycles, step=max(simulation.config.time_step, 1e-3))
-        angles = np.zeros((len(smooth.time), len(simulation.joints)))
-        for joint in smooth.joints:
-            angles[:, simulation.joints.index(joint)] = smooth.q[:, smooth.column(joint)]
-        return simulation.run(commands, lead=lead, trajectory=(smooth.time, angles), name=motion.name)
+        return simulation.run(job.commands, job.duration, job.lead, trajectory=job.trajectory, name=job.name)
     finally:
         simulation.simulator.clear_monitor()

@@ -37,19 +37,18 @@ def write_comparison(comparison: Comparison, model: RobotModel, folder: Path, ti
     progress: called with what is being made and the share done.
     """
     paths = [comparison.save(folder / "comparison.json")]
-    report = Report(title, _headline(comparison), _summary(comparison), _key_numbers(comparison), _provenance(comparison, model))
+    report = Report(title, headline(comparison), _summary(comparison), _key_numbers(comparison), _provenance(comparison, model))
     if comparison.left_out:
         rows = [[name, reason] for name, reason in comparison.left_out]
         report.add(Section("Takes left out", [Table(["take", "reason"], rows)]))
     for i, take in enumerate(comparison.takes):
         progress(f"drawing {take.name}", i / len(comparison.takes))
-        replay = write_replay(folder / f"replay-{take.name}.html", model, take.simulated, take.recorded, title=take.name)
-        paths.append(replay.path)
-        report.add(_section(take, model, replay.path))
+        paths.append(folder / f"replay-{take.name}.html")
+        report.add(take_section(take, model, paths[-1]))
     return [report.write(folder / "report.html"), *paths]
 
 
-def _headline(comparison: Comparison) -> str:
+def headline(comparison: Comparison) -> str:
     over = [(t, j, c) for t in comparison.takes for j, c in t.joints.items() if c.over_noise > LIMIT]
     if not over:
         return f"Every joint's error is within {LIMIT:g} times what noise and numerics make."
@@ -87,7 +86,9 @@ def _provenance(comparison: Comparison, model: RobotModel) -> Provenance:
     return Provenance(model.sha256, seconds=seconds, more=more)
 
 
-def _section(take: TakeComparison, model: RobotModel, replay: Path) -> Section:
+def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Section:
+    """All there is to see of one take; its 3D replay is written to `replay` and shown."""
+    write_replay(replay, model, take.simulated, take.recorded, title=take.name)
     parts: list[Part] = [Picture(joint_errors(take.joints), "Error of each joint over what noise and numerics alone would make.")]
     problems = take.recorded.problems
     if problems:

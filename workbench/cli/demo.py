@@ -1,0 +1,34 @@
+"""`workbench demo`: the whole loop on bundled data."""
+
+from __future__ import annotations
+
+import argparse
+
+from workbench.cli.options import add_out
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "demo",
+        help="the whole loop on bundled data, with a report to open at the end",
+        description="Plays the ROBOTIS walk with the servo law and with ideal joints, in point and in hydroelastic contact, "
+        "prints the thesis's table with our rows under it, compares the walk with a bundled synthetic recording, and writes "
+        "the firmware tables and a report.",
+    )
+    add_out(parser, default="runs/demo")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs it, prints the table and where the report is."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.view.demo import run_demo
+
+    with output_directory(args.out) as folder, Progress("demo") as progress:
+        demo = run_demo(folder, progress)
+    print(demo.table)
+    print(f"\nagainst the bundled synthetic recording: {demo.finding}")
+    print(f"\nwrote {args.out}: open {args.out / demo.page.name}")
+    return 0
