@@ -13,7 +13,7 @@ from workbench.device import export
 from workbench.device.limits import Violation
 from workbench.gap import metrics
 from workbench.gap.compare_session import compare_session
-from workbench.gap.footfalls import force_phases
+from workbench.gap.footfalls import foot_phases
 from workbench.gap.results import Comparison
 from workbench.gap.session import load_session
 from workbench.motion import Motion, load_motion
@@ -77,7 +77,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     rows = [*THESIS, *((label, *_end(take)) for label, take in takes.items())]
     lengths = [_end(take)[0] for take in takes.values()]
     report = Report(
-        "workbench demo", f"Six seconds of the ROBOTIS walk go {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and contact.",
+        "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and contact.",
         _SUMMARY, [(label, f"{_end(t)[0]:.1f} cm", f"heading {_heading(t):+.1f}°") for label, t in takes.items()],
         Provenance.of(model, seconds=time.monotonic() - began))
     report.add(_walk_section(rows, takes, model, folder))
@@ -90,7 +90,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
 
 def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:
     """The four runs by label; the servo law in point contact first."""
-    labels = [f"{DRIVES[drive]}, {contact} contact" for drive, contact in RUNS]
+    labels = [f"{DRIVES[drive]}, {contact}" for drive, contact in RUNS]
     configs = [SimulationConfig(drive=drive, contact=contact) for drive, contact in RUNS]
     jobs = [motion_job(model, config, motion, CYCLES, SECONDS) for config in configs]
     progress(f"simulating {len(jobs)} walks", 0.0)
@@ -112,7 +112,7 @@ def _heading(take: Take) -> float:
 
 def _walk_section(rows: list[Row], takes: Mapping[str, Take], model: RobotModel, folder: Path) -> Section:
     (label, main), *others = takes.items()
-    stance = stance_of(force_phases(main), main)
+    stance = stance_of(foot_phases(main, model), main)
     replay = write_replay(folder / "replay-walk.html", model, main, title=label).path
     limit = {j: model.servo(j).torque_at_full_duty for j in main.joints}
     assert main.torque is not None

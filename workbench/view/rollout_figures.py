@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from workbench.gap.footfalls import force_phases
+from workbench.gap.footfalls import foot_phases
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.view.figures import body_attitude, body_path, footfalls, joint_grid, joint_torques, stance_of
@@ -14,7 +14,7 @@ from workbench.view.figures import body_attitude, body_path, footfalls, joint_gr
 
 def rollout_figures(take: Take, model: RobotModel) -> Mapping[str, Figure]:
     """Figures by name: angles against commands, torques against full duty, and of a free base path, attitude and footfalls."""
-    stance = stance_of(force_phases(take), take)
+    stance = stance_of(foot_phases(take, model), take)
     figures = {"joints": joint_grid(take, stance=stance)}
     if take.torque is not None:
         limit = {j: model.servo(j).torque_at_full_duty for j in take.joints}
