@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.view_takes import capture, small_robot, swing
 from workbench.robot import RobotModel
-from workbench.view.playback import STAND_CLEARANCE, common_span, names_of, play
+from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
 
 
 @pytest.fixture
@@ -16,6 +16,12 @@ def model(tmp_path: Path) -> RobotModel:
 
 
 TIME = np.linspace(-0.2, 1.1, 40)
+
+
+def lowest_foot(played: Playback) -> float:
+    """The feet are spheres of 5 mm, 45 mm below the last link's origin."""
+    feet = (played.in_world(link) for link in ("flb_link", "frb_link"))
+    return min(float((p[:, 2] - 0.045 * R[:, 2, 2]).min()) - 0.005 for p, R in feet)
 
 
 def test_links_are_where_kinematics_says(model: RobotModel) -> None:
@@ -67,12 +73,20 @@ def test_a_recording_is_laid_over_the_simulation_at_rest(model: RobotModel) -> N
 def test_a_base_that_nobody_followed_stands_clear_of_the_floor(model: RobotModel) -> None:
     take = replace(swing(model), p_WB=None, quat_WB=None, base="fixed")
     played = play(take, model, TIME)
-    lowest = min(played.in_world(link)[0][:, 2].min() for link in model.kinematics.links)
-    assert lowest == pytest.approx(STAND_CLEARANCE)
+    assert lowest_foot(played) == pytest.approx(STAND_CLEARANCE)
     free = swing(model)
     ghost = play(take, model, TIME, like=(free, play(free, model, TIME)))
     np.testing.assert_allclose(ghost.base_p, np.tile(ghost.base_p[0], (len(TIME), 1)))
     np.testing.assert_allclose(ghost.base_p[0], [0, 0, 0.1], atol=1e-9)
+
+
+def test_a_robot_on_a_stand_is_shown_just_above_the_floor(model: RobotModel) -> None:
+    free = swing(model)
+    hung = replace(free, base="fixed", p_WB=np.tile([0, 0, 1.3], (len(free), 1)))
+    played = play(hung, model, TIME)
+    assert lowest_foot(played) == pytest.approx(STAND_CLEARANCE)
+    ghost = play(capture(hung, gap=slice(0, 0)), model, TIME, like=(hung, played))
+    np.testing.assert_allclose(ghost.base_p, played.base_p, atol=1e-9)
 
 
 def test_span_is_what_all_takes_cover(model: RobotModel) -> None:

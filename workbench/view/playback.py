@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.gap.footfalls import foot_points
 from workbench.recording.take import Take
 from workbench.robot.model import RobotModel
 
 Array = NDArray[np.float64]
 
 STAND_CLEARANCE = 0.05
-"""Height of the lowest link above the floor, where a robot on a stand does not say how high it stands [m]."""
+"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; how high it hung says nothing."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,11 @@ def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback]
         links = _seen_from(links, model.base)
     p, R = _base(take, time, clock)
     if p is None or R is None:
-        p, R = _standing(links, time, like[1] if like else None)
+        p, R = _standing(time, like[1] if like else None)
     elif like is not None:
         p, R = _laid_over(p, R, like[1], take.zeroed)
-    return Playback(time, q, p, R, links)
+    played = Playback(time, q, p, R, links)
+    return _on_a_stand(played, model) if like is None and (take.base == "fixed" or take.p_WB is None) else played
 
 
 def _joints(take: Take, model: RobotModel, time: Array, clock: Array, like: tuple[Take, Playback] | None) -> Array:
@@ -118,14 +120,20 @@ def _held(time: Array, clock: Array, values: Array) -> Array:
     return np.asarray(a + (b - a) * share[:, None], dtype=float)
 
 
-def _standing(links: Mapping[str, tuple[Array, Array]], time: Array, other: Playback | None) -> tuple[Array, Array]:
-    """A base that nobody followed: where the other take's stood at first, else level above the floor."""
-    if other is not None:
-        p, R = other.base_p[0], other.base_R[0]
-    else:
-        lowest = min(float(position[:, 2].min()) for position, _ in links.values())
-        p, R = np.array([0, 0, STAND_CLEARANCE - lowest]), np.eye(3)
+def _standing(time: Array, other: Playback | None) -> tuple[Array, Array]:
+    """A base that nobody followed: where the other take's stood at first, else level."""
+    p, R = (other.base_p[0], other.base_R[0]) if other is not None else (np.zeros(3), np.eye(3))
     return np.tile(p, (len(time), 1)), np.tile(R, (len(time), 1, 1))
+
+
+def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
+    """Just clear of the floor."""
+    heights = [played.in_world(link)[0][:, 2].min() for link in played.links]
+    for joint, (points, radii) in foot_points(model.path).items():
+        p, R = played.in_world(model.kinematics.frames[joint].child)
+        heights.append((p[:, None, 2] + R[:, 2] @ points.T - radii).min())
+    up = np.array([0.0, 0.0, STAND_CLEARANCE - min(heights)])
+    return replace(played, base_p=played.base_p + up)
 
 
 def _laid_over(p: Array, R: Array, other: Playback, zeroed: bool) -> tuple[Array, Array]:

@@ -83,7 +83,7 @@ class _Scene:
         where = np.concatenate([p.base_p[:, :2] for p in played])
         self.low, self.high = where.min(axis=0), where.max(axis=0)
         self.middle = (float((self.low + self.high)[0] / 2), float((self.low + self.high)[1] / 2))
-        self.reach = shapes.height + 0.5 * float(np.linalg.norm(self.high - self.low))
+        self.reach = 1.15 * shapes.height + 0.5 * float(np.linalg.norm(self.high - self.low))
         self.meshcat = _quiet_meshcat()
         self.animation = MeshcatAnimation(rate)
         self.copies: list[Copy] = []

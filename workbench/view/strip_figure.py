@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.recording.take import Take
 from workbench.robot.model import RobotModel
-from workbench.view.playback import Playback, common_span, names_of, play
+from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 from workbench.view.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
 
@@ -43,6 +43,7 @@ def film_strip(
             _draw_sticks(axes, model, film, k, shapes.feet, colour, alpha)
             axes.plot([], [], color=colour, label=label)
         axes.set_xlim(100 * middle - reach, 100 * middle + reach)
+        axes.set_ylim(-3, 120 * shapes.height + 100 * STAND_CLEARANCE)
         axes.set_aspect("equal", adjustable="box")
         axes.set_title(f"{time[k]:.1f} s", fontsize=12)
         axes.set_xlabel("forward [cm]")
@@ -69,4 +70,3 @@ def _draw_sticks(
             segments.append(100 * np.array([p[[0, 2]], end[[0, 2]]]))
             widths.append(1.4 if joint is not None and joint[1:2] == "l" and len(joint) == 3 else 2.8)
     axes.add_collection(LineCollection(segments, colors=colour, linewidths=widths, alpha=alpha, capstyle="round", zorder=3))
-    axes.autoscale_view()
