@@ -52,6 +52,25 @@ def test_a_station_run_again_and_a_new_one_give_the_same_to_the_bit(puppy, stati
     assert same(walked, Simulation(puppy).run(walk, 0.6))
 
 
+def test_a_run_leaves_the_takes_before_it_alone(station, walk, walked):
+    before = {f: getattr(walked, f).copy() for f in ("q", "v", "p_WB", "quat_WB")}
+    station.run(duration=0.6)
+    assert all(np.array_equal(getattr(walked, f), b) for f, b in before.items())
+
+
+def test_starts_where_it_is_told(puppy):
+    fixed = Simulation(puppy, SimulationConfig(base="fixed"))
+    q, v = np.zeros(15), np.zeros(15)
+    q[puppy.joints.index("head")], v[puppy.joints.index("head")] = 0.4, 1.0
+    take = fixed.run(duration=0.05, start=(q, v))
+    assert take.time[0] == 0
+    assert take.q[0, take.column("head")] == 0.4
+    assert take.v[0, take.column("head")] == 1.0
+    assert fixed.run(duration=0.05).q[-1, take.column("head")] == pytest.approx(0, abs=0.05)
+    with pytest.raises(InputError, match="held base"):
+        Simulation(puppy).run(duration=0.05, start=(q, v))
+
+
 def test_rests_before_the_first_command(walked):
     assert walked.time[0] == pytest.approx(-0.1)
     assert walked.resting.sum() == 100

@@ -13,12 +13,13 @@ from workbench.motion.commands import Commands
 from workbench.motion.smoothing import interpolate
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
-from workbench.servo import ServoLaw
 from workbench.servo.bank import servo_joints
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.contact import lowest_point
 from workbench.simulation.forces import FootForces
-from workbench.simulation.gantry import AXES, base_poses, gantry_coordinates
+from workbench.simulation.gantry import gantry_coordinates
+from workbench.simulation.logs import RunLogs
+from workbench.simulation.playback import bridged_base, play_back
 from workbench.simulation.reference import linear_trajectory, reference_columns
 
 Array = NDArray[np.float64]
@@ -40,11 +41,8 @@ class Simulation:
             ApplySimulatorConfig(SimulatorConfig(integration_scheme=self.config.integrator, accuracy=self.config.accuracy,
                                                  max_step_size=0.01), self.simulator)
         self._plant_context = self.diagram.GetMutableSubsystemContext(self.plant, self.context)
-        joints = servo_joints(self.plant, model)
-        self._q = np.array([j.position_start() for j in joints], dtype=int)
-        self._v = np.array([j.velocity_start() for j in joints], dtype=int) + self.plant.num_positions()
-        self._joints = joints
-        self._law = ServoLaw.of([model.servo(j) for j in model.joints])
+        self._joints = servo_joints(self.plant, model)
+        self._logs = RunLogs(self.diagram, self.context, model, self.config)
         self._base = self.plant.GetBodyByName(model.base)
         self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
         self._rest: tuple[bytes | None, Context] | None = None
@@ -55,12 +53,15 @@ class Simulation:
         return self.model.joints
 
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
-            trajectory: tuple[Array, Array] | None = None, path: Take | None = None, name: str = "simulation") -> Take:
+            trajectory: tuple[Array, Array] | None = None, path: Take | None = None,
+            start: tuple[Array, Array] | None = None, name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
         default: smoothly through the commands' poses).
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
-        this one (base "path"). Returns a Take with time 0 at the first command.
+        this one (base "path"). start: joint angles and velocities (n,) [rad, rad/s] in self.joints' order at the first
+        command, in place of rest in neutral (base "fixed" or "path"); there is no lead then. Returns a Take with time 0 at
+        the first command.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -73,34 +74,27 @@ class Simulation:
                 duration = commands.end
             else:
                 raise ValueError("expected commands, a trajectory or a duration")
-        lead = self._whole_steps(lead)
+        lead = 0.0 if start is not None else self._whole_steps(lead)
         base_path = self._base_path_to_follow(path, lead, duration)
         self._rest_in_neutral(None if base_path is None else base_path[1][0])
         if base_path is not None:
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
+        if start is not None:
+            self._put(start, commands)
         self._follow(commands, trajectory, lead, duration)
-        contact = self._advance(commands, lead, lead + duration)
-        return self._take(commands, lead, contact, name)
+        sampled, forces = self._advance(commands, lead, lead + duration)
+        t, state = self._logs.read("state")
+        time = t - lead
+        q, v = self._logs.joints(state)
+        p_WB, quat_WB = self._logs.base_path(state)
+        contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
+        return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
+                    p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
+                    commands=commands)
 
     def play_back(self, take: Take) -> Take:
-        """The thesis's animation: the model posed at each frame of a take, joints it did not see in neutral, gaps bridged,
-        velocities by differences; no dynamics. Publishes each pose, so that a visualizer on the diagram shows it."""
-        q = np.zeros((len(take), len(self.joints)))
-        for i, joint in enumerate(self.joints):
-            if joint in take.joints:
-                q[:, i] = _bridged(take.time, take.q[:, take.column(joint)])
-        p, quat = _base_track(take)
-        for t, row, p_WB, quat_WB in zip(take.time, q, p, quat):
-            self.context.SetTime(float(t - take.time[0]))
-            for joint, angle in zip(self._joints, row):
-                joint.set_angle(self._plant_context, angle)
-            if self.config.base == "free":
-                X_WB = RigidTransform(RotationMatrix(_matrix(quat_WB)), p_WB)
-                self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, X_WB)
-            self.diagram.ForcedPublish(self.context)
-        return Take(name=take.name, source="playback", time=take.time, joints=self.joints, q=q, starts_at=take.starts_at,
-                    zeroed=take.zeroed, base=take.base, v=np.asarray(np.gradient(q, take.time, axis=0)), p_WB=p, quat_WB=quat,
-                    bodies=take.bodies, commands=take.commands)
+        """The thesis's animation: the model posed at each frame of a take; see `workbench.simulation.playback`."""
+        return play_back(self.diagram, self.context, self.model, self.config.base, take)
 
     def _whole_steps(self, seconds: float) -> float:
         return round(seconds / self.config.logged_every) * self.config.logged_every
@@ -117,7 +111,7 @@ class Simulation:
         if path is None:
             raise ValueError("base 'path' needs a take to follow")
         times = path.since_start + lead
-        rows = gantry_coordinates(*_base_track(path))
+        rows = gantry_coordinates(*bridged_base(path))
         start = np.array([np.interp(0.0, times, c) for c in rows.T])
         inside = (times > 0) & (times < lead + duration + 0.1)
         return np.concatenate([[0.0], times[inside]]), np.vstack([start, rows[inside]])
@@ -137,9 +131,7 @@ class Simulation:
         self.context.SetTimeStateAndParametersFrom(self._rest[1])
         self.context.SetTime(0.0)
         self._hold_neutral()  # the inputs' values are no part of what was restored
-        for name in _LOGS:
-            if self.diagram.HasSubsystemNamed(name):
-                self.diagram.GetSubsystemByName(name).FindMutableLog(self.context).Clear()
+        self._logs.clear()
 
     def _place_base(self, gantry: Array | None) -> None:
         if gantry is not None:
@@ -158,6 +150,18 @@ class Simulation:
             self._command(neutral, neutral, neutral + 1)
         else:
             self._update_reference(np.array([0.0, 1.0]), np.zeros((2, len(self.joints))))
+
+    def _put(self, start: tuple[Array, Array], commands: Commands | None) -> None:
+        """Starts from given joint angles and velocities, with the ramp of each servo at its first goal."""
+        if self.config.base == "free":
+            raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
+        for joint, angle, rate in zip(self._joints, *start):
+            joint.set_angle(self._plant_context, float(angle))
+            joint.set_angular_rate(self._plant_context, float(rate))
+        if self.config.drive == "servo":
+            bank = self.diagram.GetSubsystemByName("servo_bank")
+            first = start[0] if commands is None else commands.goals[0]
+            bank.SetReference(self.diagram.GetMutableSubsystemContext(bank, self.context), first)
 
     def _centre_base(self) -> None:
         """Takes the millimetres and the heading that settling added out of the state: the floor is the same everywhere."""
@@ -226,51 +230,6 @@ class Simulation:
         stacked = np.array(forces).reshape(len(forces), len(self._foot_forces.feet), 3)
         return np.array(sampled), {foot: stacked[:, i] for i, foot in enumerate(self._foot_forces.feet)}
 
-    def _log(self, name: str) -> tuple[Array, Array]:
-        log = self.diagram.GetSubsystemByName(f"{name}_log").FindLog(self.context)
-        return log.sample_times(), log.data().T
-
-    def _take(self, commands: Commands | None, lead: float, contact: tuple[Array, dict[str, Array]], name: str) -> Take:
-        t, x = self._log("state")
-        q, v = x[:, self._q], x[:, self._v]
-        p, quat = self._base_path(x)
-        time = t - lead
-        sampled, forces = contact
-        foot = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
-        return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
-                    p_WB=p, quat_WB=quat, torque=self._torque(t, q, v, commands, lead), contact=foot, commands=commands)
-
-    def _base_path(self, x: Array) -> tuple[Array, Array]:
-        if self.config.base == "free":
-            start = self._base.floating_positions_start()
-            return x[:, start + 4:start + 7], x[:, start:start + 4]
-        if self.config.base == "path":
-            columns = [self.plant.GetJointByName(f"gantry_{a}").position_start() for a in AXES]
-            return base_poses(x[:, columns])
-        X_WB = self.plant.EvalBodyPoseInWorld(self._plant_context, self._base)
-        return (np.tile(X_WB.translation(), (len(x), 1)),
-                np.tile(X_WB.rotation().ToQuaternion().wxyz(), (len(x), 1)))
-
-    def _torque(self, t: Array, q: Array, v: Array, commands: Commands | None, lead: float) -> Array | None:
-        """Torque of the servos on the joints [N m]: motor less viscous friction, and Coulomb friction, from the logs."""
-        if self.config.drive == "servo" and self.config.time_step == 0 and not self.config.uses_cenic:
-            force = self._log("generalized_force")[1][:, self._v - self.plant.num_positions()]
-            return np.asarray(force - self._law.damping * v)
-        actuation = self._log("net_actuation")[1]
-        last = {self.plant.get_joint_actuator(a).joint().name(): self.plant.get_joint_actuator(a).input_start()
-                for a in self.plant.GetJointActuatorIndices()}
-        drake = actuation[:, [last[j] for j in self.joints]]
-        if self.config.drive == "ideal":
-            return drake
-        if self.config.drive == "fast_servo":
-            return np.asarray(drake - self._law.damping * v)
-        enabled: NDArray[np.bool_] | bool = True
-        if commands is not None and not commands.enabled.all():
-            row = np.clip(np.searchsorted(commands.times, t - lead + 1e-9, side="right") - 1, 0, None)
-            enabled = commands.enabled[row]
-        error = self._log("reference")[1] - q
-        return np.asarray(self._law.motor_torque(error, v, enabled) - self._law.viscous * v + drake)
-
 
 def smooth_through_poses(commands: Commands, step: float) -> tuple[Array, Array]:
     """The motion behind a table: cubics from neutral through each goal at the end of its dwell, at rest at both ends.
@@ -280,27 +239,3 @@ def smooth_through_poses(commands: Commands, step: float) -> tuple[Array, Array]
     rows = np.vstack([np.zeros(len(commands.joints)), commands.goals])
     smooth = interpolate(arrivals, commands.joints, rows, step)
     return smooth.time, smooth.q
-
-
-_LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log")
-
-
-def _bridged(time: Array, values: Array) -> Array:
-    good = np.isfinite(values)
-    return np.interp(time, time[good], values[good]) if good.any() else np.zeros_like(values)
-
-
-def _base_track(take: Take) -> tuple[Array, Array]:
-    """Base path of a take with gaps bridged; at the origin, level, where it was not seen."""
-    n = len(take)
-    if take.p_WB is None or take.quat_WB is None:
-        return np.zeros((n, 3)), np.tile([1.0, 0, 0, 0], (n, 1))
-    p = np.column_stack([_bridged(take.time, c) for c in take.p_WB.T])
-    quat = np.column_stack([_bridged(take.time, c) for c in take.quat_WB.T])
-    return p, quat / np.linalg.norm(quat, axis=1, keepdims=True)
-
-
-def _matrix(quat: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_quat(quat, scalar_first=True).as_matrix())
