@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "export")
+VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "export", "bench")
 
 
 class OneLineParser(argparse.ArgumentParser):
