@@ -169,7 +169,7 @@ def servo_joints(plant: MultibodyPlant, model: RobotModel) -> list[RevoluteJoint
     return out
 
 
-def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction) -> ServoLaw:
+def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction, law: ServoLaw | None = None) -> ServoLaw:
     """Sets on the plant's joints what the servos add to them, in place of what the SDF gave: damping, reflected inertia and,
     where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque).
 
@@ -177,7 +177,7 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction
     reflected inertia is that of its last actuator.
     """
     joints = servo_joints(plant, model)
-    law = ServoLaw.of([model.servo(j.name()) for j in joints])
+    law = law or ServoLaw.of([model.servo(j.name()) for j in joints])
     for i, joint in enumerate(joints):
         actuator = find_actuator(plant, joint)
         joint.set_default_damping(float(law.damping[i]))
@@ -192,7 +192,7 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction
 
 
 def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, period: float | None = None,
-              friction: Friction | None = None) -> ServoBank:
+              friction: Friction | None = None, law: ServoLaw | None = None) -> ServoBank:
     """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
     `moving_speed` inputs are left to connect.
 
@@ -200,17 +200,17 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     the goal ramp: the plant's step, or 1 ms in a continuous one. Takes the plant's applied_generalized_force input and, for
     implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
     default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
-    CENIC's does not: it steps over them and slides on without friction).
+    CENIC's does not: it steps over them and slides on without friction). `law`: in place of the model's nominal constants.
     """
-    if model.effects:
-        raise InputError(None, f"effect '{model.effects[0].effect}' has to be added by workbench.simulation, not by AddServos")
+    if model.effects and law is None:
+        raise InputError(None, f"effect '{model.effects[0].effect}' is for MakePuppyStation: it may change more than servos")
     if friction is None:
         friction = "implicit" if plant.time_step() > 0 else "bristle"
     if friction == "bristle" and plant.time_step() > 0:
         raise InputError(None, "bristle friction needs a continuous plant; a discrete one takes friction='implicit'")
     if plant.is_finalized():
         raise InputError(None, "the plant is finalized already; AddServos changes its joints and finalizes it itself")
-    law = SetServoPhysics(plant, model, friction)
+    law = SetServoPhysics(plant, model, friction, law)
     plant.Finalize()
     joints = servo_joints(plant, model)
     bank = ServoBank(plant, joints, law, period or plant.time_step() or 1e-3,

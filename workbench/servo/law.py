@@ -15,8 +15,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ServoLaw:
-    """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m],
-    back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]."""
+    """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m] and that per
+    volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]."""
 
     gain: Array
     margin: Array
@@ -26,6 +26,7 @@ class ServoLaw:
     viscous: Array
     coulomb: Array
     inertia: Array
+    torque_per_volt: Array
 
     @staticmethod
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
@@ -35,7 +36,8 @@ class ServoLaw:
             return np.array([getattr(s, f) for s in servos], dtype=float)
 
         return ServoLaw(column("gain"), column("margin"), column("punch_duty"), column("torque_at_full_duty"),
-                        column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"))
+                        column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"),
+                        column("stall_torque") / column("rated_voltage"))
 
     @property
     def damping(self) -> Array:

@@ -7,6 +7,7 @@ discrete plants use the dynamic coefficient alone (facts measured on Drake 1.51)
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from pydrake.geometry import (
@@ -85,6 +86,31 @@ def AddGround(plant: MultibodyPlant, scene_graph: SceneGraph, instance: ModelIns
     AddRigidHydroelasticProperties(properties)
     slab = RigidTransform([0, 0, -GROUND_SIZE[2] / 2])  # Drake logs a warning for every half space
     plant.RegisterCollisionGeometry(plant.world_body(), slab, Box(*GROUND_SIZE), "ground", properties)
+
+
+def SetFootContact(plant: MultibodyPlant, scene_graph: SceneGraph, instance: ModelInstanceIndex, friction: Mapping[str, float],
+                   stiffness: float | None) -> None:
+    """Gives feet, by link, a friction of their own with the ground (the pair's), and all contact points a stiffness [N/m] (their
+    own, in series with the ground's). Call after AddGround, before Finalize."""
+    inspector = scene_graph.model_inspector()
+    ground = plant.GetCollisionGeometriesForBody(plant.world_body())[-1]
+    mu_ground = _friction(inspector.GetProximityProperties(ground)) or 0.0
+    for g, link in model_geometries(plant, instance).items():
+        properties = inspector.GetProximityProperties(g)
+        if properties is None or (link not in friction and stiffness is None):
+            continue
+        changed = ProximityProperties(properties)
+        if link in friction:
+            mu = _partner_friction(friction[link], mu_ground)
+            changed.UpdateProperty("material", "coulomb_friction", CoulombFriction(mu, mu))
+        if stiffness is not None:
+            changed.UpdateProperty("material", "point_contact_stiffness", stiffness)
+        scene_graph.AssignRole(plant.get_source_id(), g, changed, RoleAssign.kReplace)
+
+
+def _partner_friction(pair: float, ground: float) -> float:
+    """What gives the pair, 2ab/(a+b), with the ground's; at most 1e3, where the pair should exceed twice the ground's."""
+    return min(pair * ground / (2 * ground - pair), 1e3) if pair < 2 * ground else 1e3
 
 
 def _friction(properties: ProximityProperties) -> float | None:

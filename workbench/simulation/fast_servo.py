@@ -18,7 +18,7 @@ from workbench.servo.bank import HOLDING_DAMPING, find_actuator, servo_joints
 from workbench.simulation.reference import ConnectReference
 
 
-def AddFastServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel) -> None:
+def AddFastServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, law: ServoLaw) -> None:
     """Position gain on each joint's own actuator, Coulomb friction on a second one; finalizes the plant and adds
     "joint_reference".
 
@@ -26,7 +26,6 @@ def AddFastServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotMo
     gains of both and clamps them once.
     """
     joints = servo_joints(plant, model)
-    law = ServoLaw.of([model.servo(j.name()) for j in joints])
     for i, joint in enumerate(joints):
         drive = find_actuator(plant, joint)
         joint.set_default_damping(float(law.damping[i]))

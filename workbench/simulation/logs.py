@@ -21,13 +21,14 @@ LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_lo
 class RunLogs:
     """The logs of a station, read by the names of joints. `context` is the diagram's, after a run."""
 
-    def __init__(self, diagram: RobotDiagram, context: Context, model: RobotModel, config: SimulationConfig) -> None:
+    def __init__(self, diagram: RobotDiagram, context: Context, model: RobotModel, config: SimulationConfig,
+                 law: ServoLaw) -> None:
         self._diagram, self._context, self._model, self._config = diagram, context, model, config
         self._plant = diagram.plant()
         joints = servo_joints(self._plant, model)
         self._q = np.array([j.position_start() for j in joints], dtype=int)
         self._v = np.array([j.velocity_start() for j in joints], dtype=int)
-        self._law = ServoLaw.of([model.servo(j.name()) for j in joints])
+        self._law = law
         actuators = [self._plant.get_joint_actuator(a) for a in self._plant.GetJointActuatorIndices()]
         last = {a.joint().name(): a.input_start() for a in actuators}  # each of a joint's actuators shows the joint's total
         self._u = np.array([last[j.name()] for j in joints if j.name() in last], dtype=int)

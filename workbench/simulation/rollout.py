@@ -9,6 +9,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 
+from workbench.effects.apply import physics_of, played
 from workbench.motion.commands import Commands
 from workbench.motion.smoothing import interpolate
 from workbench.recording.take import Take
@@ -42,7 +43,9 @@ class Simulation:
                                                  max_step_size=0.01), self.simulator)
         self._plant_context = self.diagram.GetMutableSubsystemContext(self.plant, self.context)
         self._joints = servo_joints(self.plant, model)
-        self._logs = RunLogs(self.diagram, self.context, model, self.config)
+        physics = physics_of(model)
+        self._zero = physics.zero
+        self._logs = RunLogs(self.diagram, self.context, model, self.config, physics.law)
         self._base = self.plant.GetBodyByName(model.base)
         self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
         self._rest: tuple[bytes | None, Context] | None = None
@@ -65,8 +68,9 @@ class Simulation:
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
+        sent = commands
         if commands is not None:
-            commands = commands.reordered(self.joints)
+            commands = played(commands.reordered(self.joints), self.model)
         if duration is None:
             if trajectory is not None:
                 duration = float(trajectory[0][-1])
@@ -90,7 +94,7 @@ class Simulation:
         contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
         return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
                     p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
-                    commands=commands)
+                    commands=sent)
 
     def play_back(self, take: Take) -> Take:
         """The thesis's animation: the model posed at each frame of a take; see `workbench.simulation.playback`."""
@@ -173,12 +177,12 @@ class Simulation:
         self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, centred)
 
     def _command(self, goal: Array, speed: Array, enabled: Array) -> None:
-        for port, value in (("goal_position", goal), ("moving_speed", speed), ("torque_enable", enabled)):
+        for port, value in (("goal_position", goal + self._zero), ("moving_speed", speed), ("torque_enable", enabled)):
             self.diagram.GetInputPort(port).FixValue(self.context, value)
 
     def _update_reference(self, times: Array, rows: Array) -> None:
         columns = reference_columns(self.plant, self.model)
-        self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(self._ahead(times, rows[:, columns]))
+        self.diagram.GetSubsystemByName("joint_reference").UpdateTrajectory(self._ahead(times, (rows + self._zero)[:, columns]))
 
     def _ahead(self, times: Array, rows: Array) -> PiecewisePolynomial:
         """A reference one step early: the implicit controllers of a discrete plant act on the state at the end of the step."""

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import ContactModel, DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    ContactModel,
+    DiscreteContactApproximation,
+    ExternallyAppliedSpatialForce,
+    MultibodyPlant,
+)
 from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
-from pydrake.systems.primitives import VectorLogSink
+from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 
-from workbench.robot import ConfigureParser, InputError, RobotModel, puppy_model
+from workbench.effects.apply import Physics, physics_of
+from workbench.robot import ConfigureParser, RobotModel, puppy_model
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.contact import AddGround, SelectFeet
+from workbench.simulation.contact import AddGround, SelectFeet, SetFootContact
 from workbench.simulation.fast_servo import AddFastServos
 from workbench.simulation.gantry import AddGantry, ConnectPath
 from workbench.simulation.reference import ConnectReference
@@ -36,57 +46,77 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
     config = config or SimulationConfig()
     config.check()
     model = model or puppy_model()
-    if model.effects:
-        raise InputError(None, f"effect '{model.effects[0].effect}' is not known to this version of the simulation")
+    physics = physics_of(model)
     model.check_base(floating=config.base == "free")
     builder = RobotDiagramBuilder(time_step=config.time_step)
     plant = builder.plant()
-    instance = _add_model(builder, model)
+    instance = _add_model(builder, model, physics)
+    plant.mutable_gravity_field().set_gravity_vector(physics.gravity)
     if config.time_step > 0:
         plant.set_discrete_contact_approximation(_APPROXIMATIONS[config.approximation])
     plant.set_contact_model(ContactModel.kPoint if config.contact == "point" else ContactModel.kHydroelasticWithFallback)
     SelectFeet(plant, builder.scene_graph(), instance, config.contact, config.hydroelastic_modulus)
     if config.base == "free":
-        AddGround(plant, builder.scene_graph(), instance, model.ground)
+        AddGround(plant, builder.scene_graph(), instance, physics.ground)
+        SetFootContact(plant, builder.scene_graph(), instance, _feet(model, physics.foot_friction), physics.foot_stiffness)
     elif config.base == "fixed" and not model.kinematics.fixed_to_world:
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(model.base, instance), RigidTransform([0, 0, 1.0]))
     elif config.base == "path":
         AddGantry(builder, model.base, instance)
     plant.SetUseSampledOutputPorts(False)  # a step solved for a log serves the update that follows; faster than sampling
-    _add_drive(builder, plant, model, config)
+    _add_drive(builder, plant, model, config, physics)
+    if physics.tether.any():
+        _add_tether(builder, plant, model.base, physics.tether)
     if config.base == "path":
         ConnectPath(builder)
     _add_logs(builder, plant, config)
     return builder.Build()
 
 
-def _add_model(builder: RobotDiagramBuilder, model: RobotModel) -> ModelInstanceIndex:
+def _add_model(builder: RobotDiagramBuilder, model: RobotModel, physics: Physics) -> ModelInstanceIndex:
     parser = builder.parser()
     ConfigureParser(parser)
+    if physics.description is not None:
+        return parser.AddModelsFromString(physics.description, "sdf")[0]
     return parser.AddModels(str(model.path))[0]
 
 
-def _add_drive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, config: SimulationConfig) -> None:
+def _feet(model: RobotModel, friction: Mapping[str, float]) -> dict[str, float]:
+    """Pair friction by the foot's link."""
+    return {model.kinematics.frames[foot].child: value for foot, value in friction.items()}
+
+
+def _add_tether(builder: RobotDiagramBuilder, plant: MultibodyPlant, base: str, force: np.ndarray) -> None:
+    pull = ExternallyAppliedSpatialForce()
+    pull.body_index = plant.GetBodyByName(base).index()
+    pull.F_Bq_W = SpatialForce(np.zeros(3), force)
+    source = builder.builder().AddSystem(ConstantValueSource(Value([pull])))
+    source.set_name("tether")
+    builder.builder().Connect(source.get_output_port(), plant.get_applied_spatial_force_input_port())
+
+
+def _add_drive(
+    builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, config: SimulationConfig, physics: Physics
+) -> None:
     diagram = builder.builder()
     if config.drive == "servo":
         implicit = config.time_step > 0 or config.uses_cenic
-        bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle")
+        bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle", law=physics.law)
         for port in ("goal_position", "moving_speed", "torque_enable"):
             diagram.ExportInput(bank.GetInputPort(port), port)
         for port in ("motor_torque", "duty", "reference"):
             diagram.ExportOutput(bank.GetOutputPort(port), port)
     elif config.drive == "fast_servo":
-        AddFastServos(diagram, plant, model)
+        AddFastServos(diagram, plant, model, physics.law)
     elif config.drive == "ideal":
-        AddIdealDrive(builder, plant, model)
+        AddIdealDrive(builder, plant, model, physics.law)
     else:
         plant.Finalize()
 
 
-def AddIdealDrive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel) -> None:
+def AddIdealDrive(builder: RobotDiagramBuilder, plant: MultibodyPlant, model: RobotModel, law: ServoLaw) -> None:
     """Joints that follow "joint_reference" whatever it takes: Drake's implicit PD, stiff and without an effort limit."""
     joints = servo_joints(plant, model)
-    law = ServoLaw.of([model.servo(j.name()) for j in joints])
     for joint, inertia in zip(joints, law.inertia):
         actuator = find_actuator(plant, joint)
         joint.set_default_damping(0.0)

@@ -1,0 +1,82 @@
+"""A model with its effects worked in: what stations are built from, and motions played with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, check_places, si_values
+from workbench.effects.registry import effect_named
+from workbench.effects.sdf import SdfRobot
+from workbench.motion.commands import Commands
+from workbench.recording.recording import Measurement
+from workbench.robot import EffectSpec, Ground, RobotModel
+from workbench.servo import ServoLaw
+
+Array = NDArray[np.float64]
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
+    coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle. tether: (3,) [N]."""
+
+    description: str | None
+    law: ServoLaw
+    ground: Ground
+    foot_friction: Mapping[str, float]
+    foot_stiffness: float | None
+    gravity: Array
+    tether: Array
+    zero: Array
+
+
+def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
+    """Each effect of a model with its spec and its values in SI, checked; InputError names what is wrong."""
+    for spec in model.effects:
+        effect = effect_named(spec.effect)
+        check_places(effect, spec, model)
+        yield effect, spec, si_values(effect, spec)
+
+
+def physics_of(model: RobotModel) -> Physics:
+    """The model's physics, effects applied in their order."""
+    law = ServoLaw.of([model.servo(j) for j in model.joints])
+    ground, gravity, tether = model.ground, np.array(GRAVITY), np.zeros(3)
+    zero = np.zeros(len(model.joints))
+    friction: dict[str, float] = {}
+    stiffness: float | None = None
+    sdf: SdfRobot | None = None
+    for effect, spec, values in resolved(model):
+        columns = np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=int)
+        law = effect.law(law, columns, values)
+        ground = effect.ground(ground, values)
+        gravity = effect.gravity(gravity, values)
+        zero[columns] += effect.zero(values)
+        pull, slip, soft = effect.tether(values), effect.foot_friction(values), effect.foot_stiffness(values)
+        tether = tether if pull is None else tether + pull
+        stiffness = stiffness if soft is None else soft
+        if slip is not None:
+            friction |= dict.fromkeys(spec.where, slip)
+        if type(effect).description is not Effect.description:
+            sdf = sdf or SdfRobot(model.path)
+            effect.description(sdf, spec, model)
+    return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero)
+
+
+def played(commands: Commands, model: RobotModel) -> Commands:
+    """What reaches the servos of commands that were sent."""
+    for effect, spec, values in resolved(model):
+        commands = effect.commands(commands, spec.where, values, model)
+    return commands
+
+
+def seen(measurement: Measurement, model: RobotModel) -> Measurement:
+    """How the cameras look at a robot with these effects."""
+    for effect, spec, _ in resolved(model):
+        measurement = effect.measurement(measurement, spec)
+    return measurement

@@ -1,0 +1,143 @@
+"""What an effect is: one piece of physics beyond the nominal model, with hooks into what it changes.
+
+An effect is one file with one subclass of Effect and its instance EFFECT. It is plain: all state is in EffectSpec. A station
+asks for its description (SDF), law (servo constants), ground, gravity and forces, a run for its commands, a comparison for its
+measurement. Another package adds effects through entry points in the group "workbench.effects" that name an Effect instance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+from workbench.recording.recording import Measurement
+from workbench.robot import EffectSpec, Ground, InputError, RobotModel
+from workbench.servo import ServoLaw
+
+if TYPE_CHECKING:
+    from workbench.effects.sdf import SdfRobot
+
+Array = NDArray[np.float64]
+Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
+Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
+Value = float | tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of an effect, in the contract's unit; `si` times it is SI. low, high: what is physically possible. typical: where
+    it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    si: float = 1.0
+    vector: bool = False
+
+
+DEGREE = math.pi / 180
+
+
+class Effect:
+    """Base of all effects; hooks do nothing unless overridden. `values` are in SI, by parameter name."""
+
+    name: ClassVar[str]
+    layer: ClassVar[Layer]
+    places: ClassVar[tuple[Place, ...]]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+
+    def sentence(self, spec: EffectSpec) -> str:
+        """For a person: what is different about this robot."""
+        raise NotImplementedError
+
+    def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
+        """Changes the robot's SDF."""
+
+    def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
+        """Servo constants of the joints in `columns` changed."""
+        return law
+
+    def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
+        """The floor changed."""
+        return ground
+
+    def foot_friction(self, values: Mapping[str, float]) -> float | None:
+        """Friction of the pair foot and ground, for the feet named in `where`; None: unchanged."""
+        return None
+
+    def foot_stiffness(self, values: Mapping[str, float]) -> float | None:
+        """Stiffness [N/m] of each contact point on the ground; None: unchanged."""
+        return None
+
+    def zero(self, values: Mapping[str, float]) -> float:
+        """Link angle less servo angle [rad] of the joints named in `where`."""
+        return 0.0
+
+    def gravity(self, gravity: Array, values: Mapping[str, float]) -> Array:
+        """Gravity (3,) [m/s^2] in the floor's frame changed."""
+        return gravity
+
+    def tether(self, values: Mapping[str, float]) -> Array | None:
+        """Force (3,) [N] on the base link's origin in W; None: none."""
+        return None
+
+    def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
+        """What reaches the servos, and when, changed."""
+        return commands
+
+    def measurement(self, measurement: Measurement, spec: EffectSpec) -> Measurement:
+        """How the robot is seen changed."""
+        return measurement
+
+
+def scalar(spec: EffectSpec, name: str) -> float:
+    """A parameter that is one number, in the contract's unit."""
+    value = spec.parameters[name]
+    assert not isinstance(value, tuple)
+    return value
+
+
+def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
+    """Scalar parameters of a spec in SI; InputError names one that is missing, unknown, or out of range."""
+    out: dict[str, float] = {}
+    for p in effect.parameters:
+        if p.name not in spec.parameters:
+            raise InputError(None, f"effect '{spec.effect}': parameter '{p.name}' [{p.unit}] is missing")
+        value = spec.parameters[p.name]
+        if p.vector != isinstance(value, tuple):
+            raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {'three numbers' if p.vector else 'one number'}")
+        for v in value if isinstance(value, tuple) else (value,):
+            if not p.low <= v <= p.high:
+                raise InputError(None, f"effect '{spec.effect}': '{p.name}' is {v:g} {p.unit}; expected {p.low:g} to {p.high:g}")
+        if isinstance(value, tuple):
+            out |= {f"{p.name}.{i}": v * p.si for i, v in enumerate(value)}
+        else:
+            out[p.name] = value * p.si
+    unknown = set(spec.parameters) - {p.name for p in effect.parameters}
+    if unknown:
+        raise InputError(None, f"effect '{spec.effect}': unknown parameter '{min(unknown)}'")
+    return out
+
+
+def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
+    """InputError unless `where` names what the model has and the effect can act on."""
+    k = model.kinematics
+    feet = tuple(j for j in model.joints if j in k.frames and not any(f.parent == k.frames[j].child for f in k.frames.values()))
+    known: dict[str, tuple[str, ...]] = {
+        "joint": model.joints, "foot": feet, "link": k.links, "rigid_body": tuple(model.rigid_bodies), "robot": ()}
+    if not spec.where:
+        if "robot" not in effect.places:
+            raise InputError(None, f"effect '{spec.effect}': where is empty; expected one {' or '.join(effect.places)}")
+        return
+    allowed = {name for place in effect.places for name in known[place]}
+    for name in spec.where:
+        if name not in allowed:
+            raise InputError(None, f"effect '{spec.effect}': where: '{name}' is no {' or '.join(effect.places)} of this robot")

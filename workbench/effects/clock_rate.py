@@ -1,0 +1,28 @@
+"""The controller's clock runs slower or faster than the recording's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from workbench.effects.base import Effect, Parameter
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+
+class ClockRate(Effect):
+    """The controller's clock runs slower or faster than the recording's."""
+
+    name = "clock_rate"
+    layer = "timing"
+    places = ("robot",)
+    parameters = (Parameter("ratio", "1", 0.5, 2.0, 1.01),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"A second of the commands takes {spec.parameters['ratio']:.4f} s of the recording."
+
+    def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
+        return replace(commands, times=commands.times * values["ratio"], end=commands.end * values["ratio"])
+
+
+EFFECT = ClockRate()

@@ -1,0 +1,28 @@
+"""Commands reach the servos late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.effects.schedules import delayed
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+
+class CommandDelay(Effect):
+    """Commands reach the servos late."""
+
+    name = "command_delay"
+    layer = "timing"
+    places = ("joint", "robot",)
+    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * scalar(spec, 'delay'):.1f} ms late."
+
+    def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
+        return delayed(commands, [commands.joints.index(j) for j in where] or range(len(commands.joints)), values["delay"])
+
+
+EFFECT = CommandDelay()

@@ -1,0 +1,41 @@
+"""Poses are missed by a servo, by chance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+SEED = 0
+"""Which poses are missed differs from take to take; a simulation shows one draw, always the same."""
+
+
+class DroppedCommand(Effect):
+    """Poses are missed by a servo, by chance."""
+
+    name = "dropped_command"
+    layer = "timing"
+    places = ("joint",)
+    parameters = (Parameter("probability", "1", 0.0, 1.0, 0.1),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"{', '.join(spec.where)} misses {100 * scalar(spec, 'probability'):.0f} % of its poses."
+
+    def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
+        chance = np.random.default_rng(SEED)
+        goals, speeds = commands.goals.copy(), commands.speeds.copy()
+        for joint in where:
+            c = commands.joints.index(joint)
+            missed = chance.random(len(commands.times)) < values["probability"]
+            for k in np.flatnonzero(missed):
+                goals[k, c] = goals[k - 1, c] if k else 0.0
+                speeds[k, c] = speeds[k - 1, c] if k else 0.0
+        return replace(commands, goals=goals, speeds=speeds)
+
+
+EFFECT = DroppedCommand()

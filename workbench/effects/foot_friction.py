@@ -1,0 +1,26 @@
+"""One foot slides more or less easily than the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from workbench.effects.base import Effect, Parameter
+from workbench.robot import EffectSpec
+
+
+class FootFriction(Effect):
+    """One foot slides more or less easily than the others."""
+
+    name = "foot_friction"
+    layer = "ground"
+    places = ("foot",)
+    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"Friction of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."
+
+    def foot_friction(self, values: Mapping[str, float]) -> float:
+        return values["friction"]
+
+
+EFFECT = FootFriction()

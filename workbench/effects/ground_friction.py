@@ -1,0 +1,27 @@
+"""All feet slide more or less easily on this floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from workbench.effects.base import Effect, Parameter
+from workbench.robot import EffectSpec, Ground
+
+
+class GroundFriction(Effect):
+    """All feet slide more or less easily on this floor."""
+
+    name = "ground_friction"
+    layer = "ground"
+    places = ("robot",)
+    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"Friction of feet and floor is {spec.parameters['friction']:.2f}."
+
+    def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
+        return replace(ground, friction=values["friction"])
+
+
+EFFECT = GroundFriction()

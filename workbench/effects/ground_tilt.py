@@ -1,0 +1,33 @@
+"""The floor is not level: gravity leans forward or left in its frame; a stand stands on the same floor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from workbench.effects.base import DEGREE, Array, Effect, Parameter
+from workbench.robot import EffectSpec
+
+
+class GroundTilt(Effect):
+    """The floor is not level: gravity leans forward or left in its frame; a stand stands on the same floor."""
+
+    name = "ground_tilt"
+    layer = "ground"
+    places = ("robot",)
+    parameters = (
+        Parameter("forward", "deg", -30.0, 30.0, 1.0, si=DEGREE),
+        Parameter("left", "deg", -30.0, 30.0, 1.0, si=DEGREE),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        forward, left = spec.parameters["forward"], spec.parameters["left"]
+        return f"Gravity leans {forward:.1f} deg forward and {left:.1f} deg to the left of the floor's normal."
+
+    def gravity(self, gravity: Array, values: Mapping[str, float]) -> Array:
+        size = np.linalg.norm(gravity)
+        lean = np.array([np.tan(values["forward"]), np.tan(values["left"]), -1.0])
+        return np.asarray(size * lean / np.linalg.norm(lean))
+
+
+EFFECT = GroundTilt()

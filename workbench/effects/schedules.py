@@ -1,0 +1,30 @@
+"""Command schedules in which joints get their poses at different times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.motion.commands import Commands
+
+
+def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands:
+    """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last."""
+    columns = list(columns)
+    if not late:
+        return commands
+    if len(columns) == len(commands.joints):
+        return replace(commands, times=commands.times + late, end=commands.end + late)
+    times = np.union1d(commands.times, commands.times + late)
+    shift = np.zeros(len(commands.joints))
+    shift[columns] = late
+    row = np.array([np.searchsorted(commands.times, times - s + 1e-9, side="right") - 1 for s in shift]).T  # (times, joints)
+    column = np.arange(len(commands.joints))
+    waiting = row < 0  # still in neutral
+    held = np.maximum(row, 0)
+    return Commands(times, commands.joints, np.where(waiting, 0.0, commands.goals[held, column]),
+                    np.where(waiting, 0.0, commands.speeds[held, column]),
+                    np.where(waiting, True, commands.enabled[held, column]), commands.end + late,
+                    commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)])

@@ -1,0 +1,26 @@
+"""Feet sink into the floor, or their rubber is soft."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from workbench.effects.base import Effect, Parameter
+from workbench.robot import EffectSpec
+
+
+class SoftGround(Effect):
+    """Feet sink into the floor, or their rubber is soft."""
+
+    name = "soft_ground"
+    layer = "ground"
+    places = ("robot",)
+    parameters = (Parameter("stiffness", "N/m", 200.0, 1e7, 5e3),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"Each contact point of a foot is as soft as {spec.parameters['stiffness']:.0f} N/m."
+
+    def foot_stiffness(self, values: Mapping[str, float]) -> float:
+        return values["stiffness"]
+
+
+EFFECT = SoftGround()

@@ -1,0 +1,34 @@
+"""The k-th bus ID got the speed of the k-th name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from workbench.effects.base import Effect
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, InputError, RobotModel
+
+
+class SpeedOrder(Effect):
+    """The k-th bus ID got the speed of the k-th name: figure 3.4 of the thesis lists goals by ID and speeds by name."""
+
+    name = "speed_order"
+    layer = "timing"
+    places = ("robot",)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return "Every servo runs at another servo's speed: goals went out in the order of bus IDs, speeds in the order of names."
+
+    def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
+        missing = [j for j in commands.joints if j not in model.bus_ids]
+        if missing:
+            raise InputError(None, f"effect 'speed_order': joint '{missing[0]}' has no bus ID")
+        by_id = sorted(commands.joints, key=lambda j: model.bus_ids[j])
+        speeds = commands.speeds.copy()
+        for k, joint in enumerate(by_id):
+            speeds[:, commands.joints.index(joint)] = commands.speeds[:, commands.joints.index(sorted(commands.joints)[k])]
+        return replace(commands, speeds=speeds)
+
+
+EFFECT = SpeedOrder()

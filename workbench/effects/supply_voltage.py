@@ -1,0 +1,31 @@
+"""The supply is not at its nominal voltage: every servo has that share of its stall torque and no-load speed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter
+from workbench.robot import EffectSpec
+from workbench.servo import ServoLaw
+
+
+class SupplyVoltage(Effect):
+    """The supply is not at its nominal voltage: every servo has that share of its stall torque and no-load speed."""
+
+    name = "supply_voltage"
+    layer = "actuator"
+    places = ("robot",)
+    parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"The servos see {spec.parameters['voltage']:.1f} V."
+
+    def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
+        return replace(law, full_torque=law.torque_per_volt * values["voltage"])
+
+
+EFFECT = SupplyVoltage()

@@ -1,0 +1,28 @@
+"""A cable pulls at the robot with a steady force."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from workbench.effects.base import Array, Effect, Parameter
+from workbench.robot import EffectSpec
+
+
+class TetherForce(Effect):
+    """A cable pulls at the robot with a steady force."""
+
+    name = "tether_force"
+    layer = "ground"
+    places = ("robot",)
+    parameters = (Parameter("force", "N", -20.0, 20.0, 0.3, vector=True),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return "Something pulls at the base with ({:.2f}, {:.2f}, {:.2f}) N.".format(*spec.parameters["force"])  # type: ignore[misc]
+
+    def tether(self, values: Mapping[str, float]) -> Array:
+        return np.array([values[f"force.{i}"] for i in range(3)])
+
+
+EFFECT = TetherForce()

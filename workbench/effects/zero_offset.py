@@ -1,0 +1,26 @@
+"""The horn sits turned on its shaft: link angle less servo angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from workbench.effects.base import DEGREE, Effect, Parameter
+from workbench.robot import EffectSpec
+
+
+class ZeroOffset(Effect):
+    """The horn sits turned on its shaft: link angle less servo angle."""
+
+    name = "zero_offset"
+    layer = "structure"
+    places = ("joint",)
+    parameters = (Parameter("angle", "deg", -45.0, 45.0, 2.0, si=DEGREE),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"{', '.join(spec.where)} stands {spec.parameters['angle']:.1f} deg off its servo's zero."
+
+    def zero(self, values: Mapping[str, float]) -> float:
+        return values["angle"]
+
+
+EFFECT = ZeroOffset()
