@@ -1,6 +1,8 @@
 # `make demo` and `make test` need Python 3.11 or newer, make and git; the rest is installed into .venv at the first call.
 
-PYTHON := $(shell command -v python3.11 || command -v python3)
+# The first that runs and is new enough; a name on the path may be a shim for a version that is not there.
+PYTHON := $(shell for p in python3.11 python3 python3.12 python3.13; do \
+  $$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && command -v $$p && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
@@ -22,13 +24,16 @@ lint: $(STAMP)
 prove: $(STAMP)
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile -m slow
 
-studies: $(STAMP)
-	@set -e; for study in studies/*/study.py studies/*.py; do \
-	  if [ -e "$$study" ]; then echo "== $$study"; $(BIN)/python "$$study"; fi; done
+# Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one.
+STUDIES := $(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py)) \
+           $(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py))
 
-# Libraries of the operating system that no Python package brings; installs what is missing where that is allowed.
+studies: $(STAMP)
+	@set -e; for study in $(STUDIES); do echo "== $$study"; $(BIN)/python -m studies.$$study; done
+
+# What no Python package brings; installs what is missing where that is allowed. FOR=tests adds what some tests need.
 system:
-	@.ci/system "$(PYTHON)"
+	@.ci/system "$(PYTHON)" $(FOR)
 
 $(STAMP): pyproject.toml
 	@.ci/system "$(PYTHON)"
