@@ -71,9 +71,9 @@ class ServoBank(LeafSystem):
         self._slope = law.gain * law.full_torque  # of the law as torque over |error|, before it is cut
         self._offset = law.punch * law.full_torque - self._slope * law.margin
         self._cached_command = self.DeclareCacheEntry(
-            "command", ValueProducer(allocate=lambda: AbstractValue.Make((np.zeros(n), None)),
+            "command", ValueProducer(allocate=lambda: AbstractValue.Make((np.zeros(n), np.zeros(n), np.zeros(n), None)),
                                      calc=lambda context, value: value.set_value(self._calc_command(context))),
-            {self._speed.ticket(), self._enable.ticket()})
+            {self._goal.ticket(), self._speed.ticket(), self._enable.ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._advance)
         state = {self._state.ticket(), self._enable.ticket(), self.xd_ticket()}
         force_state = state | ({self.xc_ticket()} if bristles else set())
@@ -90,20 +90,21 @@ class ServoBank(LeafSystem):
         """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
         context.SetDiscreteState(np.asarray(reference, dtype=float))
 
-    def _command(self, context: Context) -> tuple[Array, NDArray[np.bool_] | None]:
-        """How far the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all; cached while inputs last."""
+    def _command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
+        """Goal (n,) [rad], how far down and up the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all;
+        cached while inputs last."""
         return self._cached_command.Eval(context)  # type: ignore[no-any-return]
 
-    def _calc_command(self, context: Context) -> tuple[Array, NDArray[np.bool_] | None]:
+    def _calc_command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
         speed = self._speed.Eval(context)
         step = np.where(speed > 0, speed * self._period, np.inf)
         on = self._enable.Eval(context) > 0.5 if self._enable.HasValue(context) else None
-        return step, None if on is None or on.all() else on
+        return self._goal.Eval(context), -step, step, None if on is None or on.all() else on
 
     def _advance(self, context: Context, values: DiscreteValues) -> None:
-        step, on = self._command(context)
+        goal, down, up, on = self._command(context)
         reference = context.get_discrete_state_vector().value()
-        new = reference + np.minimum(np.maximum(self._goal.Eval(context) - reference, -step), step)
+        new = reference + np.minimum(np.maximum(goal - reference, down), up)
         if on is not None:  # the ramp starts at the measured position once torque is back
             new = np.where(on, new, self._state.Eval(context)[self._q])
         values.set_value(new)
@@ -114,7 +115,7 @@ class ServoBank(LeafSystem):
         size = np.abs(error)
         size = np.minimum(self._offset + self._slope * size, self.law.full_torque) * (size > self.law.margin)
         torque = np.copysign(size, error)
-        on = self._command(context)[1]
+        on = self._command(context)[3]
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             torque = np.where(on, torque, self.law.back_emf * x[self._x_v])
         if self._bristles:
@@ -139,12 +140,12 @@ class ServoBank(LeafSystem):
             derivatives.SetFromVector(self._bristle_rate(context, self._state.Eval(context)[self._x_v])[1])
 
     def _calc_motor_torque(self, context: Context, output: BasicVector) -> None:
-        x, on = self._state.Eval(context), self._command(context)[1]
+        x, on = self._state.Eval(context), self._command(context)[3]
         error = context.get_discrete_state_vector().value() - x[self._q]
         output.SetFromVector(self.law.motor_torque(error, x[self._x_v], True if on is None else on))
 
     def _calc_duty(self, context: Context, output: BasicVector) -> None:
-        on = self._command(context)[1]
+        on = self._command(context)[3]
         error = context.get_discrete_state_vector().value() - self._state.Eval(context)[self._q]
         output.SetFromVector(self.law.duty(error) * (1.0 if on is None else on))
 
