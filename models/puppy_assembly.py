@@ -87,7 +87,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
     tail = np.array([tail_x, 0.0, 0.0])
 
     body = Link("body_link", np.zeros(3), None, None, (
-        *(place("ax12a", (servo_x, s * hip_y, 0), z=X, y=s * Y) for s in (1, -1)),
+        *(place("ax12a", (servo_x, s * hip_y, 0), z=-X, y=s * Y) for s in (1, -1)),
         place("ax12a", tail, z=-Y, y=-X),
         place("ax12a", neck, z=-Y, y=X),
         place("body_frame", (0, 0, BODY_Z)),
@@ -98,7 +98,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
     ))
     back_servo = np.array([-servo_x, 0, 0]) - tail
     tail_link = Link("tail_link", tail, "tail", "body_link", (
-        *(place("ax12a", back_servo + s * hip_y * Y, z=-X, y=s * Y) for s in (1, -1)),
+        *(place("ax12a", back_servo + s * hip_y * Y, z=X, y=s * Y) for s in (1, -1)),
         place("f2", z=Y, y=X),
         place("tail_frame", back_servo - BODY_Z * Z),
     ))
@@ -118,17 +118,17 @@ def _leg(leg: str, d: Mapping[str, float], hip_x: float, hip_y: float) -> list[L
     bottom = middle - [0, 0, d["thigh"]]
     length = d["front_shank"] if front else d["back_shank"]
     foot_x = 0.0 if front else d["back_foot_offset"]
-    inwards = -side * Y  # where the horns of the leg's servos look: what their signs say (data/joint_signs.csv)
+    horn = -ahead * side * Y  # where the horns of the leg's servos look: what their signs say (data/joint_signs.csv)
     lower = place("f2", z=Y, y=Z) if front else place("f1", x=-X, y=Z)
     base = (26 if front else 23) * MM
     return [
         Link(f"{leg}t_link", top, f"{leg}t", "body_link" if front else "tail_link",
              (place("f1", (0, 0, -d["top_to_middle"]), x=Z, y=ahead * X),)),
         Link(f"{leg}m_link", middle, f"{leg}m", f"{leg}t_link", (
-            place("ax12a", z=inwards, y=Z),
+            place("ax12a", z=horn, y=Z),
             place("f3", (0, 0, -40.5 * MM), x=Y, y=X),
             place("f3", (0, 0, -42.5 * MM), x=Y, y=-X),
-            place("ax12a", (0, 0, -d["thigh"]), z=inwards, y=-Z),
+            place("ax12a", (0, 0, -d["thigh"]), z=horn, y=-Z),
             place("leg_hardware", (0, 0, -41.5 * MM)),
         )),
         Link(f"{leg}b_link", bottom, f"{leg}b", f"{leg}m_link", (
