@@ -18,7 +18,8 @@ class Progress:
     new `what`, and one every five seconds within it.
     """
 
-    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float = QUIET) -> None:
+    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None) -> None:
+        quiet = QUIET if quiet is None else quiet
         self._verb = verb
         self._stream = sys.stderr if stream is None else stream
         self._tty = self._stream.isatty()
