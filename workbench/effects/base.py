@@ -58,6 +58,10 @@ class Effect:
         """For a person: what is different about this robot."""
         raise NotImplementedError
 
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        """The values, in the contract's units, at which the effect vanishes; infinity for a stiffness or a ceiling."""
+        return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
+
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         """Changes the robot's SDF."""
 

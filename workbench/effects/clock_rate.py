@@ -21,6 +21,9 @@ class ClockRate(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         return f"A second of the commands takes {spec.parameters['ratio']:.4f} s of the recording."
 
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0,)
+
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
         return replace(commands, times=commands.times * values["ratio"], end=commands.end * values["ratio"])
 

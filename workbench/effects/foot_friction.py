@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from workbench.effects.base import Effect, Parameter
-from workbench.robot import EffectSpec
+from workbench.robot import EffectSpec, RobotModel
 
 
 class FootFriction(Effect):
@@ -18,6 +18,9 @@ class FootFriction(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Friction of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0 if model.ground.friction is None else model.ground.friction,)
 
     def foot_friction(self, values: Mapping[str, float]) -> float:
         return values["friction"]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from workbench.effects.base import Effect, Parameter
-from workbench.robot import EffectSpec, Ground
+from workbench.robot import EffectSpec, Ground, RobotModel
 
 
 class GroundFriction(Effect):
@@ -19,6 +19,9 @@ class GroundFriction(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Friction of feet and floor is {spec.parameters['friction']:.2f}."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0 if model.ground.friction is None else model.ground.friction,)
 
     def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
         return replace(ground, friction=values["friction"])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
-from workbench.robot import EffectSpec
+from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
 
 
@@ -23,6 +23,9 @@ class ServoGain(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The position law of {', '.join(spec.where)} is {spec.parameters['ratio']:.2f} times as steep as nominal."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0,)
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         gain = law.gain.copy()

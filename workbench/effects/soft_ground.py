@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from workbench.effects.base import Effect, Parameter
-from workbench.robot import EffectSpec
+from workbench.robot import EffectSpec, RobotModel
 
 
 class SoftGround(Effect):
@@ -18,6 +19,9 @@ class SoftGround(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Each contact point of a foot is as soft as {spec.parameters['stiffness']:.0f} N/m."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (math.inf,)
 
     def foot_stiffness(self, values: Mapping[str, float]) -> float:
         return values["stiffness"]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
-from workbench.robot import EffectSpec
+from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
 
 
@@ -23,6 +23,9 @@ class SupplyVoltage(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The servos see {spec.parameters['voltage']:.1f} V."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (float(np.mean([model.servo(j).supply_voltage for j in model.joints])),)
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         return replace(law, full_torque=law.torque_per_volt * values["voltage"])
