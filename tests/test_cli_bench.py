@@ -1,0 +1,105 @@
+"""The bench measures what it says, at a size that tests can afford; the figures themselves belong to a quiet machine."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.command import refused, succeeds
+from workbench.motion import load_motion
+from workbench.robot import data_file, puppy_model
+from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation.bench import drives, engine
+from workbench.simulation.bench.bare_plant import BarePlant
+from workbench.simulation.bench.figure import Figure, in_turns, median_and_quartiles
+
+
+@pytest.fixture(scope="module")
+def puppy():
+    return puppy_model()
+
+
+@pytest.fixture(scope="module")
+def walk(puppy):
+    return load_motion(data_file("robotis_walk.csv"), puppy).commands(2)
+
+
+def test_quick_bench_prints_and_writes_every_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "new" / "bench.json"
+    said = json.loads(succeeds(capsys, "bench", "--quick", "--out", str(out)))
+    assert json.loads(out.read_text()) == said
+    assert said["format"] == 1
+    assert said["quick"]
+    assert said["machine"]["cores"] >= 1
+    assert {"workbench", "drake", "numpy", "pandas"} <= set(said["versions"])
+    assert said["seconds"] > 0
+    plausible = {"station_against_bare_plant": (0.2, 3), "station_with_contact_forces_against_bare_plant": (0.2, 3),
+                 "station_against_mujoco_fixed_base": (0.01, 2), "station_against_mujoco_free_base": (0.01, 2),
+                 "fast_servo_and_larger_steps": (1, 20), "motive_reader_against_pandas": (0.1, 20),
+                 "batch_on_two_processes": (0.1, 4)}
+    assert set(said["figures"]) == set(plausible)
+    required = set()
+    for name, figure in said["figures"].items():
+        assert figure["meaning"]
+        if "skipped" in figure:
+            assert "mujoco" in name
+            continue
+        low, high = plausible[name]
+        assert low < figure["value"] < high, (name, figure)
+        if "requirement" in figure:
+            required.add(name)
+            within = figure["value"] >= figure["requirement"].get("at_least", 0)
+            assert figure["met"] == (within and figure["value"] < figure["requirement"].get("below", np.inf))
+    assert required == {n for n in plausible if "mujoco" not in n and "fast" not in n}
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "expected a file" in refused(capsys, "bench", "--out", str(tmp_path))
+    (tmp_path / "file").write_text("")
+    assert "is a file" in refused(capsys, "bench", "--out", str(tmp_path / "file" / "bench.json"))
+
+
+def test_runs_take_turns_after_one_to_warm_up() -> None:
+    order: list[str] = []
+    ticks = iter([0.0, 1.0, 2.0, 5.0, 10.0, 12.0, 20.0, 21.0])
+    seconds = in_turns({"a": lambda: order.append("a"), "b": lambda: order.append("b")}, 2, lambda: next(ticks))
+    assert order == ["a", "b"] * 3
+    assert seconds["a"].tolist() == [1, 2]
+    assert seconds["b"].tolist() == [3, 1]
+    assert median_and_quartiles(np.array([1.0, 2.0, 3.0, 4.0, 5.0])) == (3, (2, 4))
+
+
+def test_a_requirement_is_met_or_not_or_open() -> None:
+    assert Figure("f", "", 0.7, at_least=0.7).met
+    assert not Figure("f", "", 0.69, at_least=0.7, aim=0.5).met
+    assert not Figure("f", "", 2.0, below=2.0).met
+    assert Figure("f", "", 0.5).met is None
+    assert Figure("f", "", skipped="why", at_least=1.0).to_json() == {
+        "meaning": "", "requirement": {"at_least": 1.0}, "skipped": "why"}
+
+
+def test_the_bare_plant_makes_the_same_motion_as_the_station(puppy, walk) -> None:
+    take = Simulation(puppy, SimulationConfig(contact_period=0.0)).run(walk, 0.4)
+    bare = BarePlant(puppy, walk, take, 1e-3)
+    for _ in range(2):  # again from the same start
+        bare.run()
+        q = bare.joint_angles()
+        assert np.degrees(np.sqrt(np.mean(np.square(q - take.q[-1])))) < 5
+        assert np.degrees(np.sqrt(np.mean(np.square(take.q[0] - take.q[-1])))) > 10  # it went somewhere
+
+
+def test_a_finer_step_errs_less(puppy, walk) -> None:
+    exact = drives.converged(puppy, walk, 0.3, "fixed", 2.5e-4)
+    takes = [drives.converged(puppy, walk, 0.3, "fixed", step) for step in (2e-3, 1e-3, 2.5e-4)]
+    coarse, fine, same = drives.joint_error(takes, exact)
+    assert 0 == same < fine < coarse < 0.05
+
+
+def test_without_the_other_engine_its_figure_says_why(puppy, walk, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "studies.other_engine.bench", None)
+    exact = Simulation(puppy, SimulationConfig(base="fixed")).run(walk, 0.05)
+    figure = engine.station_against_mujoco(puppy, walk, 0.05, exact, 5e-4, 1e-3, 1)
+    assert figure.value is None
+    assert "source tree" in (figure.skipped or "")
