@@ -7,19 +7,21 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from studies.filters.measure import JOINT, NAMES, SECONDS, Result
+from studies.filters.measure import NAMES, Result
+from studies.inputs import JOINT
 from workbench.view import style
 
 COLOURS = dict(zip(NAMES, ("#AAAAAA", *style.OTHERS[:3], style.ACCENT)))
 
 
 @style.styled
-def draw_velocities(result: Result, file: Path, zoom: tuple[float, float] = (2.0, 3.0)) -> None:
+def draw_velocities(result: Result, file: Path, zoom: tuple[float, float] | None = None) -> None:
     """Angle, velocity and acceleration of JOINT under each filter (thesis, figures 6.6 and 7.7)."""
     figure = style.new_figure(11, 9)
     axes: list[Axes] = list(figure.subplots(3, 1, sharex=True))
     label, reference = result.reference
     time = reference.time
+    zoom = zoom or (time[-1] / 3, time[-1] / 2)
     shown = (time >= zoom[0]) & (time <= zoom[1])
     for panel, (what, unit) in zip(axes, (("q", "angle [deg]"), ("v", "velocity [deg/s]"), ("a", "acceleration [deg/s²]"))):
         for name, path in result.paths.items():
@@ -43,7 +45,7 @@ def draw_bodies(results: list[Result], file: Path) -> None:
     figure = style.new_figure(12, 8.5)
     grid = figure.subplots(3, 2, sharex=True, sharey="row")
     for column, result in enumerate(results):
-        time = np.linspace(0, SECONDS, len(result.floor[0]))
+        time = np.linspace(0, result.seconds, len(result.floor[0]))
         floor = np.array(result.floor)
         for row in range(3):
             panel = grid[row, column]

@@ -1,8 +1,6 @@
 """Two inputs of the thesis, each under each of its filters, and what the body makes of them.
 
-"Own filter": cubics that rest at each sample, derivatives smoothed by Savitzky-Golay (6.7). "MATLAB filter": the low-pass of
-Simulink's converter (6.8). Neither polynomial order nor time constant is stated in the thesis: the order is 3 here, and the time
-constant the one that comes closest to window 1001, as the thesis says it does (7.2.2).
+What the filters are: studies/inputs.py.
 """
 
 from __future__ import annotations
@@ -13,38 +11,25 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from workbench.motion import (
-    Trajectory,
-    filter_derivatives,
-    inconsistency,
-    interpolate,
-    interpolate_motion,
-    load_motion,
-    low_pass,
-    savitzky_golay,
-)
-from workbench.motion.smoothing import Knots
+from studies.common import COORDINATES, body_track
+from studies.inputs import CYCLES, JOINT, MIDDLE, ORDER, SECONDS, STEP, comparable_time_constant, ideal_job, robotis
+from workbench.motion import Trajectory, filter_derivatives, inconsistency, interpolate, load_motion, low_pass, savitzky_golay
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation.batch import run_job
 from workbench.simulation.play import play_motion
+
+__all__ = ["capture", "comparable_time_constant", "robotis", "study"]
 
 Array = NDArray[np.float64]
 Filter = Callable[[Trajectory], Trajectory]
 
 WINDOWS = (91, 1001, 2001)
-ORDER = 3
-STEP = 1e-4
-JOINT = "flb"  # the one that the thesis shows
-SECONDS = 6.0
-CYCLES = 13
 CYCLE = 0.468
 RATE = 120.0
 NOISE = np.radians(0.12)
 NAMES = ("unfiltered", *(f"window {w}" for w in WINDOWS), "low-pass")
-MIDDLE = slice(2000, -2000)  # clear of what the ends do to a filter
-KNOTS: tuple[Knots, Knots] = ("rest", "smooth")
 IDEAL = SimulationConfig(drive="ideal", contact_period=0.0)
 
 
@@ -71,6 +56,7 @@ class Result:
 
     reference: what velocities are measured by. paths: filtered as in the thesis. tracks: the body's, (N, 3) [cm, cm, deg]. floor:
     tracks of the unfiltered run at other steps and contact approximations. like: time constant [s] comparable to a window.
+    seconds: length of the tracks.
     """
 
     title: str
@@ -80,6 +66,7 @@ class Result:
     tracks: dict[str, Array]
     floor: list[Array]
     like: dict[int, float]
+    seconds: float = SECONDS
 
     def row(self, name: str) -> Row:
         """A filter's row."""
@@ -91,13 +78,13 @@ class Result:
         return float(np.ptp(windows)), float(np.ptp([t[-1, coordinate] for t in self.floor]))
 
 
-def capture(model: RobotModel) -> tuple[Trajectory, Trajectory, dict[str, float]]:
+def capture(model: RobotModel, seconds: float = SECONDS) -> tuple[Trajectory, Trajectory, dict[str, float]]:
     """A synthetic capture of the walk, noisy angles joined by cubics that rest at each frame, and the truth at the same times.
 
     Also the velocity error of JOINT [deg/s] that the noise alone and the resting alone make.
     """
     take = play_motion(Simulation(model, SimulationConfig()), load_motion(data_file("robotis_walk.csv")), CYCLES)
-    frames = take.resampled(np.arange(0.0, SECONDS + 1e-9, 1 / RATE))
+    frames = take.resampled(np.arange(0.0, seconds + 1e-9, 1 / RATE))
     noisy = frames.q + np.random.default_rng(0).normal(0, NOISE, frames.q.shape)
     raw = interpolate(frames.time, take.joints, noisy, STEP, knots="rest")
     fine = take.resampled(raw.time)
@@ -106,27 +93,6 @@ def capture(model: RobotModel) -> tuple[Trajectory, Trajectory, dict[str, float]
     alone = {"noise": interpolate(frames.time, take.joints, noisy, STEP, knots="smooth"),
              "rest": interpolate(frames.time, take.joints, frames.q, STEP, knots="rest")}
     return raw, truth, {what: velocity_error(path, truth) for what, path in alone.items()}
-
-
-def robotis() -> tuple[Trajectory, Trajectory]:
-    """The walk's own angles, joined as in the thesis, and joined by a smooth spline."""
-    motion = load_motion(data_file("robotis_walk.csv"))
-    n = round(SECONDS / STEP) + 1
-    rest, smooth = (interpolate_motion(motion, CYCLES, STEP, knots) for knots in KNOTS)
-    return _first(rest, n), _first(smooth, n)
-
-
-def comparable_time_constant(raw: Trajectory, window: int) -> float:
-    """Time constant [s] of the low-pass whose velocity, its lag taken out, is nearest to that of a window."""
-    i = raw.column(JOINT)
-    one = replace(raw, joints=(JOINT,), q=raw.q[:, i:i + 1], v=raw.v[:, i:i + 1], a=raw.a[:, i:i + 1])
-    goal = filter_derivatives(one, window, ORDER).v
-
-    def distance(T: float) -> float:
-        early = np.roll(low_pass(one, T).v, -round(2 * T / STEP), axis=0)
-        return float(np.mean((early - goal)[MIDDLE] ** 2))
-
-    return float(min(np.geomspace(1e-3, 0.1, 41), key=distance))
 
 
 def velocity_error(path: Trajectory, truth: Trajectory) -> float:
@@ -143,39 +109,31 @@ def lag(path: Trajectory, raw: Trajectory) -> float:
     return best * STEP * 1e3
 
 
-def walk(simulation: Simulation, path: Trajectory) -> Array:
-    """Six seconds with joints that follow the angles ideally, as in the thesis's inverse dynamics.
+def walk(model: RobotModel, config: SimulationConfig, path: Trajectory, seconds: float) -> Array:
+    """A walk with joints that follow the angles ideally, as in the thesis's inverse dynamics.
 
     Returns the base's way forward and to the left [cm] and its heading, left [deg], (N, 3) at every millisecond.
     """
-    every = round(1e-3 / STEP)
-    angles = np.zeros((len(path.time[::every]), len(simulation.joints)))
-    for joint in path.joints:
-        angles[:, simulation.joints.index(joint)] = path.q[::every, path.column(joint)]
-    take = simulation.run(duration=SECONDS, lead=0.3, trajectory=(path.time[::every], angles))
-    take = take.resampled(np.linspace(0, SECONDS - 1e-6, 6000))
-    assert take.p_WB is not None
-    assert take.quat_WB is not None
-    yaw = np.unwrap(Rotation.from_quat(take.quat_WB, scalar_first=True).as_euler("ZYX")[:, 0])
-    track = np.column_stack([take.p_WB[:, :2] * 100, np.degrees(yaw)])
-    return np.asarray(track - track[0])
+    take = run_job(ideal_job(model, config, path, seconds))
+    track = body_track(take, np.linspace(0, seconds - 1e-6, round(1e3 * seconds)))
+    return np.asarray(track[:, [COORDINATES.index(c) for c in ("x", "z", "ry")]] * [1, -1, 1])
 
 
-def study(model: RobotModel, title: str, raw: Trajectory, reference: tuple[str, Trajectory]) -> Result:
+def study(model: RobotModel, title: str, raw: Trajectory, reference: tuple[str, Trajectory],
+          progress: Callable[[str, float | None], None], seconds: float = SECONDS) -> Result:
     """All filters on one input."""
     like = {w: comparable_time_constant(raw, w) for w in WINDOWS[1:]}
-    simulation = Simulation(model, IDEAL)
-    result = Result(title, reference, [], {}, {}, [], like)
+    result = Result(title, reference, [], {}, {}, [], like, seconds)
     for name, (shown, played) in filters(like[WINDOWS[1]]).items():
-        print(f"{title}: {name}", flush=True)
+        progress(f"{title}: {name}", None)
         path = result.paths[name] = shown(raw)
-        track = result.tracks[name] = walk(simulation, played(raw))
+        track = result.tracks[name] = walk(model, IDEAL, played(raw), seconds)
         result.rows.append(Row(name, velocity_error(path, reference[1]), lag(path, raw),
                                float(np.degrees(inconsistency(path).max())), *(float(x) for x in track[-1])))
-    print(f"{title}: numerical floor", flush=True)
+    progress(f"{title}: numerical floor", None)
     others = [replace(IDEAL, time_step=h) for h in (5e-4, 2.5e-4)]
     others += [replace(IDEAL, approximation=a) for a in ("sap", "similar")]
-    result.floor.extend([result.tracks["unfiltered"], *(walk(Simulation(model, c), raw) for c in others)])
+    result.floor.extend([result.tracks["unfiltered"], *(walk(model, c, raw, seconds) for c in others)])
     return result
 
 
@@ -189,7 +147,3 @@ def filters(T: float) -> Mapping[str, tuple[Filter, Filter]]:
         out[f"window {window}"] = (partial(filter_derivatives, window=window, order=ORDER),
                                    partial(savitzky_golay, window=window, order=ORDER))
     return out | {"low-pass": (partial(low_pass, time_constant=T), partial(low_pass, time_constant=T))}
-
-
-def _first(path: Trajectory, n: int) -> Trajectory:
-    return replace(path, time=path.time[:n], q=path.q[:n], v=path.v[:n], a=path.a[:n])

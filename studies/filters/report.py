@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from studies.filters import measure
-from studies.filters.measure import CYCLE, JOINT, STEP, WINDOWS, Result
+from studies import inputs
+from studies.filters.measure import CYCLE, WINDOWS, Result
+from studies.inputs import JOINT, STEP
 
 
 def report(results: list[Result], alone: Mapping[str, float]) -> str:
@@ -13,7 +14,7 @@ def report(results: list[Result], alone: Mapping[str, float]) -> str:
     measured_by = " and ".join(r.reference[0] for r in results)
     lines = [
         "# Input filters", "", "The ROBOTIS walk, looped, and a synthetic capture of it at 120 Hz, whose true velocity is known.",
-        " ".join((measure.__doc__ or "").split("\n\n")[1].split()), "",
+        " ".join((inputs.__doc__ or "").split("\n\n")[1].split()), "",
         "| input | filter | velocity error deg/s | lag ms | v not the derivative of q, deg | x cm | left cm | heading deg |",
         "|---|---|---|---|---|---|---|---|",
         *(f"| {result.title} | {r.filter} | {r.velocity_error:.1f} | {r.lag:.1f} | {r.stray:.2f} | {r.x:.1f} | {r.left:.1f} "
