@@ -14,9 +14,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "bench",
         help="measure the speeds stated in the README",
         description="Prints as JSON, measured in turns in one run, with what is required of each: the station with the full "
-        "servo law against a bare Drake plant with PD at the same step, and against MuJoCo at the same joint error; the fast servo and "
-        "larger steps; the Motive reader against pandas; 64 rollouts on two processes against one. Takes minutes, and a quiet "
-        "machine.",
+        "servo law against a bare Drake plant with PD at the same step, and against MuJoCo at the same joint error; the fast "
+        "servo and larger steps; the Motive reader against pandas; 64 rollouts on two processes against one. Takes minutes, "
+        "and a quiet machine.",
     )
     parser.add_argument("--quick", action="store_true", help="only see that all of it runs, in seconds; the figures mean nothing")
     parser.add_argument("--out", metavar="FILE", type=Path, help="write the JSON there too")
