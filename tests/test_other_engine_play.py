@@ -128,10 +128,10 @@ def test_feet_slide_when_gravity_leans_beyond_the_friction_cone(tmp_path, share)
     assert slid < 2e-3 if share < 1 else slid > 0.2
 
 
-def test_play_refuses_effects_unknown_bases_and_robots_that_cannot_float(tmp_path, crooked):
-    effect = EffectSpec("backlash", ("hip",), {"gap": 1.0})
+def test_play_refuses_unknown_effects_and_bases_and_robots_that_cannot_float(tmp_path, crooked):
+    effect = EffectSpec("gremlins", ("hip",), {"number": 3.0})
     some = commands([0.0], [0.0], 0.1)
-    with pytest.raises(ValueError, match="backlash"):
+    with pytest.raises(ValueError, match="gremlins"):
         play(crooked.with_effect(effect), some, 0.1)
     with pytest.raises(ValueError, match="free or fixed"):
         play(crooked, some, 0.1, base="hung")

@@ -68,12 +68,12 @@ def pivots_for(
 
 def film(
     rollout: Rollout, rigid_bodies: Mapping[str, str], pivots: Mapping[str, Array], camera: Camera, starts_at: float,
-    rng: np.random.Generator,
+    rng: np.random.Generator, frames_turned: Mapping[str, Array] | None = None,
 ) -> Capture:
     """Frames from `starts_at` [s] before the first command to the run's end.
 
     The frame of a rigid body is its link's, turned so that at rest before the first command it is parallel to the
-    capture's axes.
+    capture's axes; frames_turned: asset -> rotation vector (3,) [rad] in its frame by which it is turned from that.
     ValueError if the run rests for less than `starts_at`.
     """
     if -rollout.time[0] < starts_at:
@@ -88,6 +88,8 @@ def film(
     for asset, link in rigid_bodies.items():
         p_WL, R_WL = poses[link]
         turned = to_capture @ (R_WL @ rest[link][1][0].T) @ to_capture.T
+        if frames_turned and asset in frames_turned:
+            turned = turned @ Rotation.from_rotvec(frames_turned[asset]).as_matrix()
         noise = Rotation.from_rotvec(camera.rotation_noise * rng.standard_normal((frames, 3)))
         q = (noise * Rotation.from_matrix(turned)).as_quat(canonical=True)
         x = (p_WL + R_WL @ pivots[asset]) @ to_capture.T + camera.origin

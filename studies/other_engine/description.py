@@ -14,7 +14,7 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
-from workbench.robot import ConfigureParser, InputError, Kinematics
+from workbench.robot import ConfigureParser, Ground, InputError, Kinematics
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,10 @@ class ContactShape:
     friction: float
     stiffness: float
     dissipation: float
+    pair_friction: float = math.nan
+    """Of foot and ground together, where it is known; NaN: what foot and ground say."""
+    pair_stiffness: float = math.nan
+    """Likewise [N/m]."""
 
     def bottom(self, p_WL: Array, R_WL: Array) -> float:
         """Height of its lowest point where its link is at p_WL (3,), R_WL (3, 3) [m]."""
@@ -41,12 +45,37 @@ class ContactShape:
 
 
 @dataclass(frozen=True)
+class SeriesJoint:
+    """A hinge that no servo turns, between a servo and its link, through the joint's anchor: axis (3,) in the link's frame;
+    half: play to each side [rad], infinite where it is free; stiffness [N m/rad] and damping [N m s/rad]."""
+
+    name: str
+    axis: Array
+    half: float
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What the robot stands in. friction: of all feet, None where `ground` says it; gravity (3,) [m/s²] and tether (3,) [N], a
+    steady force on the root link's origin, in the world; step: x [m] from which on the floor is higher, and by what [m]."""
+
+    ground: Ground
+    friction: float | None = None
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    tether: Array = field(default_factory=lambda: np.zeros(3))
+    step: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
 class LinkPart:
     """A link L and the joint that carries it, if any.
 
     mass [kg], com (3,) [m] and inertia (3, 3) [kg m²] about the centre of mass, all in L. parent: the parent link; p
     (3,) and R (3, 3): pose in the parent with the joint at zero; anchor (3,) and axis (3,): the joint's place and
-    direction in L; lower, upper [rad]: its range, equal if the joint does not move.
+    direction in L; lower, upper [rad]: its range, equal if the joint does not move. series: what else it turns on, after
+    the servo; spring [N m/rad]: between link and parent, at rest where the joint is at zero.
     """
 
     name: str
@@ -62,6 +91,8 @@ class LinkPart:
     axis: Array = field(default_factory=lambda: np.array([0.0, 0, 1]))
     lower: float = 0.0
     upper: float = 0.0
+    series: tuple[SeriesJoint, ...] = ()
+    spring: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,6 +106,24 @@ class Description:
     def root(self) -> LinkPart:
         """The link that all others hang on."""
         return self.links[0]
+
+    def link(self, name: str) -> LinkPart:
+        """A link by its name; ValueError where there is none."""
+        for link in self.links:
+            if link.name == name:
+                return link
+        raise ValueError(f"expected one of {', '.join(l.name for l in self.links)}, got the link '{name}'")
+
+    def child_of(self, joint: str) -> LinkPart:
+        """The link that a joint carries; ValueError where there is none."""
+        for link in self.links:
+            if link.joint == joint:
+                return link
+        raise ValueError(f"expected one of {', '.join(self.joints)}, got the joint '{joint}'")
+
+    def with_link(self, changed: LinkPart) -> Description:
+        """The same with the link of that name replaced."""
+        return Description(tuple(changed if l.name == changed.name else l for l in self.links), self.joints)
 
     def lowest(self) -> float:
         """Height of the lowest point of all contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""

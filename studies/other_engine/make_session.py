@@ -20,6 +20,7 @@ import yaml
 from studies.other_engine.capture import Camera, Capture, film, pivots_for
 from studies.other_engine.excitation import MotionRows, stand_motion, sway_motion, varied_walk
 from studies.other_engine.firmware import commands_from_rows, read_rows
+from studies.other_engine.hidden import turned_frames
 from studies.other_engine.motive_file import write_motive_csv
 from studies.other_engine.player import Rollout, play
 from workbench.robot import RobotModel, ServoConstants, data_file, load_servo_constants, puppy_model
@@ -63,10 +64,10 @@ def record(
     starts_at = round(float(rng.uniform(0.25, 0.6)), 5)
     commands = commands_from_rows(plan.motion.joints, plan.motion.times, plan.motion.angles, plan.cycles)
     duration, lead = commands.end + REST_AFTER, starts_at + 2 * timestep
-    rollout = play(model, commands, duration, lead, plan.base, timestep)
-    pivots = pivots_for(rollout, model.rigid_bodies, rng)
-    clean = film(rollout, model.rigid_bodies, pivots, camera.noiseless(), starts_at, rng)
-    return rollout, film(rollout, model.rigid_bodies, pivots, camera, starts_at, rng), clean
+    rollout = play(model, commands, duration, lead, plan.base, timestep, chance=int(rng.integers(2**31)))
+    pivots, turned = pivots_for(rollout, model.rigid_bodies, rng), turned_frames(model)
+    clean = film(rollout, model.rigid_bodies, pivots, camera.noiseless(), starts_at, rng, turned)
+    return rollout, film(rollout, model.rigid_bodies, pivots, camera, starts_at, rng, turned), clean
 
 
 def session_entry(model: RobotModel, robot: str, servos: str) -> dict[str, object]:
@@ -88,7 +89,12 @@ def servo_yaml(model: RobotModel) -> str:
 
 
 def make_session(out: Path, model: RobotModel, walk: MotionRows, seed: int, gaps: float = 0.3) -> None:
-    """Writes the session folder `out`, whole or not at all; FileExistsError if it is there. Same seed, same bytes."""
+    """Writes the session folder `out`, whole or not at all; FileExistsError if it is there. Same seed, same bytes.
+
+    ValueError for a model with effects: this session is one with nothing hidden.
+    """
+    if model.effects:
+        raise ValueError(f"expected a nominal robot, got the effect '{model.effects[0].effect}'")
     if out.exists():
         raise FileExistsError(f"{out}: exists already")
     out.parent.mkdir(parents=True, exist_ok=True)

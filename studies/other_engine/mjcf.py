@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.other_engine.description import ContactShape, Description, LinkPart
+from studies.other_engine.description import ContactShape, Description, LinkPart, Surroundings
 from studies.other_engine.servo import ServoBank
 from workbench.robot import Ground
 
@@ -27,7 +27,7 @@ DEFAULT_FRICTION = 1.0
 
 
 def to_mjcf(
-    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float, drives: bool = False
+    description: Description, servos: ServoBank, around: Surroundings, base: str, timestep: float, drives: bool = False
 ) -> str:
     """MJCF text: bodies are the links, with the links' frames; `servos` in the order of description.joints.
 
@@ -40,9 +40,11 @@ def to_mjcf(
     ET.SubElement(top, "compiler", angle="radian", autolimits="true", balanceinertia="false")
     # impratio: friction is that much stiffer than the normal force, so that a foot inside its cone does not creep.
     ET.SubElement(top, "option", timestep=_text(timestep), integrator="implicitfast", cone="elliptic", impratio="100",
-                  gravity="0 0 -9.81", tolerance="1e-10", iterations="100")
+                  gravity=_text(*around.gravity), tolerance="1e-10", iterations="100")
     world = ET.SubElement(top, "worldbody")
     ET.SubElement(world, "geom", name="ground", type="plane", size="0 0 1", condim="3")
+    if around.step is not None:
+        _raise_floor(world, *around.step)
     index = {j: i for i, j in enumerate(description.joints)}
     elements = {"": world}
     for link in description.links:
@@ -55,7 +57,12 @@ def to_mjcf(
                 ET.SubElement(element, "freejoint", name="floating_base")
         else:
             _hang(element, link, servos, index.get(link.joint), timestep)
-        _fill(element, link, ground)
+        _fill(element, link, around.ground)
+    springs = [link for link in description.links if link.spring]
+    if springs:
+        tendons = ET.SubElement(top, "tendon")
+        for link in springs:
+            _stretch(tendons, link)
     if drives:
         actuators = ET.SubElement(top, "actuator")
         for i, joint in enumerate(description.joints):
@@ -64,7 +71,8 @@ def to_mjcf(
 
 
 def compile_model(
-    description: Description, servos: ServoBank, ground: Ground, base: str, timestep: float, drives: bool = False
+    description: Description, servos: ServoBank, around: Ground | Surroundings, base: str, timestep: float,
+    drives: bool = False,
 ) -> mujoco.MjModel:
     """MuJoCo's model, with contacts as stiff [N/m] and as dissipative [s/m] as foot and ground together.
 
@@ -74,14 +82,15 @@ def compile_model(
     least 1, so that no foot rings, and at most 2, so that the contact is the same at all steps up to 1 ms: MuJoCo makes t
     two steps or more.
     """
-    model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, ground, base, timestep, drives))
+    around = around if isinstance(around, Surroundings) else Surroundings(around)
+    model = mujoco.MjModel.from_xml_string(to_mjcf(description, servos, around, base, timestep, drives))
     load = 9.81 * model.body_subtreemass[1] / 4
     for link in description.links:
         A = model.body_invweight0[model.body(link.name).id, 0]
         if A == 0:  # held on the stand: what touches it brings its own stiffness
             continue
         for k, shape in enumerate(link.shapes):
-            stiffness, dissipation = _in_series(shape, ground)
+            stiffness, dissipation = _in_series(shape, around.ground)
             rate = math.sqrt(stiffness * (1 - IMPEDANCE) * A)
             damping = load * dissipation / (2 * math.sqrt(stiffness / A))
             damping = min(max(damping, 1.0), 2.0)
@@ -93,6 +102,8 @@ def _in_series(shape: ContactShape, ground: Ground) -> tuple[float, float]:
     """Stiffness and dissipation of the pair; the softer one deforms, and so dissipates, more."""
     k = DEFAULT_STIFFNESS if math.isnan(shape.stiffness) else shape.stiffness
     d = 0.0 if math.isnan(shape.dissipation) else shape.dissipation
+    if not math.isnan(shape.pair_stiffness):
+        return shape.pair_stiffness, d
     if ground.stiffness is None or math.isinf(ground.stiffness):
         return k, d
     total = k + ground.stiffness
@@ -103,15 +114,40 @@ def _in_series(shape: ContactShape, ground: Ground) -> tuple[float, float]:
 def _hang(element: ET.Element, link: LinkPart, servos: ServoBank, i: int | None, timestep: float) -> None:
     element.set("pos", _text(*link.p))
     element.set("quat", _quaternion(link.R))
-    if i is None:
-        return
+    if i is not None:
+        _turn(element, link, servos, i, timestep)
+    for joint in link.series:
+        # Hard ends, as of gear teeth: half a newton metre bends them by less than a hundredth of a degree.
+        ET.SubElement(
+            element, "joint", name=joint.name, type="hinge", pos=_text(*link.anchor), axis=_text(*joint.axis),
+            stiffness=_text(joint.stiffness), damping=_text(joint.damping),
+            limited="true" if math.isfinite(joint.half) else "false",
+            range=_text(-joint.half, joint.half) if math.isfinite(joint.half) else "0 0",
+            solreflimit=_text(2 * timestep, 1), solimplimit="0.95 0.95 0.001")
+
+
+def _turn(element: ET.Element, link: LinkPart, servos: ServoBank, i: int, timestep: float) -> None:
     ET.SubElement(
         element, "joint", name=link.joint, type="hinge", pos=_text(*link.anchor), axis=_text(*link.axis),
         armature=_text(servos.inertia[i]), frictionloss=_text(servos.coulomb[i]),
         damping=_text(servos.viscous[i] + servos.back_emf[i]), range=_text(link.lower, link.upper),
         limited="true" if math.isfinite(link.lower) and math.isfinite(link.upper) else "false",
+        solreflimit=_text(2 * timestep, 1), solimplimit="0.95 0.95 0.001",
         # A stiff friction constraint: below the Coulomb torque the joint creeps at thousandths of a degree per second.
         solreffriction=_text(2 * timestep, 1), solimpfriction="0.99 0.99 0.001")
+
+
+def _stretch(tendons: ET.Element, link: LinkPart) -> None:
+    """A spring over all that turns about the servo's axis, at rest at zero."""
+    spring = ET.SubElement(tendons, "fixed", name=f"{link.joint}/spring", stiffness=_text(link.spring), springlength="0 0")
+    for name in (link.joint, *(s.name for s in link.series if np.allclose(s.axis, link.axis))):
+        ET.SubElement(spring, "joint", joint=name, coef="1")
+
+
+def _raise_floor(world: ET.Element, x: float, height: float) -> None:
+    half = 1.0
+    ET.SubElement(world, "geom", name="step", type="box", condim="3", size=_text(half, half, 0.05),
+                  pos=_text(x + half, 0, height - 0.05))
 
 
 def _drive(actuators: ET.Element, joint: str, servos: ServoBank, i: int) -> None:
@@ -135,6 +171,7 @@ def _fill(element: ET.Element, link: LinkPart, ground: Ground) -> None:
                   fullinertia=_text(M[0, 0], M[1, 1], M[2, 2], M[0, 1], M[0, 2], M[1, 2]))
     for k, shape in enumerate(link.shapes):
         friction = shape.friction if ground.friction is None else ground.friction
+        friction = friction if math.isnan(shape.pair_friction) else shape.pair_friction
         ET.SubElement(
             element, "geom", name=_geom_name(link, k), type=shape.kind, pos=_text(*shape.p), quat=_quaternion(shape.R),
             size=_text(*shape.half), condim="3", priority="1", solimp=_text(IMPEDANCE, IMPEDANCE, 0.001),

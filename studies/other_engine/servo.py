@@ -26,6 +26,7 @@ class ServoBank:
         with np.errstate(divide="ignore"):
             self.slope = np.where(proportional, 1 / column("proportional_gain"), column("compliance_slope") * _COUNT)
         """Error beyond the margin at which the duty is full [rad]."""
+        self.supply = column("supply_voltage")
         self.full_torque = column("stall_torque") * column("supply_voltage") / column("rated_voltage")
         self.back_emf = column("stall_torque") / column("no_load_speed")
         self.viscous = column("viscous_friction")
