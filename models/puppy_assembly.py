@@ -77,7 +77,11 @@ def place(part: str, at: tuple[float, float, float] | Array = (0, 0, 0), x: Arra
 
 
 def links(d: Mapping[str, float]) -> list[Link]:
-    """All 16 links, parents before children. d: lengths [m] by name."""
+    """All 16 links, parents before children. d: lengths [m] by name.
+
+    Servos' horns look where the joints' signs say (data/joint_signs.csv). The top servos are drawn turned about in place, with
+    the bracket on the idler's side; a robot that has these signs carries them on the other side of the leg's bracket.
+    """
     hip_x, hip_y = d["wheelbase"] / 2, d["half_track"]
     servo_x = hip_x - d["top_horn_to_middle"]  # centres of the top servos
     tail_x = -servo_x + (19 + 2 + 26) * MM  # hind servos' backs, gap, F2 of the tail joint
@@ -118,7 +122,7 @@ def _leg(leg: str, d: Mapping[str, float], hip_x: float, hip_y: float) -> list[L
     bottom = middle - [0, 0, d["thigh"]]
     length = d["front_shank"] if front else d["back_shank"]
     foot_x = 0.0 if front else d["back_foot_offset"]
-    horn = -ahead * side * Y  # where the horns of the leg's servos look: what their signs say (data/joint_signs.csv)
+    horn = -ahead * side * Y  # inwards in front, outwards behind
     lower = place("f2", z=Y, y=Z) if front else place("f1", x=-X, y=Z)
     base = (26 if front else 23) * MM
     return [
