@@ -23,7 +23,9 @@ GRAVITY = (0.0, 0.0, -9.81)
 @dataclass(frozen=True)
 class Physics:
     """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
-    coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle. tether: (3,) [N]."""
+    coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
+    tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
+    hard ends were added, which continuous plants ignore."""
 
     description: str | None
     law: ServoLaw
@@ -33,6 +35,9 @@ class Physics:
     gravity: Array
     tether: Array
     zero: Array
+    stages: Mapping[str, tuple[str, ...]]
+    moved: bool
+    ends: bool
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
@@ -65,7 +70,8 @@ def physics_of(model: RobotModel) -> Physics:
         if type(effect).description is not Effect.description:
             sdf = sdf or SdfRobot(model.path)
             effect.description(sdf, spec, model)
-    return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero)
+    return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
+                   sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends)
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:

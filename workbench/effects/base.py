@@ -131,6 +131,11 @@ def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
     return out
 
 
+def vector(values: Mapping[str, float], name: str) -> Array:
+    """A parameter that is three numbers (3,), from `si_values`."""
+    return np.array([values[f"{name}.{i}"] for i in range(3)])
+
+
 def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     """InputError unless `where` names what the model has and the effect can act on."""
     k = model.kinematics

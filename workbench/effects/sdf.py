@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
-from workbench.robot import InputError
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
+from workbench.robot import InputError, Kinematics
+
+Array = NDArray[np.float64]
+GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
+"""Of the link between servo and link [kg, kg m^2]: small beside any robot, large enough for the solver. What a gear weighs at the
+joint is the servo's reflected inertia, which stays on the servo's joint."""
+SPRING_TIME = 1e-3
+"""Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
+they are stable for any stiffness on any link up to a step of twice this (h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME)."""
+PLAY_DAMPING = 5e-4
+"""Of a gear's play [N m s/rad]: a leg that swings in it comes to rest within a second, yet falls through it nearly freely."""
+DRAKE = "{http://drake.mit.edu}"
 
 
 class SdfRobot:
-    """An SDF file in memory; each method changes one thing about the robot. Lengths m, angles rad."""
+    """An SDF file in memory; each method changes one thing about the robot. Lengths m, angles rad.
+
+    stages: by servo joint, the joints put between its servo and its link, from the servo on. They turn at the servo joint's
+    own frame; the servo joint keeps its name, and sees the servo's side. moved: link lengths differ from the file's. ends: some
+    joint has got hard ends.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -19,6 +41,9 @@ class SdfRobot:
         if model is None:
             raise InputError(path, "no <model>: effects that change the robot's build need an SDF file")
         self._model = model
+        self.stages: dict[str, tuple[str, ...]] = {}
+        self.moved = self.ends = False
+        self._link_of = {j.get("name", ""): j.findtext("child", "").strip() for j in model.findall("joint")}
 
     def text(self) -> str:
         """The changed SDF, its relative files made absolute."""
@@ -26,3 +51,167 @@ class SdfRobot:
             if uri.text and "://" not in uri.text and not Path(uri.text).is_absolute():
                 uri.text = str((self.path.parent / uri.text).resolve())
         return ElementTree.tostring(self._tree.getroot(), encoding="unicode")
+
+    def add_play(self, joint: str, gap: float) -> None:
+        """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""
+        if gap > 0:
+            self._add_stage(joint, self._joint(joint).find("axis/xyz"), (-gap / 2, gap / 2))
+
+    def add_compliance(self, joint: str, stiffness: float) -> None:
+        """A spring [N m/rad] about the joint's axis between servo and link."""
+        self._add_stage(joint, self._joint(joint).find("axis/xyz"), None, stiffness)
+
+    def add_loose_mount(self, joint: str, play: float, axis: Array) -> None:
+        """The link turns freely by `play` in all about `axis` (3,), in the link's frame, through the joint's origin."""
+        frame = Kinematics.from_text(self.text(), self.path).frames[joint]
+        across = np.asarray(axis) / np.linalg.norm(axis) if np.any(axis) else np.zeros(3)
+        if not np.linalg.norm(np.cross(across, frame.X_MB_R.T @ frame.axis)) > 0.02:
+            raise InputError(self.path, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
+        xyz = Element("xyz", {"expressed_in": self._carried_by(joint)})
+        xyz.text = written(across)
+        if play > 0:
+            self._add_stage(joint, xyz, (-play / 2, play / 2))
+
+    def set_stop(self, joint: str, lower: float, upper: float) -> None:
+        """The servo's joint ends at these angles, or where it ended before if that is nearer."""
+        if not lower < upper:
+            raise InputError(self.path, f"stop of '{joint}': expected lower below upper")
+        axis = self._joint(joint).find("axis")
+        assert axis is not None  # a revolute joint without one is no joint that Drake reads
+        limit = axis.find("limit")
+        limit = SubElement(axis, "limit") if limit is None else limit
+        self.ends = True
+        set_child(limit, "lower", max(lower, float(limit.findtext("lower", "-inf"))))
+        set_child(limit, "upper", min(upper, float(limit.findtext("upper", "inf"))))
+
+    def add_parallel_spring(self, joint: str, stiffness: float) -> None:
+        """A spring [N m/rad] across the servo's joint, at rest in neutral, beside one that the file may give it."""
+        axis = self._joint(joint).find("axis")
+        assert axis is not None
+        dynamics = axis.find("dynamics")
+        dynamics = SubElement(axis, "dynamics") if dynamics is None else dynamics
+        own, rest = float(dynamics.findtext("spring_stiffness", "0")), float(dynamics.findtext("spring_reference", "0"))
+        set_child(dynamics, "spring_stiffness", own + stiffness)
+        set_child(dynamics, "spring_reference", own * rest / (own + stiffness) if own else 0.0)
+
+    def add_point_mass(self, link: str, mass: float, position: Array) -> None:
+        """A point of `mass` [kg] fixed at `position` (3,) in the link's frame."""
+        inertial = self._inertial(link)
+        m, center, inertia = read_inertia(inertial)
+        both = (m * center + mass * np.asarray(position)) / (m + mass)
+        inertia = inertia + _parallel(m, center - both) + _parallel(mass, position - both)
+        write_inertia(inertial, m + mass, both, inertia)
+
+    def shift_center(self, link: str, offset: Array) -> None:
+        """The link's centre of mass, with the inertia about it, moved by `offset` (3,) in the link's frame."""
+        inertial = self._inertial(link)
+        m, center, inertia = read_inertia(inertial)
+        write_inertia(inertial, m, center + offset, inertia)
+
+    def lengthen(self, link: str, change: float) -> None:
+        """The way from the link's joint to the next longer by `change`: what hangs on it moves along; of a last link, its foot
+        does. The next of several is their mean. The link's inertia stays."""
+        k = Kinematics.from_text(self.text(), self.path)
+        joint = k.parent_joint[link]
+        if joint is None:
+            raise InputError(self.path, f"length of '{link}': the root link has no joint; expected a link that hangs on one")
+        carrier = k.frames[joint]
+        start = -carrier.X_MB_R.T @ carrier.X_MB_p
+        following = [f for f in k.frames.values() if f.parent == link]
+        foot = [] if following else self._foot(link)
+        ends = [f.X_PF_p for f in following] or [numbers(s.find("pose"), 6)[:3] for s in foot if s.tag == "collision"]
+        if not ends:
+            raise InputError(self.path, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
+        way = np.mean(ends, axis=0) - start
+        length = float(np.linalg.norm(way))
+        if length < 1e-6 or length + change <= 0:
+            raise InputError(self.path, f"length of '{link}': {length:g} m from joint to joint cannot change by {change:g} m")
+        shift = way / length * change
+        for shape in foot:
+            shift_pose(shape, shift)
+        if following:
+            self._place_links(k, {f.child for f in following}, link, shift)
+        self.moved = True
+
+    def _place_links(self, k: Kinematics, carried: set[str], link: str, shift: Array) -> None:
+        """Writes where each link stands, from the root, and each joint, from its child, so that nothing moves but by intent:
+        `carried` links and what hangs on them, by `shift` (3,) in `link`'s frame."""
+        poses = k.forward(np.zeros((1, len(k.joints))))
+        for name in k.links:
+            if name == k.root:
+                continue
+            p, R = poses[name][0][0], poses[name][1][0]
+            if carried & {name, *k.ancestors(name)}:
+                p = p + poses[link][1][0] @ shift
+            write_pose(self._link(name), p, R, relative_to=k.root)
+        for name, f in k.frames.items():
+            write_pose(self._joint(name), -f.X_MB_R.T @ f.X_MB_p, f.X_MB_R.T)
+
+    def _foot(self, link: str) -> list[Element]:
+        """Shapes of the link's foot: those named so, or all that touch."""
+        shapes = [s for s in self._link(link) if s.tag in ("collision", "visual")]
+        named = [s for s in shapes if "foot" in s.get("name", "")]
+        return named if any(s.tag == "collision" for s in named) else [s for s in shapes if s.tag == "collision"]
+
+    def _add_stage(self, joint: str, xyz: Element | None, limits: tuple[float, float] | None, stiffness: float = 0.0) -> None:
+        """Puts a light link before the joint's link, and between the two a joint without an actuator."""
+        before, link = self.stages.get(joint, ()), self._carried_by(joint)
+        name = f"{joint}_stage_{len(before) + 1}"
+        gear = SubElement(self._model, "link", {"name": f"{name}_gear"})
+        SubElement(gear, "pose", {"relative_to": link})
+        write_inertia(SubElement(gear, "inertial"), GEAR_MASS, np.zeros(3), GEAR_INERTIA * np.eye(3))
+        set_child(self._joint(before[-1] if before else joint), "child", f"{name}_gear")
+        stage = SubElement(self._model, "joint", {"name": name, "type": "revolute"})
+        SubElement(stage, "pose", {"relative_to": joint})
+        set_child(stage, "parent", f"{name}_gear")
+        set_child(stage, "child", link)
+        axis = SubElement(stage, "axis")
+        if xyz is not None:
+            axis.append(deepcopy(xyz))
+        limit = SubElement(axis, "limit")
+        for end, angle in zip(("lower", "upper"), limits or ()):
+            set_child(limit, end, angle)
+        self.ends |= limits is not None
+        set_child(limit, "effort", 0)  # Drake: no actuator
+        dynamics = SubElement(axis, "dynamics")
+        set_child(dynamics, "damping", stiffness * SPRING_TIME if stiffness else PLAY_DAMPING)
+        if stiffness:
+            set_child(dynamics, "spring_stiffness", stiffness)
+        if not before:
+            self._keep_apart(joint)
+        self.stages[joint] = (*before, name)
+
+    def _keep_apart(self, joint: str) -> None:
+        """Neighbours do not collide in Drake; with a gear between them they would."""
+        group = SubElement(self._model, f"{DRAKE}collision_filter_group", {"name": f"{joint}_neighbours"})
+        for link in (self._joint(joint).findtext("parent", "").strip(), self._carried_by(joint)):
+            SubElement(group, f"{DRAKE}member").text = link
+        SubElement(group, f"{DRAKE}ignored_collision_filter_group").text = f"{joint}_neighbours"
+
+    def _named(self, tag: str, name: str) -> Element:
+        for element in self._model.findall(tag):
+            if element.get("name") == name:
+                return element
+        raise InputError(self.path, f"expected a <{tag}> '{name}' in the model itself, not in a nested one")
+
+    def _joint(self, name: str) -> Element:
+        return self._named("joint", name)
+
+    def _carried_by(self, joint: str) -> str:
+        """The link that the joint has in the file, whatever was put between since."""
+        self._joint(joint)
+        return self._link_of[joint]
+
+    def _link(self, name: str) -> Element:
+        return self._named("link", name)
+
+    def _inertial(self, link: str) -> Element:
+        inertial = self._link(link).find("inertial")
+        if inertial is None:
+            raise InputError(self.path, f"link '{link}' has no <inertial>, to which mass could be added")
+        return inertial
+
+
+def _parallel(mass: float, d: Array) -> Array:
+    """Inertia (3, 3) of a point of `mass` at d (3,) (Huygens-Steiner)."""
+    return np.asarray(mass * (d @ d * np.eye(3) - np.outer(d, d)))

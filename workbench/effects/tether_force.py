@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from workbench.effects.base import Array, Effect, Parameter
+from workbench.effects.base import Array, Effect, Parameter, vector
 from workbench.robot import EffectSpec
 
 
@@ -22,7 +20,7 @@ class TetherForce(Effect):
         return "Something pulls at the base with ({:.2f}, {:.2f}, {:.2f}) N.".format(*spec.parameters["force"])  # type: ignore[misc]
 
     def tether(self, values: Mapping[str, float]) -> Array:
-        return np.array([values[f"force.{i}"] for i in range(3)])
+        return vector(values, "force")
 
 
 EFFECT = TetherForce()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from workbench.effects.apply import seen
 from workbench.gap.comparison import aligned
 from workbench.gap.session import Session, TakeSpec
 from workbench.motion.commands import Commands
@@ -49,11 +50,14 @@ class RegisteredTake(ReadTake):
     measurement: Measurement
     recorded: Take
 
-    def observed(self, rollout: Take) -> Take:
-        """A rollout of this take as the recording would show it: on its clock, zeroed in the same way (a log is not)."""
+    def observed(self, rollout: Take, model: RobotModel | None = None) -> Take:
+        """A rollout of this take as the recording would show it: on its clock, zeroed in the same way (a log is not).
+
+        model: the robot that was simulated, where its effects are not this take's: some change what cameras see."""
         if not self.recorded.zeroed:
-            return aligned(rollout, self.recorded)
-        return observe(rollout, self.measurement, self.model, self.recorded.time)[0]
+            return aligned(rollout.as_logged(), self.recorded)
+        model = model or self.model
+        return observe(rollout, seen(self.measurement, model), model, self.recorded.time)[0]
 
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:

@@ -50,7 +50,9 @@ class Measurement:
     in the capture's axes at rest. noise: joint -> standard deviation [rad] at rest. position_noise [m].
     rest_pose: joint -> servo angle [rad] at which the robot is taken to have stood (droop), rest_rotation (4,) wxyz: the
     base's tilt there; a recorded zero is this pose. joint_starts: what each joint alone says of the start [s].
-    pivot_residual: asset -> RMS [m] by which its positions miss the kinematic tree. The rest are standard deviations.
+    pivot_residual: asset -> RMS [m] by which its positions miss the kinematic tree. frames: asset -> rotation vector (3,) [rad],
+    in its own frame (the capture's axes, at rest), by which that is turned from where it is said to be; about its pivot, which
+    stays. The rest are standard deviations.
     """
 
     starts_at: float
@@ -67,3 +69,4 @@ class Measurement:
     yaw_sigma: float = float("nan")
     pivot_sigma: Mapping[str, Array] = field(default_factory=dict)
     pivot_residual: Mapping[str, float] = field(default_factory=dict)
+    frames: Mapping[str, Array] = field(default_factory=dict)

@@ -35,12 +35,14 @@ class Take:
     time: (N,) [s], from the first frame (a recording), or from the first command (a simulation, negative while it rests).
     starts_at: time of the first command [s]; NaN where unknown.
     joints: the n joints that were seen. q: (N, n) [rad]; NaN where unseen. `zeroed`: q is zero at the rest before the first
-    command, as motion capture sees it; else q is the servo's angle. q_sigma: (N, n) standard deviation [rad].
+    command, as motion capture sees it; else q is the angle itself. q_sigma: (N, n) standard deviation [rad].
     p_WB (N, 3), quat_WB (N, 4) wxyz: pose of the base link's frame B in the world W. bodies: rigid bodies by asset,
     in the take's world axes. torque: (N, n) [N m] on the joints. v: (N, n) [rad/s].
     contact: foot -> ground reaction (N, 3) [N] in W. `problems`: what was mended, marked or left out, a line each.
     mended: (N,) frames whose gaps were filled. off_axis: (N, n, 3) [rad] what of each joint's rotation its servo does not
-    turn, as a rotation vector in the base's axes in the neutral pose (forward, left, up).
+    turn, as a rotation vector in the base's axes in the neutral pose (forward, left, up). Only a simulated robot whose build is
+    not the model's has servo_q (N, n) [rad], the servo's own angle as its sensor tells it, where q is the link's, and links,
+    the pose of each link in W, where the model's lengths and joints do not give it.
     """
 
     name: str
@@ -62,6 +64,8 @@ class Take:
     problems: tuple[str, ...] = ()
     mended: NDArray[np.bool_] | None = None
     off_axis: Array | None = None
+    servo_q: Array | None = None
+    links: Mapping[str, BodyTrack] = field(default_factory=dict)
 
     @staticmethod
     def from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
@@ -77,6 +81,10 @@ class Take:
     def column(self, joint: str) -> int:
         """Index of a joint's column in q, v and torque."""
         return self.joints.index(joint)
+
+    def as_logged(self) -> Take:
+        """The take as the servos' own sensors see it: q on their side of play and springs."""
+        return self if self.servo_q is None else replace(self, q=self.servo_q)
 
     @property
     def since_start(self) -> Array:
@@ -105,6 +113,9 @@ class Take:
                 return None
             return np.column_stack([np.interp(time, self.time, c, left=np.nan, right=np.nan) for c in y.T])
 
+        def moved(tracks: Mapping[str, BodyTrack]) -> dict[str, BodyTrack]:
+            return {k: BodyTrack(p=linear(b.p), quat=slerp(b.quat)) for k, b in tracks.items()}  # type: ignore[arg-type]
+
         def slerp(q: Array | None) -> Array | None:
             if q is None:
                 return None
@@ -123,7 +134,7 @@ class Take:
             self, time=time, q=linear(self.q),  # type: ignore[arg-type]
             off_axis=None if off is None else linear(off.reshape(len(off), -1)).reshape(len(time), *off.shape[1:]),  # type: ignore[union-attr]
             q_sigma=linear(self.q_sigma), v=linear(self.v), p_WB=linear(self.p_WB),
-            quat_WB=slerp(self.quat_WB), torque=linear(self.torque), mended=None,
-            bodies={k: BodyTrack(p=linear(b.p), quat=slerp(b.quat)) for k, b in self.bodies.items()},  # type: ignore[arg-type]
+            quat_WB=slerp(self.quat_WB), torque=linear(self.torque), mended=None, servo_q=linear(self.servo_q),
+            bodies=moved(self.bodies), links=moved(self.links),
             contact={k: linear(f) for k, f in self.contact.items()},  # type: ignore[misc]
         )

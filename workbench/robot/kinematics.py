@@ -53,6 +53,11 @@ class Kinematics:
         """Parses an SDF or URDF; InputError if Drake cannot."""
         return _parse(Path(path))
 
+    @staticmethod
+    def from_text(text: str, path: Path) -> Kinematics:
+        """Parses an SDF held in memory; `path` is the file it came from, which errors name."""
+        return _parse(Path(path), text)
+
     def joint_of(self, link: str) -> str | None:
         """Name of the joint that carries `link`; None for the root."""
         return self.parent_joint[link]
@@ -109,7 +114,7 @@ def rotation_about(axis: Array, angle: Array) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _parse(path: Path) -> Kinematics:
+def _parse(path: Path, text: str | None = None) -> Kinematics:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import RevoluteJoint, WeldJoint
@@ -120,7 +125,7 @@ def _parse(path: Path) -> Kinematics:
     parser = Parser(plant)
     ConfigureParser(parser)
     try:
-        instances = parser.AddModels(str(path))
+        instances = parser.AddModels(str(path)) if text is None else parser.AddModelsFromString(text, "sdf")
     except Exception as e:
         raise InputError(path, f"Drake cannot read this model: {e}") from None
     if len(instances) != 1:

@@ -45,8 +45,14 @@ class RunLogs:
         return log.sample_times().copy(), log.data().T.copy()
 
     def joints(self, state: Array) -> tuple[Array, Array]:
-        """Angles and velocities (N, n) [rad, rad/s] from logged states (N, nq + nv)."""
+        """The servos' side: angles and velocities (N, n) [rad, rad/s] from logged states (N, nq + nv)."""
         return state[:, self._q], state[:, self._plant.num_positions() + self._v]
+
+    def joints_named(self, names: tuple[str, ...], state: Array) -> tuple[Array, Array]:
+        """As `joints`, of any joints of the plant with one angle each."""
+        found = [self._plant.GetJointByName(n) for n in names]
+        q, v = ([j.position_start() for j in found], [j.velocity_start() for j in found])
+        return state[:, q], state[:, self._plant.num_positions() + np.array(v, dtype=int)]
 
     def base_path(self, state: Array) -> tuple[Array, Array]:
         """p_WB (N, 3) [m] and quat_WB (N, 4) wxyz of the base link."""

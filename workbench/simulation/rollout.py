@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -22,6 +24,7 @@ from workbench.simulation.gantry import gantry_coordinates
 from workbench.simulation.logs import RunLogs
 from workbench.simulation.playback import bridged_base, play_back
 from workbench.simulation.reference import linear_trajectory, reference_columns
+from workbench.simulation.structure import Structure
 
 Array = NDArray[np.float64]
 
@@ -45,6 +48,7 @@ class Simulation:
         self._joints = servo_joints(self.plant, model)
         physics = physics_of(model)
         self._zero = physics.zero
+        self._structure = Structure(model, physics) if physics.stages or physics.moved else None
         self._logs = RunLogs(self.diagram, self.context, model, self.config, physics.law)
         self._base = self.plant.GetBodyByName(model.base)
         self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
@@ -62,7 +66,7 @@ class Simulation:
         default: smoothly through the commands' poses).
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
-        this one (base "path"). start: joint angles and velocities (n,) [rad, rad/s] in self.joints' order at the first
+        this one (base "path"). start: link angles and velocities (n,) [rad, rad/s] in self.joints' order at the first
         command, in place of rest in neutral (base "fixed" or "path"); there is no lead then. Returns a Take with time 0 at
         the first command.
         """
@@ -92,13 +96,27 @@ class Simulation:
         q, v = self._logs.joints(state)
         p_WB, quat_WB = self._logs.base_path(state)
         contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
-        return Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
+        take = Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
                     p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
                     commands=sent)
+        return self._as_built(take, state)
 
     def play_back(self, take: Take) -> Take:
         """The thesis's animation: the model posed at each frame of a take; see `workbench.simulation.playback`."""
         return play_back(self.diagram, self.context, self.model, self.config.base, take)
+
+    def _as_built(self, take: Take, state: Array) -> Take:
+        """The take with what the links do, where they do not follow the servos as the model says."""
+        if self._zero.any():
+            take = replace(take, servo_q=take.q - self._zero)
+        if self._structure is None:
+            return take
+        assert take.p_WB is not None
+        assert take.quat_WB is not None
+        q, v = self._logs.joints_named(self._structure.joints, state)
+        seen = self._structure.seen(q, v)
+        return replace(take, q=seen.q, v=seen.v, off_axis=seen.off_axis, servo_q=take.q - self._zero,
+                       links=self._structure.links(q, take.p_WB, take.quat_WB))
 
     def _whole_steps(self, seconds: float) -> float:
         return round(seconds / self.config.logged_every) * self.config.logged_every
@@ -143,8 +161,9 @@ class Simulation:
             hold = linear_trajectory(np.array([0.0, 1.0]), np.vstack([gantry, gantry]))
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(hold)
         elif self.config.base == "free":
+            k = self._structure.kinematics if self._structure else self.model.kinematics
             poses = {link: RigidTransform(RotationMatrix(R[0]), p[0])
-                     for link, (p, R) in self.model.kinematics.forward(np.zeros((1, len(self.joints)))).items()}
+                     for link, (p, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
             height = -lowest_point(self.plant, self.diagram.scene_graph(), self._base.model_instance(), poses)
             self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, RigidTransform([0, 0, height]))
 
@@ -159,12 +178,16 @@ class Simulation:
         """Starts from given joint angles and velocities, with the ramp of each servo at its first goal."""
         if self.config.base == "free":
             raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
-        for joint, angle, rate in zip(self._joints, *start):
+        servos = start[0]
+        if self._structure is not None:  # play and springs stay as they rested
+            standing = np.atleast_2d(self.plant.GetPositionsAndVelocities(self._plant_context))
+            servos = self._structure.servo_angles(start[0], self._logs.joints_named(self._structure.joints, standing)[0][0])
+        for joint, angle, rate in zip(self._joints, servos, start[1]):
             joint.set_angle(self._plant_context, float(angle))
             joint.set_angular_rate(self._plant_context, float(rate))
         if self.config.drive == "servo":
             bank = self.diagram.GetSubsystemByName("servo_bank")
-            first = start[0] if commands is None else commands.goals[0]
+            first = servos if commands is None else commands.goals[0] + self._zero
             bank.SetReference(self.diagram.GetMutableSubsystemContext(bank, self.context), first)
 
     def _centre_base(self) -> None:

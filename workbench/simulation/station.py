@@ -19,7 +19,7 @@ from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 
 from workbench.effects.apply import Physics, physics_of
-from workbench.robot import ConfigureParser, RobotModel, puppy_model
+from workbench.robot import ConfigureParser, InputError, RobotModel, puppy_model
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
 from workbench.simulation.config import SimulationConfig
@@ -47,6 +47,7 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
     config.check()
     model = model or puppy_model()
     physics = physics_of(model)
+    _check_ends(config, physics)
     model.check_base(floating=config.base == "free")
     builder = RobotDiagramBuilder(time_step=config.time_step)
     plant = builder.plant()
@@ -71,6 +72,12 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
         ConnectPath(builder)
     _add_logs(builder, plant, config)
     return builder.Build()
+
+
+def _check_ends(config: SimulationConfig, physics: Physics) -> None:
+    if physics.ends and config.time_step == 0 and not config.uses_cenic:
+        raise InputError(None, "time_step: an effect gives joints hard ends, which Drake's integrators turn through; expected a "
+                         "step above 0, or the integrator 'cenic'")
 
 
 def _add_model(builder: RobotDiagramBuilder, model: RobotModel, physics: Physics) -> ModelInstanceIndex:

@@ -1,0 +1,31 @@
+"""Free play in a servo's gear: the link turns a little while the servo stands."""
+
+from __future__ import annotations
+
+from workbench.effects.base import DEGREE, Effect, Parameter, scalar, si_values
+from workbench.effects.sdf import SdfRobot
+from workbench.robot import EffectSpec, RobotModel
+
+
+class Backlash(Effect):
+    """Free play in a servo's gear: the link turns a little while the servo stands.
+
+    The sensor and the reflected inertia are on the servo's side. The play is half to each side of the servo's angle, ends hard
+    and without bounce, and nearly free of friction.
+    """
+
+    name = "backlash"
+    layer = "structure"
+    places = ("joint",)
+    parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"{', '.join(spec.where)} has {scalar(spec, 'gap'):.1f} deg of free play between servo and link."
+
+    def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
+        values = si_values(self, spec)
+        for joint in spec.where:
+            sdf.add_play(joint, values["gap"])
+
+
+EFFECT = Backlash()

@@ -1,0 +1,29 @@
+"""A link's centre of mass is not where the model has it."""
+
+from __future__ import annotations
+
+from workbench.effects.base import Effect, Parameter, si_values, vector
+from workbench.effects.sdf import SdfRobot
+from workbench.robot import EffectSpec, RobotModel
+
+
+class ComShift(Effect):
+    """A link's centre of mass is not where the model has it."""
+
+    name = "com_shift"
+    layer = "inertia"
+    places = ("link",)
+    parameters = (Parameter("offset", "m", -0.2, 0.2, 0.005, vector=True),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        x, y, z = spec.parameters["offset"]  # type: ignore[misc]
+        return (f"The centre of mass of {', '.join(spec.where)} is ({1000 * x:.1f}, {1000 * y:.1f}, {1000 * z:.1f}) mm off the "
+                "model's, in its frame.")
+
+    def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
+        values = si_values(self, spec)
+        for link in spec.where:
+            sdf.shift_center(link, vector(values, "offset"))
+
+
+EFFECT = ComShift()

@@ -1,0 +1,32 @@
+"""A link is longer or shorter than drawn, from its joint to the next."""
+
+from __future__ import annotations
+
+from workbench.effects.base import Effect, Parameter, scalar, si_values
+from workbench.effects.sdf import SdfRobot
+from workbench.robot import EffectSpec, RobotModel
+
+
+class LinkLength(Effect):
+    """A link is longer or shorter than drawn, from its joint to the next.
+
+    What hangs on the link moves along the line from its joint to the next (to the mean of several); of a last link the foot
+    moves, which is the shapes named so, or all that touch. The link's inertia stays as it was.
+    """
+
+    name = "link_length"
+    layer = "structure"
+    places = ("link",)
+    parameters = (Parameter("change", "m", -0.2, 0.2, 0.003),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        change = scalar(spec, "change")
+        return f"{', '.join(spec.where)} is {1000 * abs(change):.1f} mm {'longer' if change > 0 else 'shorter'} than drawn."
+
+    def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
+        values = si_values(self, spec)
+        for link in spec.where:
+            sdf.lengthen(link, values["change"])
+
+
+EFFECT = LinkLength()

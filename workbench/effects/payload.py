@@ -1,0 +1,32 @@
+"""A link carries a mass that the model lacks."""
+
+from __future__ import annotations
+
+from workbench.effects.base import Effect, Parameter, scalar, si_values, vector
+from workbench.effects.sdf import SdfRobot
+from workbench.robot import EffectSpec, RobotModel
+
+
+class Payload(Effect):
+    """A link carries a mass that the model lacks."""
+
+    name = "payload"
+    layer = "inertia"
+    places = ("link",)
+    parameters = (
+        Parameter("mass", "kg", 0.0, 5.0, 0.05),
+        Parameter("position", "m", -0.5, 0.5, 0.02, vector=True),
+    )
+
+    def sentence(self, spec: EffectSpec) -> str:
+        x, y, z = spec.parameters["position"]  # type: ignore[misc]
+        return (f"{', '.join(spec.where)} carries {1000 * scalar(spec, 'mass'):.0f} g more, at ({1000 * x:.0f}, {1000 * y:.0f}, "
+                f"{1000 * z:.0f}) mm in its frame.")
+
+    def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
+        values = si_values(self, spec)
+        for link in spec.where:
+            sdf.add_point_mass(link, values["mass"], vector(values, "position"))
+
+
+EFFECT = Payload()
