@@ -136,7 +136,7 @@ class _Run:
         servos, data, model, on = self.servos, self.data, self.model, self.reference.enabled
         q, v = data.qpos[self.position], data.qvel[self.dof]
         duty = np.where(on, servos.duty(self.reference.at(t) - self.drive.sensed(q)), 0.0)
-        damping = self.damping
+        damping, on_link = self.damping, None
         if self.drive.effects:
             now = Instant(t, model.opt.timestep, q, v, self.series @ data.qpos, duty, self.load, self.motor)
             torque = duty * servos.full_torque * self.drive.strength(now)
@@ -148,7 +148,7 @@ class _Run:
             model.dof_frictionloss[self.dof] = self.drive.friction(now)
             on_link = self.drive.link_torque(now)
         else:
-            torque, on_link = duty * servos.full_torque, 0.0
+            torque = duty * servos.full_torque
             net = torque - np.where(on, servos.back_emf * v, 0.0)
         model.dof_damping[self.dof] = damping
         self._pull(torque, on_link)
@@ -158,14 +158,14 @@ class _Run:
         self.motor = net
         return np.asarray(net, dtype=float)
 
-    def _pull(self, torque: Array, on_link: Array | float) -> None:
+    def _pull(self, torque: Array, on_link: Array | None) -> None:
         data = self.data
         if np.any(self.tether):
             data.xfrc_applied[1, :3] = self.tether
             data.xfrc_applied[1, 3:] = np.cross(data.xpos[1] - data.xipos[1], self.tether)
-        if np.ndim(on_link):
+        if on_link is not None:
             data.qfrc_applied[:] = 0.0
-            np.add.at(data.qfrc_applied, self.model.jnt_dofadr, self._spread(np.asarray(on_link)))
+            np.add.at(data.qfrc_applied, self.model.jnt_dofadr, self._spread(on_link))
             data.qfrc_applied[self.dof] += torque
         else:
             data.qfrc_applied[self.dof] = torque

@@ -43,9 +43,9 @@ def loose_mount(robot: Description, spec: EffectSpec) -> Description:
 
 
 def joint_stop(robot: Description, spec: EffectSpec) -> Description:
-    """The joint ends there; an end that is not given stays."""
-    given = {k: angle(spec, k) for k in ("lower", "upper") if k in spec.parameters}
-    return _joints(robot, spec, lambda l: replace(l, **given))
+    """The servo's shaft ends there, or before, where the description says so."""
+    lower, upper = angle(spec, "lower"), angle(spec, "upper")
+    return _joints(robot, spec, lambda l: replace(l, lower=max(l.lower, lower), upper=min(l.upper, upper)))
 
 
 def zero_offset(robot: Description, spec: EffectSpec) -> Description:

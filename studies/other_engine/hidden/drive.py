@@ -188,8 +188,14 @@ class Drive:
 
     def friction(self, now: Instant) -> Array:
         """Coulomb friction of each servo [N m]."""
-        return self.servos.coulomb + sum((e.friction(now) for e in self.effects), start=np.zeros_like(now.q))
+        total = self.servos.coulomb.copy()
+        for e in self.effects:
+            total += e.friction(now)
+        return total
 
     def link_torque(self, now: Instant) -> Array:
         """On the links, past the servos [N m]."""
-        return sum((e.link_torque(now) for e in self.effects), start=np.zeros_like(now.q))
+        total = np.zeros_like(now.q)
+        for e in self.effects:
+            total += e.link_torque(now)
+        return total

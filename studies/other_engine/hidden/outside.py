@@ -5,8 +5,8 @@
 | `gear_ripple` | joint | `torque` N m of friction, `period` deg: 0 to `torque` more over the joint's angle |
 | `sensor_ripple` | joint | `amplitude` deg, `period` deg: the potentiometer's error over the angle |
 | `taut_cable` | joint | `from` deg, `stiffness` N m/rad: pulls back only beyond that angle (below it, where it is negative) |
-| `warming_friction` | joint | `torque` N m more when cold, `share` of it that goes as its own work warms it, `heat` J that it takes |
-| `friction_memory` | joint | `torque` N m, `speed` deg/s, `time` s: Stribeck friction that lags, more while starting than while stopping |
+| `warming_friction` | joint | `torque` N m more, of which its own work of `heat` J warms `share` away |
+| `friction_memory` | joint | `torque` N m, `speed` deg/s, `time` s: Stribeck friction that lags behind the speed |
 | `one_way_friction` | joint | `torque` N m more where it turns to positive angles |
 | `power_dips` | – | `share` of torque lost, `length` s, `rate` 1/s: a loose plug, at random |
 | `swinging_mass` | link | `mass` kg, `length` m, `position` m: hangs from a point of the link, about its y axis |

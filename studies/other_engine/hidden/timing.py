@@ -63,7 +63,7 @@ COMMANDS: dict[str, Change] = {
 
 def _heard(sent: Commands, times: list[Array], end: float) -> Commands:
     """The commands where each joint hears them at times of its own (K,) [s]."""
-    instants = np.unique(np.round(np.concatenate(times), 9))
+    instants: Array = np.unique(np.round(np.concatenate(times), 9)).astype(float)
     instants = instants[np.diff(instants, prepend=-np.inf) > 1e-7]
     n = len(sent.joints)
     goals, speeds = np.zeros((len(instants), n)), np.zeros((len(instants), n))
