@@ -58,8 +58,8 @@ def body_track(take: Take, times: Array) -> Array:
 
 
 def body_end(take: Take, seconds: float) -> Array:
-    """COORDINATES (6,) of the body so long after the first command."""
-    return np.asarray(body_track(take, np.array([seconds]))[0])
+    """COORDINATES (6,) of the body so long after the first command; whole turns on the way are counted."""
+    return np.asarray(body_track(take, np.linspace(0.0, seconds, 2 + int(seconds / 0.02)))[-1])
 
 
 def sign(value: float, digits: int = 1) -> str:

@@ -102,8 +102,8 @@ def ideal_job(model: RobotModel, config: SimulationConfig, path: Trajectory, sec
     corners are no coarser than the step.
     """
     every = min(config.time_step or 1e-3, 1e-3)
-    times = np.arange(round(seconds / every) + 1) * every
-    angles = np.zeros((len(times), len(model.joints)))
+    times = np.asarray(np.arange(round(seconds / every) + 1) * every, dtype=np.float64)
+    angles: Array = np.zeros((len(times), len(model.joints)))
     for joint in path.joints:
         angles[:, model.joints.index(joint)] = np.interp(times, path.time, path.q[:, path.column(joint)])
     return Job(model, config, None, seconds, LEAD, (times, angles), name=name)

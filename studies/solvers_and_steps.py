@@ -66,6 +66,11 @@ class Outcome:
         return self.solver in APPROXIMATIONS
 
     @property
+    def cost(self) -> float:
+        """Processor seconds for each second simulated, the rest before the walk included."""
+        return self.cpu / (self.seconds + inputs.LEAD)
+
+    @property
     def label(self) -> str:
         """Of solver and setting."""
         return f"{self.solver}, {1e3 * self.setting:g} ms" if self.discrete else f"{self.solver}, accuracy {self.setting:g}"
@@ -190,8 +195,8 @@ def findings(outcomes: Sequence[Outcome], explicit: Sequence[Outcome]) -> list[t
 
     steps = [f"{name}: {over_steps(drive)}" for drive, name in DRIVES.items()]
     compared = [pick(drive, solver, 1e-3) for drive in DRIVES for solver in ("lagged", "cenic")]
-    costs = [f"{o.label}: {o.cpu / o.seconds:.2f} s ({DRIVES[o.drive]})" for o in compared if o]
-    tried = "; ".join(o.note or f"{o.cpu / o.seconds:.0f} s of processor time for each simulated second" for o in explicit)
+    costs = [f"{o.label}: {o.cost:.2f} s ({DRIVES[o.drive]})" for o in compared if o]
+    tried = "; ".join(o.note or f"{o.cost:.0f} s of processor time for each simulated second" for o in explicit)
     spread = "; ".join(f"{name} {np.ptp(x):.1f} cm and {np.ptp(turn):.0f}°" for name, x, turn in _spread(outcomes))
     return [
         ('7.2.1: "The average step size for the solver is around 1e-4 … Higher precision would increase computation time without '
@@ -209,7 +214,7 @@ def findings(outcomes: Sequence[Outcome], explicit: Sequence[Outcome]) -> list[t
 def runs_table(outcomes: Sequence[Outcome]) -> Table:
     """Every run."""
     rows = [[DRIVES[o.drive], o.contact, o.label, *(("–",) * 3 if o.note else (sign(o.x), sign(o.right), sign(o.heading))),
-             "–" if np.isnan(o.cpu) else f"{o.cpu / o.seconds:.2f}", o.note or ("" if o.seconds == outcomes[0].seconds else
+             "–" if np.isnan(o.cpu) else f"{o.cost:.2f}", o.note or ("" if o.seconds == outcomes[0].seconds else
                                                                                 f"{o.seconds:g} s only")]
             for o in sorted(outcomes, key=lambda o: (o.drive, o.contact, o.solver, -o.setting))]
     return Table(("drive", "feet", "solver", "x [cm]", "right [cm]", "heading [deg]", "cpu s per s", ""), rows)
@@ -223,7 +228,7 @@ def draw(outcomes: Sequence[Outcome]) -> Figure:
     grid = figure.subplots(3, len(columns), sharex=True, sharey="row", squeeze=False)
     for (drive, contact), axes in zip(columns, grid.T):
         mine = [o for o in outcomes if (o.drive, o.contact) == (drive, contact) and not o.note]
-        for panel, value in zip(axes, (lambda o: o.x, lambda o: o.heading, lambda o: o.cpu / o.seconds)):
+        for panel, value in zip(axes, (lambda o: o.x, lambda o: o.heading, lambda o: o.cost)):
             _draw_runs(panel, mine, value)
         if drive == "ideal":
             for x in (SIMULATED_M[0], SIMULATED_OWN[0]):

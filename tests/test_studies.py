@@ -43,6 +43,13 @@ def test_the_body_in_the_thesis_axes() -> None:
     assert found == pytest.approx({"x": 30, "y": 1, "z": -15, "rx": 5, "ry": 120, "rz": 8}, abs=1e-9)
 
 
+def test_whole_turns_are_counted() -> None:
+    time = np.linspace(-0.1, 6.0, 62)
+    quat = Rotation.from_euler("Z", 1.2 * np.maximum(time, 0)[:, None]).as_quat(scalar_first=True)
+    take = Take("spin", "simulation", time, ("flb",), np.zeros((62, 1)), 0.0, p_WB=np.zeros((62, 3)), quat_WB=quat)
+    assert body_end(take, 5.5)[COORDINATES.index("ry")] == pytest.approx(np.degrees(6.6), abs=0.1)
+
+
 def test_variance_is_shared_out_as_it_was_put_in() -> None:
     """A main effect, a pair's effect and noise of known variances."""
     rng = np.random.default_rng(1)
@@ -149,9 +156,9 @@ def test_a_study_from_end_to_end(name: str, study: Any, tmp_path: Path, capsys: 
     match name:
         case "thesis_runs":
             runs = content["runs"]
-            assert set(runs) == {"animation", "robotis M", "robotis", "mocap M", "mocap"}
+            assert set(runs) == {"animation", "robotis M", "robotis", "mocap M", "mocap", "robotis, smooth"}
             ends = {run: tuple(round(v["end"], 3) for v in values.values()) for run, values in runs.items()}
-            assert len(set(ends.values())) == 5
+            assert len(set(ends.values())) == 6
             assert all(abs(e[0]) < 50 for e in ends.values())
             assert all(runs[r]["x"]["floor"] > 0 for r in ends if r != "animation")
         case "solvers_and_steps":

@@ -13,10 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from studies import inputs
-from studies.common import COORDINATES, publish, run_study
+from studies.common import COORDINATES, publish, run_study, sign
 from studies.thesis_runs.figures import draw_runs
 from studies.thesis_runs.findings import contact_table, ends_table, findings
-from studies.thesis_runs.runs import ANIMATION, STEPS, Run, five_runs
+from studies.thesis_runs.runs import ANIMATION, SMOOTH, STEPS, Run, five_runs
 from workbench.robot import puppy_model
 from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
 
@@ -34,11 +34,11 @@ def thesis_runs(out: Path, quick: bool, progress: Callable[[str, float | None], 
     progress(f"model {model.sha256[:12]}", None)
     seconds, steps = (1.0, (2e-3, 1e-3)) if quick else (inputs.SECONDS, STEPS)
     runs = five_runs(model, seconds, steps, not quick, progress)
-    animation, *simulated = runs
+    animation, *simulated = (r for r in runs if r.name != SMOOTH)
     figures = {
         "robotis": draw_runs([animation, *simulated[:2]], "ROBOTIS angles (as figure 7.4)"),
         "mocap": draw_runs([animation, *simulated[2:]], "recorded angles (as figure 7.5)"),
-        "all": draw_runs(runs, "all runs (as figure 7.6)"),
+        "all": draw_runs([animation, *simulated], "all runs (as figure 7.6)"),
     }
     report = Report(
         "The thesis's five runs", headline(runs), f"{_SYNTHETIC}\n\n{_METHOD}", provenance=Provenance.of(
@@ -58,10 +58,14 @@ def thesis_runs(out: Path, quick: bool, progress: Callable[[str, float | None], 
 
 def headline(runs: list[Run]) -> str:
     """The result in one sentence."""
-    animation, *simulated = runs
-    ends = [r.end("x") for r in simulated]
-    return (f"Ideal joints take the puppy {min(ends):.0f} to {max(ends):.0f} cm in {animation.time[-1]:.0f} s "
-            f"where the (synthetic) recording goes {animation.end('x'):.0f}; the thesis: 32 to 33 and 37.")
+    by = {r.name: r for r in runs}
+
+    def of(a: str, b: str) -> str:
+        return " and ".join(f"{sign(by[n].end('x'), 0)} cm (turned by {sign(by[n].end('ry'), 0)}°)" for n in (a, b))
+
+    return (f"Ideal joints with ROBOTIS angles end at {of('robotis M', 'robotis')}, with recorded angles at "
+            f"{of('mocap M', 'mocap')}; the (synthetic) recording goes {by[ANIMATION].end('x'):.0f} cm. The thesis: 32 to 33, "
+            "and 37.")
 
 
 def numbers(runs: list[Run]) -> dict[str, object]:

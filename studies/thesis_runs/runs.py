@@ -21,6 +21,8 @@ STEPS = (1e-3, 5e-4, 2.5e-4)
 ANIMATION = "animation"
 SIMULATED = ("robotis M", "robotis", "mocap M", "mocap")
 """The thesis's names; M: MATLAB filter, else its own."""
+SMOOTH = "robotis, smooth"
+"""Not among the thesis's: its own filter on the poses joined by a smooth spline, where cubicpolytraj may have rested at each."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +53,14 @@ class Run:
 
 def five_runs(model: RobotModel, seconds: float, steps: Sequence[float], other_contact: bool,
               progress: Callable[[str, float | None], None]) -> list[Run]:
-    """The animation first. seconds: how much of each. steps [s]: the first is the run's own, the others its floor."""
+    """The animation first, SMOOTH last. seconds: how much of each. steps [s]: the run's own, then those of its floor."""
     progress("reading the recording", None)
     recorded = inputs.recording().recorded
-    robotis, _ = inputs.robotis()
+    robotis, smooth = inputs.robotis()
     mocap = inputs.recorded_angles(recorded)
     progress("filtering", None)
     paths = {"robotis M": inputs.matlab_filter(robotis), "robotis": inputs.own_filter(robotis),
-             "mocap M": inputs.matlab_filter(mocap), "mocap": inputs.own_filter(mocap)}
+             "mocap M": inputs.matlab_filter(mocap), "mocap": inputs.own_filter(mocap), SMOOTH: inputs.own_filter(smooth)}
     configs = [replace(IDEAL, time_step=h) for h in steps]
     if other_contact:
         configs.append(replace(IDEAL, time_step=steps[0], contact="hydroelastic"))

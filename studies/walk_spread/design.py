@@ -20,7 +20,7 @@ from workbench.robot.resources import resolve_model
 
 FACTORS = ("masses", "friction", "step", "contact")
 """That the question names; `drive` is apart, each drive has a cloud of its own."""
-CENTRE = {"masses": "as built", "friction": 0.6, "step": 1e-3, "contact": "point"}
+CENTRE: Mapping[str, Any] = {"masses": "as built", "friction": 0.6, "step": 1e-3, "contact": "point"}
 MASSES: Mapping[str, float | int] = {"-15 %": 0.85, "as built": 1.0, "+15 %": 1.15, "seed 1": 1}
 """All links by one factor (float), or each by a factor of its own from 0.85 to 1.15, drawn with a seed (int)."""
 MASS_RANGE = (0.85, 1.15)
@@ -66,7 +66,7 @@ class Design:
             "question": "Six seconds of the ROBOTIS walk from rest: how far do distance and heading spread?",
             "seconds": self.seconds, "drives": list(self.drives), "levels": {k: list(v) for k, v in self.levels.items()},
             "masses": {"one factor for all links, or a seed for one each": dict(MASSES), "range": list(MASS_RANGE)},
-            "excursions": list(self.excursions), "centre": CENTRE, "runs": len(self.cases),
+            "excursions": list(self.excursions), "centre": dict(CENTRE), "runs": len(self.cases),
             "inputs_sha256": dict(self.inputs_sha256)}, indent=1, sort_keys=True) + "\n"
 
     @property

@@ -43,14 +43,14 @@ def draw_cloud(ends: Ends) -> Figure:
     for x in (REAL[0], SIMULATED_OWN[0]):
         grid[0, 0].axvline(x, color=style.RECORDED if x == REAL[0] else style.COMMAND, lw=1.5, ls="--")
     grid[0, 1].set_axis_off()
-    plane.set_xlim(left=0)
+    plane.set_xlim(left=min(0.0, plane.get_xlim()[0]))
     plane.set_xlabel("x, forward [cm]")
     plane.set_ylabel("heading, positive to the left [deg]")
     grid[0, 0].set_ylabel("runs")
     grid[1, 1].set_xlabel("runs")
     grid[0, 0].set_title("six seconds of the ROBOTIS walk")
     handles, labels = plane.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
 
 
