@@ -21,7 +21,8 @@ SPRING_TIME = 1e-3
 """Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
 they are stable for any stiffness on any link up to a step of twice this (h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME)."""
 PLAY_DAMPING = 5e-4
-"""Of a gear's play [N m s/rad]: a leg that swings in it comes to rest within a second, yet falls through it nearly freely."""
+"""Of a gear's play [N m s/rad]: a link that swings in it comes to rest in seconds, and a servo that moves at 3 rad/s drags
+it along with a mere 1.5 mN m."""
 DRAKE = "{http://drake.mit.edu}"
 
 
@@ -74,15 +75,16 @@ class SdfRobot:
 
     def set_stop(self, joint: str, lower: float, upper: float) -> None:
         """The servo's joint ends at these angles, or where it ended before if that is nearer."""
-        if not lower < upper:
-            raise InputError(self.path, f"stop of '{joint}': expected lower below upper")
         axis = self._joint(joint).find("axis")
         assert axis is not None  # a revolute joint without one is no joint that Drake reads
         limit = axis.find("limit")
         limit = SubElement(axis, "limit") if limit is None else limit
+        lower, upper = max(lower, float(limit.findtext("lower", "-inf"))), min(upper, float(limit.findtext("upper", "inf")))
+        if not lower < upper:
+            raise InputError(self.path, f"stop of '{joint}': expected lower below upper, and both within the joint's own range")
+        set_child(limit, "lower", lower)
+        set_child(limit, "upper", upper)
         self.ends = True
-        set_child(limit, "lower", max(lower, float(limit.findtext("lower", "-inf"))))
-        set_child(limit, "upper", min(upper, float(limit.findtext("upper", "inf"))))
 
     def add_parallel_spring(self, joint: str, stiffness: float) -> None:
         """A spring [N m/rad] across the servo's joint, at rest in neutral, beside one that the file may give it."""
