@@ -6,21 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from workbench.motion.commands import Commands
 from workbench.motion.motion import load_motion
-from workbench.robot import (
-    BUS_IDS,
-    PUPPY,
-    RIGID_BODIES,
-    Ground,
-    InputError,
-    RobotModel,
-    ServoConstants,
-    load_servo_constants,
-    puppy_model,
-)
+from workbench.robot import InputError, RobotModel
+from workbench.robot.robot_section import read_model
 from workbench.robot.yaml_file import Fields, read_yaml
 
 Base = Literal["free", "fixed"]
@@ -77,6 +68,12 @@ class Session:
         """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
         return (model or self.model).with_servos(take.servos)
 
+    def with_model(self, model: RobotModel) -> Session:
+        """The same recordings beside another model of the robot; InputError where that is another robot."""
+        if model.joints != self.model.joints or model.kinematics.links != self.model.kinematics.links:
+            raise InputError(model.description, f"expected the links and joints of the robot in {self.path}")
+        return replace(self, model=model)
+
 
 def load_session(path: str | Path) -> Session:
     """Reads `session.yaml`.
@@ -90,8 +87,7 @@ def load_session(path: str | Path) -> Session:
     top = Fields(path, read_yaml(path))
     if top.raw("format") != 1:
         raise top.error("format", "expected 1")
-    ground = _ground(top.mapping("ground"))
-    model = _robot(top.mapping("robot") or Fields(path, {}, "robot"), ground)
+    model = read_model(top)
     takes = tuple(_take(f, model) for f in top.sequence("takes"))
     predict = tuple(_predict(f, model) for f in top.sequence("predict"))
     top.done()
@@ -103,70 +99,6 @@ def load_session(path: str | Path) -> Session:
     if not takes and not predict:
         raise top.error("takes", "expected at least one take")
     return Session(path, model, takes, predict)
-
-
-def _ground(f: Fields | None) -> Ground | None:
-    if f is None:
-        return None
-    ground = Ground(
-        friction=f.number("friction", least=0), stiffness=f.number("stiffness", least=0, finite=False),
-        dissipation=f.number("dissipation", least=0),
-    )
-    f.done()
-    return ground
-
-
-def _robot(f: Fields, ground: Ground | None) -> RobotModel:
-    description = f.text("model", PUPPY) or PUPPY
-    if description == PUPPY:
-        model = puppy_model()
-    else:
-        file = description if description.startswith("package://") else str(f.existing("model", description))
-        model = RobotModel(description=file)
-    kinematics = model.kinematics
-    links, joints = kinematics.links, model.joints
-    base = f.text("base", model.base if model.base in links else kinematics.root) or ""
-    if base not in links:
-        raise f.error("base", f"the model has no link '{base}'; expected one of {', '.join(links)}")
-    bodies = {a: link for a, link in RIGID_BODIES.items() if link in links}
-    ids = {j: i for j, i in BUS_IDS.items() if j in joints}
-    given = f.mapping("rigid_bodies")
-    if given is not None:
-        bodies = {asset: _name(given, asset, link, "link", links) for asset, link in given.items()}
-        twice = [link for link in bodies.values() if list(bodies.values()).count(link) > 1]
-        if twice:
-            raise f.error("rigid_bodies", f"link '{twice[0]}' carries two assets; expected one each")
-    given = f.mapping("bus_ids")
-    if given is not None:
-        ids = {}
-        for joint, number in given.items():
-            _name(given, joint, joint, "joint", joints)
-            good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 253
-            if not good or number in ids.values():
-                raise given.error(joint, f"expected a bus ID of its own from 0 to 253, got {number!r}")
-            ids[joint] = number
-    servos = _servos(f, joints)
-    f.done()
-    return replace(
-        model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
-        ground=ground or model.ground)
-
-
-def _servos(f: Fields, joints: tuple[str, ...]) -> dict[str, ServoConstants]:
-    """Constants by joint, from one file for all or one for each; a joint without a file keeps the nominal AX-12A."""
-    given = f.raw("servos")
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping):
-        return dict.fromkeys(joints, load_servo_constants(f.existing("servos", given)))
-    each = Fields(f.path, given, f.at("servos"))
-    return {_name(each, j, j, "joint", joints): load_servo_constants(each.existing(j, f)) for j, f in each.items()}
-
-
-def _name(f: Fields, key: str, value: Any, kind: str, known: tuple[str, ...]) -> str:
-    if value not in known:
-        raise f.error(key, f"the model has no {kind} '{value}'; expected one of {', '.join(known)}")
-    return str(value)
 
 
 def _take(f: Fields, model: RobotModel) -> TakeSpec:

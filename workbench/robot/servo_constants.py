@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -99,26 +100,27 @@ _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage",
 
 def load_servo_constants(path: str | Path) -> ServoConstants:
     """Reads `servo.yaml`; InputError names the file and the key."""
-    path = Path(path)
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise InputError(path, "expected a mapping of servo constants")
-    required = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
-                "reflected_inertia"}
-    missing = sorted(required - set(content))
-    if missing:
-        raise InputError(path, f"key '{missing[0]}' is missing")
-    law = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
-    try:
-        constants: dict[str, Any] = dict.fromkeys(law) | _as_known(content)
-        return ServoConstants(**constants)
-    except ValueError as e:
-        raise InputError(path, str(e)) from None
+    return servo_constants(read_yaml(path), Path(path))
 
 
-def _as_known(content: dict[str, Any]) -> dict[str, Any]:
-    known = {f.name for f in fields(ServoConstants)}
+def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants:
+    """Constants out of keys and values that stand at `place` in the file `path`; InputError names file, place and key."""
+    at = f"{place}: " if place else ""
+    if not isinstance(content, Mapping):
+        raise InputError(path, f"{at}expected a mapping of servo constants")
+    known = [f.name for f in fields(ServoConstants)]
     for key in content:
         if key not in known:
-            raise ValueError(f"unknown key '{key}'; expected one of {', '.join(sorted(known))}")
-    return content
+            raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(known))}")
+    missing = sorted(_REQUIRED - set(content))
+    if missing:
+        raise InputError(path, f"{at}key '{missing[0]}' is missing")
+    law = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
+    try:
+        return ServoConstants(**(dict.fromkeys(law) | dict(content)))
+    except ValueError as e:
+        raise InputError(path, f"{at}{e}") from None
+
+
+_REQUIRED = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
+             "reflected_inertia"}

@@ -38,6 +38,23 @@ for _tag, _pattern, _first in (
 _CoreLoader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(node.value))
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes what YAML 1.1 or 1.2 would take for something else than text; no anchors, as a person would write."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+_Dumper.yaml_implicit_resolvers = {
+    first: [*yaml.SafeDumper.yaml_implicit_resolvers.get(first, []), *_CoreLoader.yaml_implicit_resolvers.get(first, [])]
+    for first in {*yaml.SafeDumper.yaml_implicit_resolvers, *_CoreLoader.yaml_implicit_resolvers}}
+
+
+def yaml_text(content: Mapping[str, Any]) -> str:
+    """Plain types as YAML, in their order, that `read_yaml` gives back; lists of numbers on one line."""
+    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=120, allow_unicode=True)
+
+
 def read_yaml(path: str | Path) -> Any:
     """Content of a YAML file (1.2 core schema, no key twice); InputError if it cannot be read."""
     text = read_text(path)

@@ -1,0 +1,219 @@
+"""What a diagnosis says (contract, section 6), typed: the verdict, where the gap is, what explains it, what does not."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, get_args
+
+from workbench.effects.base import Layer
+from workbench.robot import Posterior, RobotModel
+from workbench.robot.files import write_together
+from workbench.robot.model_file import model_text
+
+Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
+Vector: TypeAlias = tuple[float, float, float]
+FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
+
+
+@dataclass(frozen=True)
+class Change:
+    """An error before and after an effect entered, in `unit`."""
+
+    before: float
+    after: float
+    unit: str
+
+    def to_json(self) -> dict[str, Any]:
+        return {"before": _number(self.before), "after": _number(self.after), "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter in the contract's unit (section 7). low, high bound 90 %; infinite where the data give no bound."""
+
+    value: float | Vector
+    low: float | Vector
+    high: float | Vector
+    unit: str
+
+    def __post_init__(self) -> None:
+        value, low, high = (x if isinstance(x, tuple) else (x,) for x in (self.value, self.low, self.high))
+        if not len(value) == len(low) == len(high) in (1, 3):
+            raise ValueError("expected value, low and high alike: one number each, or three")
+        for v, a, b in zip(value, low, high):
+            if not (math.isfinite(v) and a <= v <= b):
+                raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
+
+    def to_json(self) -> dict[str, Any]:
+        return {"value": _numbers(self.value), "low": _numbers(self.low), "high": _numbers(self.high), "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """An effect that the data cannot tell from the finding's."""
+
+    effect: str
+    where: tuple[str, ...]
+    confidence: float
+
+    def __post_init__(self) -> None:
+        _check_confidence(self.confidence)
+
+    def to_json(self) -> dict[str, Any]:
+        return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence)}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A piece of physics that the model lacked. confidence: probability that it is there, at that place. fit: error on the
+    stretches that were fitted; validation: on those that no choice and no parameter saw. evidence: for a person."""
+
+    effect: str
+    where: tuple[str, ...]
+    confidence: float
+    parameters: Mapping[str, Estimate]
+    fit: Change
+    validation: Change
+    alternatives: tuple[Alternative, ...] = ()
+    evidence: str = ""
+
+    def __post_init__(self) -> None:
+        _check_confidence(self.confidence)
+        if len(self.alternatives) > 1:
+            raise ValueError(f"a tie is one finding with at most one alternative, got {len(self.alternatives)}")
+
+    def to_json(self) -> dict[str, Any]:
+        return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence),
+                "parameters": {name: p.to_json() for name, p in self.parameters.items()},
+                "alternatives": [a.to_json() for a in self.alternatives],
+                "fit": self.fit.to_json(), "validation": self.validation.to_json(), **_said("evidence", self.evidence)}
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """An effect that was tried and not kept, and why."""
+
+    effect: str
+    where: tuple[str, ...]
+    reason: str
+    validation: Change | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason}
+        return out if self.validation is None else out | {"validation": self.validation.to_json()}
+
+
+@dataclass(frozen=True)
+class GapEntry:
+    """Where, when and in which layer a recording leaves the nominal model. when: spans of the take's clock [s]. phase: of the
+    gait, empty where there is none. error, floor: RMS there, and of noise and numerics, in `unit`."""
+
+    layer: Layer
+    where: tuple[str, ...]
+    take: str
+    when: tuple[tuple[float, float], ...]
+    error: float
+    floor: float
+    unit: str
+    phase: str = ""
+
+    def __post_init__(self) -> None:
+        if self.layer not in get_args(Layer):
+            raise ValueError(f"layer: expected one of {', '.join(get_args(Layer))}, got {self.layer!r}")
+
+    def to_json(self) -> dict[str, Any]:
+        return {"layer": self.layer, "where": list(self.where), "take": self.take,
+                "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_said("phase", self.phase),
+                "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What the fitted model leaves, and what it depends on (angle, speed, load, time, phase)."""
+
+    where: tuple[str, ...]
+    error: float
+    floor: float
+    unit: str
+    description: str
+
+    def to_json(self) -> dict[str, Any]:
+        return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
+                "description": self.description}
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """A motion (file beside findings.json) to record next, on a base free or fixed, and the ties that it separates."""
+
+    motion: str
+    base: Literal["free", "fixed"]
+    separates: tuple[tuple[str, str], ...]
+
+    def to_json(self) -> dict[str, Any]:
+        return {"motion": self.motion, "base": self.base, "separates": [list(pair) for pair in self.separates]}
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All that a session says. model: nominal with the findings' effects; posterior: of their parameters. left_out: damaged
+    takes, (name, reason). provenance: workbench, drake, model_sha256, seed, seconds."""
+
+    verdict: Verdict
+    model: RobotModel
+    nominal: RobotModel
+    gap: tuple[GapEntry, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+    unexplained: tuple[Unexplained, ...] = ()
+    next_experiment: NextExperiment | None = None
+    posterior: Posterior = field(default_factory=Posterior)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.verdict not in get_args(Verdict):
+            raise ValueError(f"verdict: expected one of {', '.join(get_args(Verdict))}, got {self.verdict!r}")
+
+    def to_json(self) -> dict[str, Any]:
+        """The contract's findings.json."""
+        out: dict[str, Any] = {
+            "format": 1, "verdict": self.verdict,
+            "gap": [g.to_json() for g in self.gap], "findings": [f.to_json() for f in self.findings],
+            "rejected": [r.to_json() for r in self.rejected], "unexplained": [u.to_json() for u in self.unexplained],
+            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_json(),
+            "provenance": dict(self.provenance),
+        }
+        if self.left_out:
+            out["left_out"] = [{"take": name, "reason": reason} for name, reason in self.left_out]
+        return out
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Writes findings.json, model.yaml and nominal.yaml into `folder`, all or none; returns their paths."""
+        folder = Path(folder)
+        return write_together(folder, {
+            FINDINGS: json.dumps(self.to_json(), indent=1, allow_nan=False, ensure_ascii=False) + "\n",
+            MODEL: model_text(self.model, folder, self.posterior, self.provenance),
+            NOMINAL: model_text(self.nominal, folder, provenance=self.provenance)})
+
+
+def _check_confidence(value: float) -> None:
+    if not 0 <= value <= 1:
+        raise ValueError(f"confidence: expected a probability, got {value}")
+
+
+def _said(key: str, text: str) -> dict[str, str]:
+    return {key: text} if text else {}
+
+
+def _number(value: float) -> Any:
+    """JSON has no infinity: null."""
+    return None if math.isinf(value) else float(value)
+
+
+def _numbers(value: float | Vector) -> Any:
+    return [_number(v) for v in value] if isinstance(value, tuple) else _number(value)

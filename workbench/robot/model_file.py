@@ -1,0 +1,168 @@
+"""`model.yaml`: a robot with the physics found missing in it, for this workbench and for any other Drake project.
+
+`MakePuppyStation(model=load_model("model.yaml"))` simulates it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot.files import write_whole
+from workbench.robot.model import EffectSpec, RobotModel
+from workbench.robot.robot_section import read_model, read_servos
+from workbench.robot.yaml_file import Fields, read_yaml, yaml_text
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """What is known of the effects' parameters, in the contract's units (section 7).
+
+    names: (n) such as "backlash(flm).gap", "payload(body_link).position.x". mean: (n,). covariance: (n, n), infinite where
+    the data say nothing.
+    """
+
+    names: tuple[str, ...] = ()
+    mean: Array = field(default_factory=lambda: np.zeros(0))
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if np.shape(self.mean) != (n,) or np.shape(self.covariance) != (n, n):
+            raise ValueError(f"expected mean ({n},) and covariance ({n}, {n}), got {np.shape(self.mean)}, {np.shape(self.covariance)}")
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """All that a model.yaml says."""
+
+    model: RobotModel
+    posterior: Posterior
+    provenance: Mapping[str, Any]
+
+
+def parameter_names(effects: Sequence[EffectSpec]) -> tuple[str, ...]:
+    """Names for a posterior, one for each number, in the effects' order."""
+    out = []
+    for e in effects:
+        at = f"{e.effect}({','.join(e.where)})" if e.where else e.effect
+        for name, value in e.parameters.items():
+            out += [f"{at}.{name}.{axis}" for axis in "xyz"] if isinstance(value, tuple) else [f"{at}.{name}"]
+    return tuple(out)
+
+
+def save_model(model: RobotModel, path: str | Path, posterior: Posterior | None = None,
+               provenance: Mapping[str, Any] | None = None) -> Path:
+    """Writes model.yaml, whole or not at all; InputError where it cannot be written."""
+    return write_whole(path, model_text(model, Path(path).parent, posterior, provenance))
+
+
+def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = None,
+               provenance: Mapping[str, Any] | None = None) -> str:
+    """The text of a model.yaml that is to lie in `folder`: an SDF inside that is named relative to it, another absolutely."""
+    servos = {j: {k: v for k, v in asdict(model.servo(j)).items() if v is not None} for j in model.joints}
+    alike = len({repr(s) for s in servos.values()}) == 1
+    content: dict[str, Any] = {
+        "format": 1,
+        "robot": {"model": _description(model, folder.resolve()), "base": model.base, "rigid_bodies": dict(model.rigid_bodies),
+                  "bus_ids": dict(model.bus_ids)},
+        "ground": {k: v for k, v in asdict(model.ground).items() if v is not None},
+        "servos": next(iter(servos.values())) if alike else servos,
+    }
+    if model.effects:
+        content["effects"] = [{"effect": e.effect, "where": list(e.where), "parameters": {
+            k: [float(x) for x in v] if isinstance(v, tuple) else float(v) for k, v in e.parameters.items()}} for e in model.effects]
+    if posterior is not None and posterior.names:
+        content["posterior"] = {"names": list(posterior.names), "mean": np.asarray(posterior.mean, dtype=float).tolist(),
+                                "covariance": np.asarray(posterior.covariance, dtype=float).tolist()}
+    if provenance:
+        content["provenance"] = dict(provenance)
+    return yaml_text(content)
+
+
+def _description(model: RobotModel, folder: Path) -> str:
+    if model.description.startswith("package://"):
+        return model.description
+    return str(model.path.relative_to(folder) if model.path.is_relative_to(folder) else model.path)
+
+
+def load_model(path: str | Path) -> RobotModel:
+    """The robot of a model.yaml, with its effects."""
+    return load_model_file(path).model
+
+
+def load_model_file(path: str | Path) -> ModelFile:
+    """Reads a model.yaml.
+
+    InputError names the file, the key and what was expected: an unknown key, a missing SDF, an effect at a place that the robot
+    lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects' room to say.
+    """
+    path = Path(path)
+    top = Fields(path, read_yaml(path))
+    if top.raw("format") != 1:
+        raise top.error("format", "expected 1")
+    model = read_model(top)
+    model = replace(model, servos={**model.servos, **read_servos(top, model.joints)},
+                    effects=tuple(_effect(f, model) for f in top.sequence("effects")))
+    posterior = _posterior(top.mapping("posterior"), model)
+    given = top.mapping("provenance")
+    provenance = {} if given is None else dict(given.items())
+    top.done()
+    return ModelFile(model, posterior, provenance)
+
+
+def _effect(f: Fields, model: RobotModel) -> EffectSpec:
+    name = str(f.required("effect", f.text("effect")))
+    where = f.raw("where") or []
+    places = {*model.joints, *model.kinematics.links, *model.rigid_bodies}
+    if not isinstance(where, list):
+        raise f.error("where", f"expected a list of names, got {where!r}")
+    for place in where:
+        if not isinstance(place, str) or place not in places:
+            raise f.error("where", f"the robot has no joint, link or rigid body '{place}'")
+    given = f.mapping("parameters")
+    parameters = {} if given is None else {key: _value(given, key, value) for key, value in given.items()}
+    f.done()
+    return EffectSpec(name, tuple(where), parameters)
+
+
+def _value(f: Fields, key: str, value: Any) -> float | tuple[float, float, float]:
+    if isinstance(value, list):
+        numbers = _numbers(f, key, value, finite=True)
+        if len(numbers) != 3:
+            raise f.error(key, f"expected one number or three, got {len(numbers)}")
+        return (numbers[0], numbers[1], numbers[2])
+    return _numbers(f, key, [value], finite=True)[0]
+
+
+def _posterior(f: Fields | None, model: RobotModel) -> Posterior:
+    if f is None:
+        return Posterior()
+    names, mean, covariance = (f.raw(key) for key in ("names", "mean", "covariance"))
+    f.done()
+    expected = list(parameter_names(model.effects))
+    if names != expected:
+        raise f.error("names", f"expected those of the effects, {', '.join(expected) or 'none'}")
+    if not isinstance(mean, list) or len(mean) != len(expected):
+        raise f.error("mean", f"expected a list of {len(expected)} numbers")
+    square = isinstance(covariance, list) and all(isinstance(row, list) and len(row) == len(expected) for row in covariance)
+    if not square or len(covariance) != len(expected):
+        raise f.error("covariance", f"expected {len(expected)} rows of {len(expected)} numbers")
+    rows = [_numbers(f, "covariance", row) for row in covariance]
+    return Posterior(tuple(expected), np.array(_numbers(f, "mean", mean)), np.array(rows).reshape(len(expected), len(expected)))
+
+
+def _numbers(f: Fields, key: str, values: Sequence[Any], finite: bool = False) -> list[float]:
+    for v in values:
+        good = isinstance(v, (int, float)) and not isinstance(v, bool) and not math.isnan(v) and not (finite and math.isinf(v))
+        if not good:
+            raise f.error(key, f"expected a number, got {v!r}")
+    return [float(v) for v in values]

@@ -1,0 +1,101 @@
+"""What `robot:` and `ground:` say in a YAML file (contract, section 1), of a session as of a fitted model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+from workbench.robot.errors import InputError
+from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
+from workbench.robot.names import BUS_IDS, RIGID_BODIES
+from workbench.robot.servo_constants import ServoConstants, load_servo_constants, servo_constants
+from workbench.robot.yaml_file import Fields
+
+_CONSTANTS = {f.name for f in fields(ServoConstants)}
+
+
+def read_model(top: Fields) -> RobotModel:
+    """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected.
+    """
+    ground = _ground(top.mapping("ground"))
+    f = top.mapping("robot") or Fields(top.path, {}, "robot")
+    description = f.text("model", PUPPY) or PUPPY
+    if description == PUPPY:
+        model = puppy_model()
+    else:
+        model = RobotModel(description=description if description.startswith("package://")
+                           else str(f.existing("model", description)))
+    try:
+        kinematics = model.kinematics
+    except InputError as e:
+        raise f.error("model", str(e)) from None
+    links, joints = kinematics.links, model.joints
+    base = f.text("base", model.base if model.base in links else kinematics.root) or ""
+    if base not in links:
+        raise f.error("base", f"the model has no link '{base}'; expected one of {', '.join(links)}")
+    bodies = _rigid_bodies(f, links)
+    ids = _bus_ids(f, joints)
+    servos = read_servos(f, joints)
+    f.done()
+    return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
+                   ground=ground or model.ground)
+
+
+def _ground(f: Fields | None) -> Ground | None:
+    if f is None:
+        return None
+    ground = Ground(
+        friction=f.number("friction", least=0), stiffness=f.number("stiffness", least=0, finite=False),
+        dissipation=f.number("dissipation", least=0),
+    )
+    f.done()
+    return ground
+
+
+def _rigid_bodies(f: Fields, links: tuple[str, ...]) -> dict[str, str]:
+    given = f.mapping("rigid_bodies")
+    if given is None:
+        return {a: link for a, link in RIGID_BODIES.items() if link in links}
+    bodies = {asset: _name(given, asset, link, "link", links) for asset, link in given.items()}
+    twice = [link for link in bodies.values() if list(bodies.values()).count(link) > 1]
+    if twice:
+        raise f.error("rigid_bodies", f"link '{twice[0]}' carries two assets; expected one each")
+    return bodies
+
+
+def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
+    given = f.mapping("bus_ids")
+    if given is None:
+        return {j: i for j, i in BUS_IDS.items() if j in joints}
+    ids: dict[str, int] = {}
+    for joint, number in given.items():
+        _name(given, joint, joint, "joint", joints)
+        good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 253
+        if not good or number in ids.values():
+            raise given.error(joint, f"expected a bus ID of its own from 0 to 253, got {number!r}")
+        ids[joint] = number
+    return ids
+
+
+def read_servos(f: Fields, joints: tuple[str, ...]) -> dict[str, ServoConstants]:
+    """Constants by joint, of the key `servos`: one for all or one for each, as files or as they are; empty where it is absent."""
+    given = f.raw("servos")
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping) or not set(given).isdisjoint(_CONSTANTS.difference(joints)):
+        return dict.fromkeys(joints, _constants(f, "servos", given))
+    each = Fields(f.path, given, f.at("servos"))
+    return {_name(each, joint, joint, "joint", joints): _constants(each, joint, value) for joint, value in each.items()}
+
+
+def _constants(f: Fields, key: str, value: Any) -> ServoConstants:
+    if not isinstance(value, Mapping):
+        return load_servo_constants(f.existing(key, value))
+    return servo_constants(value, f.path, f.at(key))
+
+
+def _name(f: Fields, key: str, value: Any, kind: str, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise f.error(key, f"the model has no {kind} '{value}'; expected one of {', '.join(known)}")
+    return str(value)
