@@ -284,10 +284,12 @@ def test_parameters_come_to_si():
 
 
 def test_every_effect_of_the_contract_is_known_and_says_what_it_is():
-    contract = set("""backlash joint_compliance coulomb_friction viscous_friction supply_voltage servo_gain dead_band
-        reflected_inertia joint_stop zero_offset parallel_spring command_delay timing_drift clock_rate dropped_command
-        speed_order loose_mount link_length payload com_shift ground_friction foot_friction ground_tilt soft_ground tether_force
-        marker_frame""".split())
+    contract = {
+        "backlash", "joint_compliance", "coulomb_friction", "viscous_friction", "supply_voltage",
+        "servo_gain", "dead_band", "reflected_inertia", "joint_stop", "zero_offset", "parallel_spring",
+        "command_delay", "timing_drift", "clock_rate", "dropped_command", "speed_order", "loose_mount",
+        "link_length", "payload", "com_shift", "ground_friction", "foot_friction", "ground_tilt",
+        "soft_ground", "tether_force", "marker_frame"}
     effects = known_effects()
     assert contract <= set(effects)
     example = {"joint": "flm", "foot": "flb", "link": "flm_link", "rigid_body": "FLmid"}
