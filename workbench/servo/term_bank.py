@@ -1,0 +1,184 @@
+"""A servo bank whose servos do more than the nominal law: a failing supply, a ceiling, friction that varies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import RevoluteJoint
+from pydrake.systems.framework import BasicVector, Context, DependencyTicket, DiscreteValues, ValueProducer
+
+from workbench.servo.law import ServoLaw
+from workbench.servo.system import BRISTLE_SHARPNESS, BRISTLE_SLIP, ServoBank
+from workbench.servo.terms import Instant, ServoTerm, most_friction
+
+Array = NDArray[np.float64]
+
+LOAD_SMOOTHING = 2e-3
+"""Time constant [s] of the load that friction sees: following at once, friction and load would feed on each other from step to
+step."""
+MOVING = 5e-3
+"""Speed [rad/s] from which a joint's direction is that of its velocity, far above creep at rest."""
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """(n,) [N m]. push: duty torque as the plant takes it, which takes back-EMF off itself; motor: duty torque less back-EMF;
+    friction: the dry friction wanted; relief: what the bank takes off the plant's, along the motion."""
+
+    push: Array
+    motor: Array
+    friction: Array
+    relief: Array
+
+
+class TermBank(ServoBank):
+    """As ServoBank, with `terms`; duty torque times their strengths, motor torque cut at their lowest ceiling, friction raised.
+
+    Further ports: input `net_actuation` (of the plant; needed where friction varies in a discrete plant), output
+    `friction_relief` (n) N m.
+
+    Ceiling: back-EMF is damping of the plant, implicit in a discrete one, so that a cut motor torque gets it back, at the velocity
+    to expect at the end of the step.
+
+    Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank pushes
+    along the motion, at rest along the motion that friction prevents, with that less the friction wanted. Held joints
+    stay exactly held, as the actuator takes up what the bank pushes. Direction and load are those of the last step; a joint that
+    turns back rests for one step. Bristles: they yield at the friction wanted.
+
+    The load is what the servo hands to its link: motor torque less viscous and dry friction less what the reflected inertia takes,
+    exact in discrete plants for the step before the last; in continuous ones by differences over a period. Friction sees it
+    through a first-order lag of LOAD_SMOOTHING.
+
+    Discrete state besides the reference: velocity (n), what is known of the load (n), load (n), friction of the last step (n),
+    and whether there was a last step (1).
+    """
+
+    def __init__(
+        self, plant: MultibodyPlant, joints: Sequence[RevoluteJoint], law: ServoLaw, period: float, bristles: bool,
+        terms: Sequence[ServoTerm],
+    ) -> None:
+        self.terms = tuple(terms)
+        self._most = most_friction(terms, law)
+        self._varies = bool((self._most > law.coulomb).any())
+        self._ceiling = np.full(len(joints), np.inf)
+        for term in terms:
+            self._ceiling = np.minimum(self._ceiling, term.ceiling())
+        self._discrete = plant.time_step() > 0
+        self._smoothing = period / (period + LOAD_SMOOTHING)
+        self._inertia_rate = law.inertia / period
+        self._actuators = _last_actuators(plant, joints)
+        super().__init__(plant, joints, law, period, bristles)
+
+    def _declare_terms(self, plant: MultibodyPlant) -> set[DependencyTicket]:
+        n = len(self.joints)
+        self._net_actuation = self.DeclareVectorInputPort("net_actuation", plant.num_actuators())
+        self._memory = int(self.DeclareDiscreteState(4 * n + 1))
+        self._first_command = int(self.DeclareNumericParameter(BasicVector([0.0])))
+        more = {self.time_ticket(), self.pa_ticket()}
+        state = more | {self._state.ticket(), self._enable.ticket(), self.xd_ticket()}
+        self._parts = self.DeclareCacheEntry(
+            "parts", ValueProducer(allocate=lambda: AbstractValue.Make(_Parts(*np.zeros((4, n)))),
+                                   calc=lambda context, value: value.set_value(self._calc_parts(context))), state)
+        self.DeclareVectorOutputPort("friction_relief", n, self._calc_relief, state)
+        return more
+
+    def SetFirstCommand(self, context: Context, time: float) -> None:
+        """When the first command comes [s]; without this, at time 0. Infinity: not yet."""
+        context.get_mutable_numeric_parameter(self._first_command).SetFromVector([time])
+
+    def SetReference(self, context: Context, reference: Array) -> None:
+        """As in ServoBank; joints may have been moved, so that the last step says nothing about the next."""
+        super().SetReference(context, reference)
+        context.SetDiscreteState(self._memory, np.zeros(4 * len(self.joints) + 1))
+
+    def _remembered(self, context: Context) -> tuple[Array, bool]:
+        """Rows (4, n) of the discrete state, and whether there was a last step."""
+        memory = context.get_discrete_state(self._memory).value()
+        return memory[:-1].reshape(4, -1), bool(memory[-1])
+
+    def _calc_parts(self, context: Context) -> _Parts:
+        x, on, law = self._state.Eval(context), self._command(context)[3], self.law
+        v = x[self._x_v]
+        duty = law.duty(context.get_discrete_state(0).value() - x[self._q])
+        duty = duty if on is None else duty * on
+        (last_v, _, load, held), stepped = self._remembered(context)
+        begin = context.get_numeric_parameter(self._first_command).value()[0]
+        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load)
+        torque, friction = duty * law.full_torque, law.coulomb
+        for term in self.terms:
+            torque = torque * term.strength(law, now)
+            friction = friction + term.friction(now)
+        friction = np.minimum(friction, self._most)
+        ahead = 2.0 * v - last_v if stepped and self._discrete else v
+        push, motor = torque - _beyond(torque - law.back_emf * ahead, self._ceiling), torque - law.back_emf * v
+        motor = motor - _beyond(motor, self._ceiling)
+        if on is not None:  # no back-EMF either: undo the joint's share of damping
+            push, motor = np.where(on, push, law.back_emf * v), np.where(on, motor, 0.0)
+        if not self._varies or self._bristles:
+            return _Parts(push, motor, friction, np.zeros_like(v))
+        yielding = np.maximum(friction / 2, 1e-6)  # well below the friction of a joint that slides, so that this one counts as such
+        direction = np.clip(v / MOVING - held / yielding, -1.0, 1.0)
+        return _Parts(push, motor, friction, (self._most - friction) * direction)
+
+    def _calc_force(self, context: Context, output: BasicVector) -> None:
+        parts: _Parts = self._parts.Eval(context)
+        torque = parts.push + parts.relief
+        if self._bristles:
+            torque = torque - self._bristle_force(context, self._state.Eval(context)[self._x_v])
+        self._force[self._v] = torque
+        output.SetFromVector(self._force)
+
+    def _calc_motor_torque(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._parts.Eval(context).motor)
+
+    def _calc_relief(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._parts.Eval(context).relief)
+
+    def _advance(self, context: Context, values: DiscreteValues) -> None:
+        super()._advance(context, values)
+        (_, known, load, _), stepped = self._remembered(context)
+        parts: _Parts = self._parts.Eval(context)
+        v = self._state.Eval(context)[self._x_v]
+        if stepped:  # implicit damping and the reflected inertia's change of speed, now that the step's end is known
+            handed = known - (self.law.damping + self._inertia_rate) * v
+            load = load + self._smoothing * (handed - load)
+        friction = self._friction(context, parts, v)
+        known = parts.push + friction + self._inertia_rate * v
+        values.set_value(self._memory, np.concatenate([v, known, load, friction, [1.0]]))
+
+    def _friction(self, context: Context, parts: _Parts, v: Array) -> Array:
+        """Dry friction on the joints (n,) [N m] over the step that begins."""
+        if self._bristles:
+            return -self._bristle_force(context, v)
+        if not self._varies:
+            return np.zeros_like(v)  # nobody asks
+        return np.asarray(self._net_actuation.Eval(context)[self._actuators] + parts.relief)
+
+    def _bristle_rate(self, context: Context, v: Array) -> tuple[Array, Array]:
+        z = context.get_continuous_state_vector().CopyToVector()
+        load = np.maximum(np.sign(v) * z / BRISTLE_SLIP, 0.0)
+        return z, np.where(self._most > 0, v * (1.0 - load**BRISTLE_SHARPNESS), 0.0)
+
+    def _bristle_force(self, context: Context, v: Array) -> Array:
+        z, rate = self._bristle_rate(context, v)
+        level = self._parts.Eval(context).friction
+        stiffness = level / BRISTLE_SLIP
+        force = stiffness * z + 2.0 * np.sqrt(stiffness * self.law.inertia) * rate
+        return np.asarray(np.clip(force, -level, level), dtype=float)
+
+
+def _beyond(torque: Array, ceiling: Array) -> Array:
+    """What of a torque is beyond the ceiling, with its sign."""
+    return torque - np.clip(torque, -ceiling, ceiling)
+
+
+def _last_actuators(plant: MultibodyPlant, joints: Sequence[RevoluteJoint]) -> NDArray[np.int_]:
+    """Columns of net_actuation that show the joints' totals."""
+    actuators = [plant.get_joint_actuator(a) for a in plant.GetJointActuatorIndices()]
+    column = {a.joint().name(): a.input_start() for a in actuators}
+    return np.array([column[j.name()] for j in joints], dtype=int)

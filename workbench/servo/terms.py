@@ -1,0 +1,52 @@
+"""What a servo may do beyond the nominal law, at each instant: terms of a TermBank."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.servo.law import ServoLaw
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) of the joints [rad/s]; duty (n,), 0 with
+    torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it."""
+
+    elapsed: float
+    velocity: Array
+    duty: Array
+    load: Array
+
+
+class ServoTerm:
+    """Does nothing unless overridden. What it returns is for all servos (n,), or one number for all."""
+
+    def strength(self, law: ServoLaw, now: Instant) -> Array | float:
+        """What is left of the duty torque, 0 to 1."""
+        return 1.0
+
+    def ceiling(self) -> Array | float:
+        """Most of the motor's torque, duty torque less back-EMF [N m]."""
+        return np.inf
+
+    def friction(self, now: Instant) -> Array | float:
+        """Dry friction beyond the law's Coulomb friction [N m], not negative."""
+        return 0.0
+
+    def most_friction(self, law: ServoLaw) -> Array | float:
+        """The most that `friction` may ask for [N m]; above 0 where it varies."""
+        return 0.0
+
+
+def most_friction(terms: Sequence[ServoTerm], law: ServoLaw) -> Array:
+    """The most dry friction of each servo, Coulomb's included (n,) [N m]."""
+    most = law.coulomb.copy()
+    for term in terms:
+        most = most + term.most_friction(law)
+    return most
