@@ -19,7 +19,8 @@ GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
 joint is the servo's reflected inertia, which stays on the servo's joint."""
 SPRING_TIME = 1e-3
 """Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
-they are stable for any stiffness on any link up to a step of twice this (h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME)."""
+they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME.
+For longer steps the station adds damping."""
 PLAY_DAMPING = 5e-4
 """Of a gear's play [N m s/rad]: a link that swings in it comes to rest in seconds, and a servo that moves at 3 rad/s drags
 it along with a mere 1.5 mN m."""

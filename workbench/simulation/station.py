@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -19,6 +20,7 @@ from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 
 from workbench.effects.apply import Physics, physics_of
+from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import ConfigureParser, InputError, RobotModel, puppy_model
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
@@ -52,6 +54,7 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
     builder = RobotDiagramBuilder(time_step=config.time_step)
     plant = builder.plant()
     instance = _add_model(builder, model, physics)
+    _steady_springs(plant, physics)
     plant.mutable_gravity_field().set_gravity_vector(physics.gravity)
     if config.time_step > 0:
         plant.set_discrete_contact_approximation(_APPROXIMATIONS[config.approximation])
@@ -72,6 +75,15 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
         ConnectPath(builder)
     _add_logs(builder, plant, config)
     return builder.Build()
+
+
+def _steady_springs(plant: MultibodyPlant, physics: Physics) -> None:
+    """More damping between servos and links than the description has, where the step is too long for it (SPRING_TIME)."""
+    more = plant.time_step() / (2 * SPRING_TIME)
+    if more > 1:
+        for stage in itertools.chain.from_iterable(physics.stages.values()):
+            joint = plant.GetJointByName(stage)
+            joint.set_default_damping(more * joint.default_damping())
 
 
 def _check_ends(config: SimulationConfig, physics: Physics) -> None:
