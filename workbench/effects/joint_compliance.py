@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from workbench.effects.base import Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
@@ -21,6 +23,9 @@ class JointCompliance(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"{', '.join(spec.where)} twists against its servo with {scalar(spec, 'stiffness'):.1f} N m/rad."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (math.inf,)
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

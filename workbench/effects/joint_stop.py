@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
@@ -23,6 +25,9 @@ class JointStop(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"{', '.join(spec.where)} goes no further than {scalar(spec, 'lower'):.1f} and {scalar(spec, 'upper'):.1f} deg."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (-math.inf, math.inf)
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

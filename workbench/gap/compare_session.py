@@ -52,7 +52,7 @@ def compare_session(session: Session, config: SimulationConfig | None = None, *,
     config = config or SimulationConfig()
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
-    rollouts = roll_out([_run(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
+    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
     nominal = {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}
     registered, unregistered = register_takes(session, takes, nominal, progress)
     by_name = dict(zip(nominal, rollouts))
@@ -105,7 +105,7 @@ def _cost(job: Job) -> float:
     return steps * (2 if job.config.contact == "hydroelastic" else 1)
 
 
-def _run(t: ReadTake) -> Run:
+def run_of(t: ReadTake) -> Run:
     return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base)
 
 
