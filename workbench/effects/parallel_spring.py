@@ -8,7 +8,10 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class ParallelSpring(Effect):
-    """Something pulls a joint back to neutral: a cable across it, as a spring."""
+    """Something pulls a joint back to neutral: a cable across it, as a spring.
+
+    It acts on the servo's joint: where play or a soft gear is at the same joint, on the servo's side of it.
+    """
 
     name = "parallel_spring"
     layer = "structure"

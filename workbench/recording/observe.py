@@ -44,6 +44,7 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
     zeroed = replace(
         seen, q=seen.q - q0, zeroed=True, p_WB=p_WB - p0 + np.array([0, 0, m.origin[2]]),
         quat_WB=quat.multiply(quat_WB, quat.conjugate(quat0)), servo_q=None, links={},
+        off_axis=None if seen.off_axis is None else seen.off_axis - _rest_off_axis(take),
         bodies={a: BodyTrack(turned(b.p - [m.origin[0], m.origin[1], 0.0], -m.yaw), turned_quaternion(b.quat, -m.yaw))
                 for a, b in bodies.items()})
     if bodies and (take.links or m.frames):
@@ -63,6 +64,11 @@ def _at_rest(take: Take) -> tuple[Array, Array, Array]:
     p = np.zeros(3) if take.p_WB is None else take.p_WB[rest].mean(axis=0)
     turn = np.array([1.0, 0, 0, 0]) if take.quat_WB is None else quat.mean(take.quat_WB[rest])
     return take.q[rest].mean(axis=0), p, turn
+
+
+def _rest_off_axis(take: Take) -> Array:
+    assert take.off_axis is not None
+    return np.asarray(take.off_axis[_resting(take)].mean(axis=0))
 
 
 def _model_poses(q: Array, p_WB: Array, quat_WB: Array, joints: tuple[str, ...], m: Measurement,
