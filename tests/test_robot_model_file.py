@@ -87,7 +87,7 @@ def test_another_drake_project_simulates_it_in_one_line(tmp_path: Path) -> None:
     ("effect: backlash", "efect: backlash", "effects[0].effect: is missing"),
     ("gap: 3.1", "gap: wide", "effects[0].parameters.gap: expected a number"),
     ("gap: 3.1", "gap: .inf", "effects[0].parameters.gap: expected a number"),
-    ("position: [0.01, 0.0, -0.02]", "position: [0.01, 0.0]", "effects[1].parameters.position: expected one number or three, got 2"),
+    ("position: [0.01, 0.0, -0.02]", "position: [0.01, 0.0]", "effects[1].parameters.position: expected one number or three"),
     ("where: [two]", "where: [four]", "effects[0].where: the robot has no joint, link or rigid body 'four'"),
     ("where: [two]", "where: two", "effects[0].where: expected a list"),
     ("model: robot.sdf", "model: none.sdf", "robot.model: file not found"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,7 +19,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("a", metavar="SESSION|A", help="session.yaml; or a recording, motion or rollout")
     parser.add_argument("b", metavar="B", nargs="?", help="what to compare A with: a recording, motion or rollout")
-    add_model(parser)
+    add_model(parser, "the session's own; of two files, the bundled puppy")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of A and B; a session says it itself")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
@@ -41,6 +41,8 @@ def run(args: argparse.Namespace) -> int:
     with output_directory(args.out) as folder, Progress("compare") as progress:
         if args.b is None:
             session = load_session(args.a)
+            if args.model != PUPPY:
+                session = session.with_model(load_model(args.model))
             model, title = session.model, f"Session {session.path}"
             comparison = compare_session(session, config, progress=progress)
         else:

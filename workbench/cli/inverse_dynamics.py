@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("input", metavar="INPUT", help="a motion, a rollout, a recording, or a session.yaml with --take")
     parser.add_argument("--take", metavar="NAME", help="take of the session")
     parser.add_argument("--motion", metavar="FILE", help="motion that was played in the recording, if it does not say itself")
-    add_model(parser)
+    add_model(parser, "the bundled puppy; with --take the session's own")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of a motion or recording (default: free)")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
     add_out(parser, default="runs/inverse-dynamics")
@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
 
     with output_directory(args.out) as folder, Progress("inverse-dynamics") as progress:
         if args.take:
-            model, result = forces_of_take(args.input, args.take, progress)
+            other = None if args.model == PUPPY else load_model(args.model)
+            model, result = forces_of_take(args.input, args.take, progress, other)
         else:
             model = load_model(args.model)
             result = forces_of_file(args.input, model, args.base, args.cycles, args.motion, progress)

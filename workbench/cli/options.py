@@ -12,11 +12,12 @@ if TYPE_CHECKING:
 PUPPY = "package://puppy/puppy.sdf"
 
 
-def add_model(parser: argparse.ArgumentParser) -> None:
-    """--model: which robot."""
+def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy") -> None:
+    """--model: which robot; PUPPY where nothing is said. default: what that stands for."""
     parser.add_argument(
         "--model", metavar="FILE", default=PUPPY,
-        help="robot: an SDF or URDF, or a session.yaml whose robot, servos and ground are taken (default: the bundled puppy)")
+        help="robot: a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos and ground are taken "
+        f"(default: {default})")
 
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -28,14 +29,25 @@ def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None
 
 
 def load_model(name: str) -> RobotModel:
-    """The robot that --model names."""
+    """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
+    from workbench.effects.apply import resolved
     from workbench.gap.session import load_session
-    from workbench.robot import RobotModel, puppy_model
+    from workbench.robot import InputError, RobotModel, puppy_model
+    from workbench.robot.model_file import load_model as read_model_file
+    from workbench.robot.yaml_file import read_yaml
 
     if name == PUPPY:
         return puppy_model()
     if Path(name).suffix.lower() in (".yaml", ".yml"):
-        return load_session(name).model
+        content = read_yaml(name)
+        if isinstance(content, dict) and not {"takes", "predict"}.isdisjoint(content):
+            return load_session(name).model
+        model = read_model_file(name)
+        try:
+            list(resolved(model))
+        except InputError as e:
+            raise InputError(name, f"effects: {e.problem}") from None
+        return model
     model = RobotModel(description=name)
     return RobotModel(description=name, base=model.kinematics.root)
 

@@ -17,9 +17,11 @@ from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 
 
-def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress) -> tuple[RobotModel, InverseDynamicsResult]:
-    """Of the recorded take `name` of a session; with the robot as it was in that take."""
+def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress, model: RobotModel | None = None,
+                   ) -> tuple[RobotModel, InverseDynamicsResult]:
+    """Of the recorded take `name` of a session; with the robot as it was in that take. model: another than the session's."""
     session = load_session(path)
+    session = session if model is None else session.with_model(model)
     chosen = [t for t in session.takes if t.name == name]
     if not chosen:
         raise InputError(path, f"takes: no take '{name}'; takes: {', '.join(t.name for t in session.takes)}")

@@ -104,7 +104,7 @@ def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) ->
 def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mapping[str, Take],
                    progress: Progress = no_progress) -> tuple[list[RegisteredTake], LeftOut]:
     """Registers each take against its rollout (by the take's name), with one yaw for all of them."""
-    yaw = _yaw(session, [t for t in takes if t.recording.rigid_bodies])
+    yaw = capture_yaw(session, takes)
     registered: list[RegisteredTake] = []
     left: list[tuple[str, str]] = []
     for i, t in enumerate(takes):
@@ -116,8 +116,9 @@ def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mappin
     return registered, remaining(session, registered, tuple(left))
 
 
-def _yaw(session: Session, captured: Sequence[ReadTake]) -> float | None:
-    """One for all takes that cameras saw; None without any."""
+def capture_yaw(session: Session, takes: Sequence[ReadTake]) -> float | None:
+    """One yaw [rad] for all takes that cameras saw; None without any."""
+    captured = [t for t in takes if t.recording.rigid_bodies]
     if not captured:
         return None
     try:

@@ -11,5 +11,6 @@ from workbench.robot.servo_constants import COUNT, SPEED_UNIT, ServoConstants, l
 __all__ = [
     "BUS_IDS", "COUNT", "FEET", "JOINTS", "PUPPY", "RIGID_BODIES", "SPEED_UNIT", "ConfigurePackageMap", "ConfigureParser",
     "EffectSpec", "Ground", "InputError", "JointFrame", "Kinematics", "ModelFile", "Posterior", "RobotModel", "ServoConstants",
-    "data_file", "load_model", "load_model_file", "load_servo_constants", "puppy_model", "resolve_model", "resource_dir", "save_model",
+    "data_file", "load_model", "load_model_file", "load_servo_constants", "puppy_model", "resolve_model", "resource_dir",
+    "save_model",
 ]

@@ -37,7 +37,8 @@ class Posterior:
     def __post_init__(self) -> None:
         n = len(self.names)
         if np.shape(self.mean) != (n,) or np.shape(self.covariance) != (n, n):
-            raise ValueError(f"expected mean ({n},) and covariance ({n}, {n}), got {np.shape(self.mean)}, {np.shape(self.covariance)}")
+            got = f"{np.shape(self.mean)}, {np.shape(self.covariance)}"
+            raise ValueError(f"expected mean ({n},) and covariance ({n}, {n}), got {got}")
 
 
 @dataclass(frozen=True)
@@ -78,14 +79,18 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
         "servos": next(iter(servos.values())) if alike else servos,
     }
     if model.effects:
-        content["effects"] = [{"effect": e.effect, "where": list(e.where), "parameters": {
-            k: [float(x) for x in v] if isinstance(v, tuple) else float(v) for k, v in e.parameters.items()}} for e in model.effects]
+        content["effects"] = [_effect_content(e) for e in model.effects]
     if posterior is not None and posterior.names:
         content["posterior"] = {"names": list(posterior.names), "mean": np.asarray(posterior.mean, dtype=float).tolist(),
                                 "covariance": np.asarray(posterior.covariance, dtype=float).tolist()}
     if provenance:
         content["provenance"] = dict(provenance)
     return yaml_text(content)
+
+
+def _effect_content(e: EffectSpec) -> dict[str, Any]:
+    parameters = {k: [float(x) for x in v] if isinstance(v, tuple) else float(v) for k, v in e.parameters.items()}
+    return {"effect": e.effect, "where": list(e.where), "parameters": parameters}
 
 
 def _description(model: RobotModel, folder: Path) -> str:

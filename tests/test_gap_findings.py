@@ -1,0 +1,92 @@
+"""findings.json as the contract writes it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import pytest
+
+from workbench.gap.findings import (
+    Alternative,
+    Change,
+    Diagnosis,
+    Estimate,
+    Finding,
+    GapEntry,
+    NextExperiment,
+    Rejected,
+    Unexplained,
+)
+from workbench.robot import EffectSpec, load_model, load_model_file, puppy_model
+
+BACKLASH = Finding(
+    "backlash", ("flm",), 0.97, {"gap": Estimate(3.1, 2.7, 3.5, "deg")}, Change(1.12, 0.21, "deg"), Change(1.10, 0.23, "deg"),
+    (Alternative("joint_compliance", ("flm",), 0.02),))
+DIAGNOSIS = Diagnosis(
+    "explained", puppy_model().with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.1})), puppy_model(),
+    gap=(GapEntry("structure", ("flm",), "walk", ((1.2, 1.4),), 2.1, 0.2, "deg", "stance"),), findings=(BACKLASH,),
+    rejected=(Rejected("coulomb_friction", ("flm",), "no better than a placebo", Change(1.1, 1.0, "deg")),),
+    unexplained=(Unexplained(("frm",), 0.6, 0.2, "deg", "grows with load"),),
+    next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
+    provenance={"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94})
+
+
+def test_it_is_the_contracts_file(tmp_path: Path) -> None:
+    paths = DIAGNOSIS.save(tmp_path / "out")
+    assert [p.name for p in paths] == ["findings.json", "model.yaml", "nominal.yaml"]
+    assert json.loads(paths[0].read_text()) == {
+        "format": 1, "verdict": "explained",
+        "gap": [{"layer": "structure", "where": ["flm"], "take": "walk", "when": [[1.2, 1.4]], "phase": "stance", "error": 2.1,
+                 "floor": 0.2, "unit": "deg"}],
+        "findings": [{
+            "effect": "backlash", "where": ["flm"], "confidence": 0.97,
+            "parameters": {"gap": {"value": 3.1, "low": 2.7, "high": 3.5, "unit": "deg"}},
+            "alternatives": [{"effect": "joint_compliance", "where": ["flm"], "confidence": 0.02}],
+            "fit": {"before": 1.12, "after": 0.21, "unit": "deg"}, "validation": {"before": 1.10, "after": 0.23, "unit": "deg"}}],
+        "rejected": [{"effect": "coulomb_friction", "where": ["flm"], "reason": "no better than a placebo",
+                      "validation": {"before": 1.1, "after": 1.0, "unit": "deg"}}],
+        "unexplained": [{"where": ["frm"], "error": 0.6, "floor": 0.2, "unit": "deg", "description": "grows with load"}],
+        "next_experiment": {"motion": "next_experiment.csv", "base": "fixed", "separates": [["backlash", "joint_compliance"]]},
+        "provenance": {"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94}}
+    assert load_model(paths[1]).effects == DIAGNOSIS.model.effects
+    assert load_model_file(paths[2]).provenance["seconds"] == 94
+    assert load_model(paths[2]).sha256 == puppy_model().sha256
+
+
+def test_no_bound_is_null_and_a_vector_three_numbers() -> None:
+    estimate = Estimate((0.0, 0.1, 0.2), (-inf, 0.0, 0.1), (inf, 0.2, inf), "m").to_json()
+    assert estimate == {"value": [0, 0.1, 0.2], "low": [None, 0, 0.1], "high": [None, 0.2, None], "unit": "m"}
+    assert Estimate(50.0, 20.0, inf, "N m/rad").to_json()["high"] is None
+
+
+def test_nothing_found_says_so() -> None:
+    said = Diagnosis("no_gap", puppy_model(), puppy_model()).to_json()
+    assert said["findings"] == said["gap"] == []
+    assert said["next_experiment"] is None
+
+
+def test_what_cannot_be_meant_is_refused() -> None:
+    with pytest.raises(ValueError, match="probability"):
+        replace(BACKLASH, confidence=1.2)
+    with pytest.raises(ValueError, match="at most one alternative"):
+        replace(BACKLASH, alternatives=BACKLASH.alternatives * 2)
+    with pytest.raises(ValueError, match="between its bounds"):
+        Estimate(3.0, 3.1, 3.5, "deg")
+    with pytest.raises(ValueError, match="finite"):
+        Estimate(inf, 0.0, inf, "N m")
+    with pytest.raises(ValueError, match="alike"):
+        Estimate((0.0, 0.0, 0.0), 0.0, 1.0, "m")
+    with pytest.raises(ValueError, match="verdict"):
+        replace(DIAGNOSIS, verdict="perhaps")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="layer"):
+        replace(DIAGNOSIS.gap[0], layer="weather")  # type: ignore[arg-type]
+
+
+def test_a_number_that_is_none_is_a_defect(tmp_path: Path) -> None:
+    broken = replace(DIAGNOSIS, unexplained=(replace(DIAGNOSIS.unexplained[0], error=float("nan")),))
+    with pytest.raises(ValueError, match="JSON"):
+        broken.save(tmp_path)
+    assert not list(tmp_path.iterdir())

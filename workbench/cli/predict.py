@@ -1,0 +1,41 @@
+"""`workbench predict SESSION --model M.yaml`: takes that nobody has shown the model."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.options import add_out, load_model
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "predict",
+        help="foretell the takes that a session asks for",
+        description="Plays each entry of the session's `predict` on a fitted model and writes NAME.csv: a Motive CSV as the "
+        "cameras of the entry's start file would see it, or for `commands` a joint log with their times.",
+    )
+    parser.add_argument("session", metavar="SESSION", help="session.yaml")
+    parser.add_argument("--model", metavar="M.yaml", help="fitted model (default: the session's own, with nothing added)")
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
+    add_out(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulates and writes."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.gap.prediction import predict_session
+    from workbench.gap.session import load_session
+    from workbench.simulation import SimulationConfig
+
+    session = load_session(args.session)
+    model = session.model if args.model is None else load_model(args.model)
+    with output_directory(args.out) as folder, Progress("predict") as progress:
+        predicted = predict_session(session, model, folder, progress, config=SimulationConfig(contact=args.contact))
+    for name, reason in predicted.left_out:
+        print(f"workbench predict: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    print(f"wrote {args.out}: {', '.join(path.name for path in predicted.paths)}")
+    return 0
