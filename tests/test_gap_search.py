@@ -72,7 +72,8 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
             continue
         neutral = c.values(np.zeros(len(c.neutral)))
         assert all(v == n or (n == np.inf and v == p.high) for v, n, p in zip(neutral, c.neutral, c.parameters)), str(c)
-        assert c.values(np.ones(len(c.neutral))) == pytest.approx([p.typical for p in c.parameters])
+        ones = [2 * n if n == p.typical else p.typical for p, n in zip(c.parameters, c.neutral)]
+        assert c.values(np.ones(len(c.neutral))) == pytest.approx(ones)
         low, high = c.bounds()
         assert (low <= 0).all()
         assert (high >= 1).all()

@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
-    value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling)."""
+    value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
+    speed at which friction fades), whose neutral value is its typical one, x is the number of doublings."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -36,7 +37,10 @@ class Candidate:
         """Numbers in the contract's units, cut to what is possible."""
         out = []
         for p, n, size in zip(self.parameters, self.neutral, x):
-            value = p.typical / max(size, p.typical / p.high) if math.isinf(n) else n + size * (p.typical - n)
+            if math.isinf(n):
+                value = p.typical / max(size, p.typical / p.high)
+            else:
+                value = n * 2.0**size if n == p.typical else n + size * (p.typical - n)
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 
@@ -44,16 +48,19 @@ class Candidate:
         """Of the sizes x."""
         low, high = [], []
         for p, n in zip(self.parameters, self.neutral):
-            ends = [(end - n) / (p.typical - n) for end in (p.low, p.high)] if math.isfinite(n) else [0.0, p.typical / p.low]
+            if n == p.typical:
+                ends = [math.log2(end / n) for end in (p.low, p.high)]
+            else:
+                ends = [(end - n) / (p.typical - n) for end in (p.low, p.high)] if math.isfinite(n) else [0.0, p.typical / p.low]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)
 
     @property
     def _probed(self) -> list[int]:
-        """Numbers that show from neutral on: where a vector says how a scalar acts (a payload's place), the scalar alone."""
+        """Numbers that show from neutral on: not those that shape an effect, nor a vector that says where a scalar acts."""
         scalar = any(not p.vector for p in self.effect.parameters)
-        return [i for i, p in enumerate(self.parameters) if not (scalar and p.vector)]
+        return [i for i, (p, n) in enumerate(zip(self.parameters, self.neutral)) if n != p.typical and not (scalar and p.vector)]
 
     def probes(self) -> list[Array]:
         """Sizes at which each probed number alone is typical; one empty for an effect without numbers."""
