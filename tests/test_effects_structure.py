@@ -14,6 +14,8 @@ from tests.shared_data import shared
 from workbench.effects.apply import physics_of, seen
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
+from workbench.gap.registered import read_takes, register_take
+from workbench.gap.session import load_session
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Recording, Take, observe, take_from_recording
 from workbench.recording.tracks import model_axes
@@ -510,6 +512,21 @@ def test_the_practice_robot_takes_all_of_them():
     assert np.abs(take.v[-1]).max() < 0.02
     weight = sum(f[-1, 2] for f in take.contact.values())
     assert weight == pytest.approx((sum(model.kinematics.masses.values()) + 0.1 + 3e-4) * GRAVITY, rel=5e-3)
+
+
+def test_backlash_explains_another_engines_recording_of_it():
+    """Four seconds on the stand of the practice session whose answer is 3 deg of play in flm: down to the noise."""
+    session = load_session(shared("practice/p1_backlash/session.yaml"))
+    stand = next(t for t in read_takes(session)[0] if t.spec.name == "stand")
+    errors = []
+    for model in (stand.model, with_effects(stand.model, ("backlash", "flm", {"gap": 3.0}))):
+        rollout = Simulation(model, replace(FIXED, contact_period=0.0)).run(stand.commands, duration=4.0, lead=0.3)
+        take = register_take(stand, rollout, None)
+        apart = (take.recorded.q - take.observed(rollout, model).q[:, [model.joints.index(j) for j in take.recorded.joints]])
+        moving = np.isfinite(apart).all(axis=1) & (take.recorded.time > take.measurement.starts_at)
+        errors.append(np.rad2deg(np.sqrt(np.mean(apart[moving, take.recorded.column("flm")] ** 2))))
+    assert errors[0] > 1.0
+    assert errors[1] < 0.25
 
 
 @pytest.mark.parametrize(("effect", "where", "parameters", "problem"), [
