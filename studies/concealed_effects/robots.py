@@ -66,10 +66,8 @@ def quadruped(rng: Rng) -> Robot:
     links += [_link("neck_link", (0.085, 0, height + 0.03), masses["neck"], (0.008, 0, 0.022), (0.032, 0.032, 0.055)),
               _link("head_link", (0.105, 0, height + 0.075), masses["head"], (0.024, 0, 0.004), (0.06, 0.045, 0.04))]
     joints += [_joint("neck", "body_link", "neck_link", "0 -1 0"), _joint("head", "neck_link", "head_link", "0 -1 0")]
-    bodies = {asset: link for asset, link in RIGID_BODIES.items() if link in {f"{j}_link" for j in ("body", "tail")}
-              or link[0] in "fb" and link[3:] == "_link"}
     ground = Ground(friction=round(float(rng.uniform(0.5, 0.75)), 2), stiffness=1e5, dissipation=20.0)
-    return Robot("quadruped", _sdf("quadruped", links + joints), _servo(rng), ground, "body_link", bodies, dict(BUS_IDS))
+    return Robot("quadruped", _sdf("quadruped", links + joints), _servo(rng), ground, "body_link", dict(RIGID_BODIES), dict(BUS_IDS))
 
 
 def arm(rng: Rng) -> Robot:

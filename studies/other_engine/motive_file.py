@@ -16,7 +16,12 @@ _AXES = (*"XYZW", *"XYZ", "")
 def write_motive_csv(
     path: str | Path, capture: Capture, name: str, digits: int = 6, frames_in_take: int | None = None
 ) -> None:
-    """Writes rigid bodies; blank cells where unseen. `frames_in_take`: of the whole take, where this is its start."""
+    """Writes what `motive_csv` says."""
+    write_whole(path, motive_csv(capture, name, digits, frames_in_take))
+
+
+def motive_csv(capture: Capture, name: str, digits: int = 6, frames_in_take: int | None = None) -> str:
+    """Text of rigid bodies; blank cells where unseen. `frames_in_take`: of the whole take, where this is its start."""
     assets = list(capture.p)
     total = len(capture) if frames_in_take is None else frames_in_take
     header = {
@@ -39,4 +44,4 @@ def write_motive_csv(
     for k, row in enumerate(table):
         cells = ("" if np.isnan(x) else f"{x:.{digits}f}" for x in row)
         lines.append(f"{k},{k / capture.rate:.6f}," + ",".join(cells))
-    write_whole(path, "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"

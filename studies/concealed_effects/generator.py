@@ -1,0 +1,166 @@
+"""Makes the trial's sessions: python -m studies.concealed_effects.generator OUT [--count 100]
+
+OUT/sessions/NAME has what a user would send, in the layout of a session, and nothing of what is hidden; OUT/sealed the truth.
+Run again, it goes on where it was stopped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from studies.concealed_effects.conceal import Bench, NoneFoundError, conceal
+from studies.concealed_effects.plan import MAKERS, SessionPlan, plan_sessions
+from studies.concealed_effects.robots import Robot
+from studies.concealed_effects.sealed import Vault
+from studies.concealed_effects.takes import LogPlan, filmed_takes, is_logged, log_csv, log_rows, logged_takes, play_log
+from studies.concealed_effects.visible import FINE
+
+from studies.other_engine.hidden import OUTSIDE
+from studies.other_engine.make_session import TakePlan, random_camera, record, servo_yaml, session_entry
+from studies.other_engine.motive_file import motive_csv
+from workbench.robot import EffectSpec, RobotModel
+
+Files = dict[str, str]
+
+
+def generate(out: Path, count: int, progress: Callable[[str], None] = print) -> None:
+    """All sessions that are not there yet."""
+    vault = Vault(out / "sealed")
+    for plan in plan_sessions(vault.seed, count):
+        if plan.name in vault.commitments and (out / "sessions" / plan.name).exists():
+            continue
+        began = time.monotonic()
+        make(out, vault, plan)
+        progress(f"{plan.name}: {time.monotonic() - began:.0f} s")
+
+
+def make(out: Path, vault: Vault, plan: SessionPlan) -> None:
+    """One session: its truth sealed first, then its folder put in place, whole."""
+    (out / "sessions").mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out, prefix=".making.") as temporary:
+        folder = Path(temporary) / plan.name
+        folder.mkdir()
+        shown, hidden = write_session(folder, plan)
+        if plan.name not in vault.commitments:
+            vault.seal(plan.name, hidden)
+        for name, text in shown.items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_text(text, encoding="utf-8")
+        target = out / "sessions" / plan.name
+        shutil.rmtree(target, ignore_errors=True)
+        os.replace(folder, target)
+
+
+def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
+    """What a user would send, and what is sealed, as files by name. `folder` gets the robot's SDF."""
+    began = time.monotonic()
+    rng = np.random.default_rng(plan.seed)
+    while True:  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
+        robot = MAKERS[plan.robot](rng)
+        (folder / "robot.sdf").unlink(missing_ok=True)
+        model = robot.model(folder / "robot.sdf")
+        takes: list[TakePlan] | list[LogPlan] = logged_takes(model, rng) if is_logged(robot) else filmed_takes(rng)
+        bench = Bench(robot, model, [t for t in takes if not t.predict])  # type: ignore[arg-type]
+        if not bench.sound:
+            continue
+        try:
+            effects = conceal(bench, plan.effects, plan.masked, rng)
+            break
+        except NoneFoundError:
+            continue
+    hidden = bench.with_effects(effects)
+    session = session_entry(model, "robot.sdf" if robot.sdf else model.description, "servo.yaml")
+    shown, sealed = {"servo.yaml": servo_yaml(model)}, Files()
+    entries = (_logs if is_logged(robot) else _films)(robot, model, hidden, takes, rng, shown, sealed)  # type: ignore[operator]
+    if is_logged(robot):
+        session.pop("ground")
+        session["robot"].pop("rigid_bodies")  # type: ignore[attr-defined]
+        session["robot"]["bus_ids"] = dict(robot.bus_ids)  # type: ignore[index]
+    shown["session.yaml"] = yaml.safe_dump(session | entries[0], sort_keys=False)
+    truth = {"name": plan.name, "robot": robot.kind, "effects": [_truth_of(e) for e in effects], "masked": plan.masked,
+             "outside": [e.effect for e in effects if e.effect in OUTSIDE], "takes": entries[1],
+             "seconds": round(time.monotonic() - began, 1)}
+    sealed["truth.json"] = json.dumps(truth, indent=1) + "\n"
+    return shown, sealed
+
+
+def _truth_of(effect: EffectSpec) -> dict[str, object]:
+    return json.loads(json.dumps(asdict(effect)))  # type: ignore[no-any-return]
+
+
+def _films(robot: Robot, model: RobotModel, hidden: RobotModel, takes: list[TakePlan], rng: np.random.Generator, shown: Files,
+           sealed: Files) -> tuple[dict[str, object], dict[str, object]]:
+    camera = random_camera(rng)
+    learn: list[dict[str, object]] = []
+    predict: list[dict[str, object]] = []
+    facts: dict[str, object] = {}
+    for plan in takes:
+        entry: dict[str, object] = {"name": plan.name, "motion": f"{'predict' if plan.predict else 'motions'}/{plan.name}.csv",
+                                    "cycles": plan.cycles}
+        shown[str(entry["motion"])] = plan.motion.to_csv()
+        state = rng.bit_generator.state
+        run, capture, _ = record(hidden, plan, camera, rng, FINE)
+        after = rng.bit_generator.state
+        rng.bit_generator.state = state  # the nominal robot is seen from where the other was
+        _, _, nominal = record(model, plan, camera, rng, FINE)
+        rng.bit_generator.state = after
+        ends = run.poses(np.array([0.0, run.time[-1]]), (model.base,))[model.base][0]
+        facts[plan.name] = {"lead": capture.starts_at, "travel": float(np.linalg.norm((ends[1] - ends[0])[:2]))}
+        if plan.predict:
+            start = capture.cut(int(capture.starts_at * capture.rate) - 2)
+            shown[f"predict/{plan.name}_start.csv"] = motive_csv(start, plan.name, frames_in_take=len(capture))
+            sealed[f"{plan.name}.csv"] = motive_csv(capture, plan.name)
+            sealed[f"{plan.name}.nominal.csv"] = motive_csv(nominal, plan.name)
+            predict.append(entry | {"start": f"predict/{plan.name}_start.csv", "starts_at": capture.starts_at,
+                                    "frames": len(capture), "base": plan.base})
+        else:
+            shown[f"takes/{plan.name}.csv"] = motive_csv(capture, plan.name)
+            learn.append(entry | {"recording": f"takes/{plan.name}.csv", "base": plan.base})
+    return {"takes": learn, "predict": predict}, facts
+
+
+def _logs(robot: Robot, model: RobotModel, hidden: RobotModel, takes: list[LogPlan], rng: np.random.Generator, shown: Files,
+          sealed: Files) -> tuple[dict[str, object], dict[str, object]]:
+    learn: list[dict[str, object]] = []
+    predict: list[dict[str, object]] = []
+    facts: dict[str, object] = {}
+    for plan in takes:
+        chance = int(rng.integers(2**31))
+        position, velocity = log_rows(play_log(hidden, plan, FINE, chance), plan, rng)
+        facts[plan.name] = {"lead": 0.0}
+        if plan.predict:
+            nominal, _ = log_rows(play_log(model, plan, FINE, chance), plan, np.random.default_rng(0))
+            shown[f"predict/{plan.name}.csv"] = log_csv(plan, position, velocity, start_only=True)
+            sealed[f"{plan.name}.csv"] = log_csv(plan, position)
+            sealed[f"{plan.name}.nominal.csv"] = log_csv(plan, nominal)
+            predict.append({"name": plan.name, "commands": f"predict/{plan.name}.csv", "base": "fixed"})
+        else:
+            shown[f"takes/{plan.name}.csv"] = log_csv(plan, position)
+            learn.append({"name": plan.name, "recording": f"takes/{plan.name}.csv", "base": "fixed"})
+    return {"takes": learn, "predict": predict}, facts
+
+
+def main() -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--count", type=int, default=100)
+    args = parser.parse_args()
+    generate(args.out, args.count)
+    vault = Vault(args.out / "sealed")
+    print(f"{len(vault.commitments)} sessions sealed, SHA-256 of all commitments {vault.digest()}")
+
+
+if __name__ == "__main__":
+    main()
