@@ -16,7 +16,6 @@ THESIS: Mapping[str, tuple[str, ...]] = {
     "robotis": (*(sign(v, 2) for v in SIMULATED_OWN), "–", "4.8 (mean of three)", "–"),
     "mocap M": ("32.6 (mean of two)", "–", "1.89 or −4", "–", "−10.88", "–"),
     "mocap": ("32.6 (mean of two)", "–", "1.89 or −4", "–", "4.8 (mean of three)", "–"),
-    SMOOTH: ("–",) * 6,
 }
 """Where the body ends in the thesis, as far as its text says. Of its mocap runs it gives means and extremes: all four
 simulations 4.45 cm short of the robot on average, which leaves 32.6 cm for these two."""
@@ -29,14 +28,15 @@ def ends_table(runs: Sequence[Run]) -> Table:
     """Ours under the thesis's, each with its numerical floor."""
     rows = []
     for run in runs:
-        rows.append([run.name, "thesis", *THESIS[run.name]])
+        if run.name in THESIS:
+            rows.append([run.name, "thesis", *THESIS[run.name]])
         digits = (1, 2, 1, 2, 1, 2)
         own = [with_floor(run.end(c), run.floor(c), d) if run.finer else sign(run.end(c), d) for c, d in zip(COORDINATES, digits)]
-        rows.append(["", "here", *own])
+        rows.append(["" if run.name in THESIS else run.name, "here", *own])
     return Table(HEADER, rows, "Where the body is at the end. ±: how far the same run ends elsewhere with the step halved and "
                  f"quartered ({', '.join(f'{1e3 * h:g}' for h in STEPS)} ms). The tilts are the body's own, the heading counts "
                  "from the start. The thesis gives the tilts as ranges: about x −1 to 0.74, about z −0.16 to 0.83 deg.",
-                 emphasis=range(1, 2 * len(runs), 2))
+                 emphasis=[i for i, row in enumerate(rows) if row[1] == "here"])
 
 
 def contact_table(runs: Sequence[Run]) -> Table:

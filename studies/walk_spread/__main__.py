@@ -24,6 +24,8 @@ from workbench.view.report import Picture, Provenance, Report, Section, Table, T
 
 FALLEN = 45.0
 """Tilt [deg] beyond which the robot is said to have fallen."""
+AMPLIFIED = 0.2
+"""Share of three factors and more from which a walk is said to amplify whatever changes."""
 _X, _TURN = COORDINATES.index("x"), COORDINATES.index("ry")
 
 
@@ -97,9 +99,10 @@ def _explained(shares: dict[tuple[str, str], Shares]) -> str:
         first, second, *_ = sorted(s.main, key=lambda f: -s.main[f])
         what, unit = ("Distance", "cm") if c == "x" else ("Heading", "deg")
         lines.append(
-            f"{what}, {NAMES[drive]} (standard deviation {s.std:.1f} {unit}): {first} explains {100 * s.main[first]:.0f} %, "
-            f"{second} {100 * s.main[second]:.0f} %; {100 * sum(s.pairs.values()):.0f} % come of two factors together and "
-            f"{100 * s.rest:.0f} % of three and more: small changes that the walk amplifies, none of them to blame alone.")
+            f"{what}, {NAMES[drive]} (standard deviation {s.std:.1f} {unit}): {100 * s.main[first]:.0f} % come of {first} alone, "
+            f"{100 * s.main[second]:.0f} % of {second}, {100 * sum(s.pairs.values()):.0f} % of two factors together and "
+            f"{100 * s.rest:.0f} % of three and more"
+            + (": small changes that the walk amplifies, no factor to blame alone." if s.rest > AMPLIFIED else "."))
     return "\n\n".join(lines)
 
 
@@ -121,9 +124,10 @@ def rest(ends: Ends) -> str:
     if nearest is not None:
         lines.append(f"Of the single changes outside the design, '{nearest.excursion}' ({NAMES[nearest.drive]}) comes nearest to "
                      f"the robot's distance, with {sign(ends[nearest][_X])} cm and {sign(ends[nearest][_TURN])} deg.")
-    lines.append("Not varied here, and open: the sense in which each servo turns on the model (studies.joint_signs finds it "
-                 "without looking at the distance), the shape of the feet, backlash and compliance of servos and frames, and "
-                 "when the thesis's six seconds begin. A recording of the robot would tell them apart; a distance does not.")
+    lines.append("Not varied here, and open: the sense in which each servo turns on the model (studies.joint_signs chose it with "
+                 "the distance known, so that nearness confirms nothing), the shape of the feet, backlash and compliance of "
+                 "servos and frames, and when the thesis's six seconds begin. A recording of the robot would tell them apart; a "
+                 "distance does not.")
     return "\n\n".join(lines)
 
 

@@ -35,7 +35,8 @@ def draw_cloud(ends: Ends) -> Figure:
     for case, end in ends.items():
         if case.excursion:
             plane.plot(end[_X], end[_TURN], "x", color=COLOURS[case.drive], ms=9, mew=2)
-            plane.annotate(case.excursion, (end[_X], end[_TURN]), xytext=(6, 4), textcoords="offset points", fontsize=9)
+            plane.annotate(case.excursion, (end[_X], end[_TURN]), xytext=(6, -13 if case.drive == "servo" else 4),
+                           textcoords="offset points", fontsize=9)
     _draw_thesis(plane)
     for drive, colour in COLOURS.items():
         grid[0, 0].hist(cloud(ends, drive, "x"), bins=20, color=colour, alpha=0.6)
