@@ -56,8 +56,8 @@ def five_runs(model: RobotModel, seconds: float, steps: Sequence[float], other_c
     """The animation first, SMOOTH last. seconds: how much of each. steps [s]: the run's own, then those of its floor."""
     progress("reading the recording", None)
     recorded = inputs.recording().recorded
-    robotis, smooth = inputs.robotis()
-    mocap = inputs.recorded_angles(recorded)
+    angles = (*inputs.robotis(), inputs.recorded_angles(recorded))
+    robotis, smooth, mocap = (inputs.first_seconds(path, seconds) for path in angles)
     progress("filtering", None)
     paths = {"robotis M": inputs.matlab_filter(robotis), "robotis": inputs.own_filter(robotis),
              "mocap M": inputs.matlab_filter(mocap), "mocap": inputs.own_filter(mocap), SMOOTH: inputs.own_filter(smooth)}
