@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydrake.multibody.plant import DiscreteContactApproximation
 from pydrake.planning import RobotDiagram, RobotDiagramBuilder
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from workbench.robot import RobotModel, ServoConstants
-from workbench.servo import AddServos, ServoBank
+from workbench.servo import AddServos, ServoBank, ServoTerm
 
 LENGTH = 0.1
 GRAVITY = 9.81
@@ -65,14 +67,16 @@ def rig_model(folder: Path, servo: ServoConstants, mass: float = 0.1) -> RobotMo
 
 
 def make_rig(folder: Path, servo: ServoConstants, mass: float = 0.1, gravity: bool = True, time_step: float = 1e-3,
-             integrator: str = "", accuracy: float = 1e-6) -> Rig:
+             integrator: str = "", accuracy: float = 1e-6, approximation: str = "kLagged", terms: Sequence[ServoTerm] = ()) -> Rig:
     model = rig_model(folder, servo, mass)
     builder = RobotDiagramBuilder(time_step=time_step)
     plant = builder.plant()
     builder.parser().AddModels(str(model.path))
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -GRAVITY if gravity else 0])
-    bank = AddServos(builder.builder(), plant, model, friction="implicit" if integrator == "cenic" else None)
+    if time_step > 0:
+        plant.set_discrete_contact_approximation(getattr(DiscreteContactApproximation, approximation))
+    bank = AddServos(builder.builder(), plant, model, friction="implicit" if integrator == "cenic" else None, terms=terms)
     for port in ("goal_position", "moving_speed", "torque_enable"):
         builder.builder().ExportInput(bank.GetInputPort(port), port)
     diagram = builder.Build()

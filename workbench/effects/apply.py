@@ -14,7 +14,7 @@ from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
-from workbench.servo import ServoLaw
+from workbench.servo import ServoLaw, ServoTerm
 
 Array = NDArray[np.float64]
 GRAVITY = (0.0, 0.0, -9.81)
@@ -25,7 +25,7 @@ class Physics:
     """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
     coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
     tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
-    hard ends were added, which continuous plants ignore."""
+    hard ends were added, which continuous plants ignore. terms: of the servos, beyond their constants."""
 
     description: str | None
     law: ServoLaw
@@ -38,6 +38,7 @@ class Physics:
     stages: Mapping[str, tuple[str, ...]]
     moved: bool
     ends: bool
+    terms: tuple[ServoTerm, ...] = ()
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
@@ -55,10 +56,13 @@ def physics_of(model: RobotModel) -> Physics:
     zero = np.zeros(len(model.joints))
     friction: dict[str, float] = {}
     stiffness: float | None = None
+    terms: list[ServoTerm] = []
     sdf: SdfRobot | None = None
     for effect, spec, values in resolved(model):
         columns = np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=int)
         law = effect.law(law, columns, values)
+        term = effect.servo_term(np.isin(model.joints, spec.where), values)
+        terms += [] if term is None else [term]
         ground = effect.ground(ground, values)
         gravity = effect.gravity(gravity, values)
         zero[columns] += effect.zero(values)
@@ -71,7 +75,7 @@ def physics_of(model: RobotModel) -> Physics:
             sdf = sdf or SdfRobot(model.path)
             effect.description(sdf, spec, model)
     return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
-                   sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends)
+                   sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends, tuple(terms))
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:

@@ -1,8 +1,9 @@
 """What an effect is: one piece of physics beyond the nominal model, with hooks into what it changes.
 
 An effect is one file with one subclass of Effect and its instance EFFECT. It is plain: all state is in EffectSpec. A station
-asks for its description (SDF), law (servo constants), ground, gravity and forces, a run for its commands, a comparison for its
-measurement. Another package adds effects through entry points in the group "workbench.effects" that name an Effect instance.
+asks for its description (SDF), law (servo constants), servo terms, ground, gravity and forces, a run for its commands, a
+comparison for its measurement. Another package adds effects through entry points in the group "workbench.effects" that name an
+Effect instance.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, InputError, RobotModel
-from workbench.servo import ServoLaw
+from workbench.servo import ServoLaw, ServoTerm
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
@@ -59,7 +60,8 @@ class Effect:
         raise NotImplementedError
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
-        """The values, in the contract's units, at which the effect vanishes; infinity for a stiffness or a ceiling."""
+        """The values, in the contract's units, at which the effect vanishes: infinity for a stiffness or a ceiling, the
+        typical value for a number that only shapes the effect."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
@@ -68,6 +70,10 @@ class Effect:
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         """Servo constants of the joints in `columns` changed."""
         return law
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm | None:
+        """What servos do beyond constants; here (n,): the servos named in `where`. None: nothing."""
+        return None
 
     def ground(self, ground: Ground, values: Mapping[str, float]) -> Ground:
         """The floor changed."""

@@ -51,7 +51,8 @@ def servo_joints(plant: MultibodyPlant, model: RobotModel) -> list[RevoluteJoint
 def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction, law: ServoLaw | None = None,
                     terms: Sequence[ServoTerm] = ()) -> ServoLaw:
     """Sets on the plant's joints what the servos add to them, in place of what the SDF gave: damping, reflected inertia and,
-    where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque, or the most that `terms` may ask for).
+    where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque, or with the most that `terms` may
+    ask for).
 
     A joint's only actuator is used, because CENIC clamps the sum of several once, and because a joint's
     reflected inertia is that of its last actuator.
@@ -83,8 +84,9 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
     default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
     CENIC's does not: it steps over them and slides on without friction). `law`: in place of the model's nominal constants.
-    `terms`: what servos do beyond the law; friction that varies needs bristles, or a discrete plant with `period` its step,
-    whose outputs it makes unsampled (SetUseSampledOutputPorts), so that they are of the step that begins.
+    `terms`: what servos do beyond the law. In a discrete plant they take `period` to be its step, and make its output ports
+    unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that varies
+    needs bristles or a discrete plant.
     """
     if model.effects and law is None:
         raise InputError(None, f"effect '{model.effects[0].effect}' is for MakePuppyStation: it may change more than servos")
@@ -97,11 +99,11 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     law = SetServoPhysics(plant, model, friction, law, terms)
     most, period = most_friction(terms, law), period or plant.time_step() or 1e-3
     varies = bool((most > law.coulomb).any())
-    if terms and plant.time_step() > 0 and period != plant.time_step():
-        raise InputError(None, f"period {period:g} s: with terms it is the plant's step, {plant.time_step():g} s")
-    if varies and friction == "implicit":
-        if plant.time_step() == 0:
-            raise InputError(None, "friction that varies needs a discrete plant, or friction='bristle'; CENIC takes neither")
+    if varies and friction == "implicit" and plant.time_step() == 0:
+        raise InputError(None, "friction that varies needs a discrete plant, or friction='bristle'; CENIC takes neither")
+    if terms and plant.time_step() > 0:
+        if period != plant.time_step():
+            raise InputError(None, f"period {period:g} s: with terms it is the plant's step, {plant.time_step():g} s")
         plant.SetUseSampledOutputPorts(False)
     plant.Finalize()
     joints = servo_joints(plant, model)

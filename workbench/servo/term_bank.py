@@ -42,17 +42,17 @@ class TermBank(ServoBank):
     Further ports: input `net_actuation` (of the plant; needed where friction varies in a discrete plant), output
     `friction_relief` (n) N m.
 
-    Ceiling: back-EMF is damping of the plant, implicit in a discrete one, so that a cut motor torque gets it back, at the velocity
-    to expect at the end of the step.
+    Back-EMF is damping of the plant, implicit in a discrete one, so that a motor torque that is cut, or off, gets it back, at
+    the velocity to expect at the end of the step.
 
-    Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank pushes
-    along the motion, at rest along the motion that friction prevents, with that less the friction wanted. Held joints
-    stay exactly held, as the actuator takes up what the bank pushes. Direction and load are those of the last step; a joint that
-    turns back rests for one step. Bristles: they yield at the friction wanted.
+    Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank
+    pushes along the motion, at rest along the motion that friction prevents, with that less the friction wanted. A held joint
+    stays exactly held, as the actuator takes up what the bank pushes. Direction and load are those of the last step; a joint
+    that turns back rests for one step. Bristles yield at the friction wanted.
 
-    The load is what the servo hands to its link: motor torque less viscous and dry friction less what the reflected inertia takes,
-    exact in discrete plants for the step before the last; in continuous ones by differences over a period. Friction sees it
-    through a first-order lag of LOAD_SMOOTHING.
+    The load is what the servo hands to its link: motor torque less viscous and dry friction less what the reflected inertia
+    takes. It is exact in discrete plants, for the step before the last; in continuous ones it comes from differences over a
+    period. Friction sees it through a first-order lag of LOAD_SMOOTHING.
 
     Discrete state besides the reference: velocity (n), what is known of the load (n), load (n), friction of the last step (n),
     and whether there was a last step (1).
@@ -79,7 +79,7 @@ class TermBank(ServoBank):
         self._net_actuation = self.DeclareVectorInputPort("net_actuation", plant.num_actuators())
         self._memory = int(self.DeclareDiscreteState(4 * n + 1))
         self._first_command = int(self.DeclareNumericParameter(BasicVector([0.0])))
-        more = {self.time_ticket(), self.pa_ticket()}
+        more = {self.time_ticket(), self.pn_ticket()}
         state = more | {self._state.ticket(), self._enable.ticket(), self.xd_ticket()}
         self._parts = self.DeclareCacheEntry(
             "parts", ValueProducer(allocate=lambda: AbstractValue.Make(_Parts(*np.zeros((4, n)))),
@@ -118,10 +118,10 @@ class TermBank(ServoBank):
         push, motor = torque - _beyond(torque - law.back_emf * ahead, self._ceiling), torque - law.back_emf * v
         motor = motor - _beyond(motor, self._ceiling)
         if on is not None:  # no back-EMF either: undo the joint's share of damping
-            push, motor = np.where(on, push, law.back_emf * v), np.where(on, motor, 0.0)
+            push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
         if not self._varies or self._bristles:
             return _Parts(push, motor, friction, np.zeros_like(v))
-        yielding = np.maximum(friction / 2, 1e-6)  # well below the friction of a joint that slides, so that this one counts as such
+        yielding = np.maximum(friction / 2, 1e-6)  # well below what brakes a joint that slides, so that this counts as sliding
         direction = np.clip(v / MOVING - held / yielding, -1.0, 1.0)
         return _Parts(push, motor, friction, (self._most - friction) * direction)
 

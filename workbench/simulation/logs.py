@@ -15,7 +15,7 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.gantry import AXES, base_poses
 
 Array = NDArray[np.float64]
-LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log")
+LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log", "motor_torque_log", "friction_relief_log")
 
 
 class RunLogs:
@@ -78,6 +78,8 @@ class RunLogs:
             return drake
         if self._config.drive == "fast_servo":
             return np.asarray(drake - self._law.damping * v)
+        if self._diagram.HasSubsystemNamed("motor_torque_log"):
+            return np.asarray(self.read("motor_torque")[1] - self._law.viscous * v + drake + self.read("friction_relief")[1])
         enabled: NDArray[np.bool_] | bool = True
         if commands is not None and not commands.enabled.all():
             row = np.clip(np.searchsorted(commands.times, since_start + 1e-9, side="right") - 1, 0, None)

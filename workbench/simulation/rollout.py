@@ -61,14 +61,14 @@ class Simulation:
 
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
             trajectory: tuple[Array, Array] | None = None, path: Take | None = None,
-            start: tuple[Array, Array] | None = None, name: str = "simulation") -> Take:
+            start: tuple[Array, Array] | None = None, elapsed: float = 0.0, name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
         default: smoothly through the commands' poses).
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
         this one (base "path"). start: link angles and velocities (n,) [rad, rad/s] in self.joints' order at the first
-        command, in place of rest in neutral (base "fixed" or "path"); there is no lead then. Returns a Take with time 0 at
-        the first command.
+        command, in place of rest in neutral (base "fixed" or "path"); there is no lead then. elapsed [s]: how long the
+        robot has played before these commands, for effects that grow with it. Returns a Take with time 0 at the first command.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -89,6 +89,7 @@ class Simulation:
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
         if start is not None:
             self._put(start, commands)
+        self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
         sampled, forces = self._advance(commands, lead, lead + duration)
         t, state = self._logs.read("state")
@@ -146,6 +147,7 @@ class Simulation:
             self.context.SetTimeStateAndParametersFrom(self.diagram.CreateDefaultContext())
             self._place_base(gantry)
             self._hold_neutral()
+            self._set_first_command(np.inf)
             self.simulator.Initialize()
             self.simulator.AdvanceTo(self._whole_steps(self.config.settle))
             self._centre_base()
@@ -173,6 +175,11 @@ class Simulation:
             self._command(neutral, neutral, neutral + 1)
         else:
             self._update_reference(np.array([0.0, 1.0]), np.zeros((2, len(self.joints))))
+
+    def _set_first_command(self, time: float) -> None:
+        if self.config.drive == "servo":
+            bank = self.diagram.GetSubsystemByName("servo_bank")
+            bank.SetFirstCommand(self.diagram.GetMutableSubsystemContext(bank, self.context), time)
 
     def _put(self, start: tuple[Array, Array], commands: Commands | None) -> None:
         """Starts from given joint angles and velocities, with the ramp of each servo at its first goal."""

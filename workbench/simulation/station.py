@@ -120,12 +120,15 @@ def _add_drive(
     diagram = builder.builder()
     if config.drive == "servo":
         implicit = config.time_step > 0 or config.uses_cenic
-        bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle", law=physics.law)
+        bank = AddServos(diagram, plant, model, friction="implicit" if implicit else "bristle", law=physics.law,
+                         terms=physics.terms)
         for port in ("goal_position", "moving_speed", "torque_enable"):
             diagram.ExportInput(bank.GetInputPort(port), port)
         for port in ("motor_torque", "duty", "reference"):
             diagram.ExportOutput(bank.GetOutputPort(port), port)
     elif config.drive == "fast_servo":
+        if physics.terms:
+            raise InputError(None, "drive: an effect changes what servos do from instant to instant; expected drive 'servo'")
         AddFastServos(diagram, plant, model, physics.law)
     elif config.drive == "ideal":
         AddIdealDrive(builder, plant, model, physics.law)
@@ -158,6 +161,8 @@ def _add_logs(builder: RobotDiagramBuilder, plant: MultibodyPlant, config: Simul
     if config.drive == "servo":
         bank = builder.builder().GetSubsystemByName("servo_bank")
         logged["reference"] = bank.GetOutputPort("reference")
+        if bank.HasOutputPort("friction_relief"):
+            logged |= {name: bank.GetOutputPort(name) for name in ("motor_torque", "friction_relief")}
         if config.time_step == 0:
             logged["generalized_force"] = bank.GetOutputPort("generalized_force")
     for name, port in logged.items():

@@ -1,0 +1,51 @@
+"""A servo that sticks: more dry friction at rest than when it turns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import DEGREE, Effect, Parameter, scalar
+from workbench.robot import EffectSpec, RobotModel
+from workbench.servo import Instant, ServoLaw, ServoTerm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Sticking(ServoTerm):
+    """torque: (n,) [N m]; speed [rad/s]."""
+
+    torque: Array
+    speed: float
+
+    def friction(self, now: Instant) -> Array:
+        return np.asarray(self.torque * np.exp(-np.square(now.velocity / self.speed)))
+
+    def most_friction(self, law: ServoLaw) -> Array:
+        return self.torque
+
+
+class StribeckFriction(Effect):
+    """A servo that sticks: more dry friction at rest, fading as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
+
+    name = "stribeck_friction"
+    layer = "actuator"
+    places = ("joint",)
+    parameters = (Parameter("torque", "N m", 0.0, 1.5, 0.05), Parameter("speed", "deg/s", 0.5, 400.0, 20.0, si=DEGREE))
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return (f"{', '.join(spec.where)} sticks: {scalar(spec, 'torque'):.3f} N m more dry friction at rest, "
+                f"gone above some {2 * scalar(spec, 'speed'):.0f} deg/s.")
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return 0.0, self.parameters[1].typical
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        return _Sticking(here.astype(float) * values["torque"], values["speed"])
+
+
+EFFECT = StribeckFriction()

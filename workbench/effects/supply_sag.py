@@ -1,0 +1,44 @@
+"""A supply that gives way: its voltage drops with what all servos together draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.robot import EffectSpec
+from workbench.servo import Instant, ServoLaw, ServoTerm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Sagging(ServoTerm):
+    """drop [V] for each servo at full duty."""
+
+    drop: float
+
+    def strength(self, law: ServoLaw, now: Instant) -> Array:
+        supply = law.full_torque / law.torque_per_volt
+        return np.asarray(np.maximum(1.0 - self.drop * np.abs(now.duty).sum() / supply, 0.0))
+
+
+class SupplySag(Effect):
+    """A supply that gives way: its voltage drops with the sum of all servos' duties, and all of them share what is left."""
+
+    name = "supply_sag"
+    layer = "actuator"
+    places = ("robot",)
+    parameters = (Parameter("drop", "V", 0.0, 5.0, 0.3),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"The supply drops by {scalar(spec, 'drop'):.2f} V for each servo at full duty."
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        return _Sagging(values["drop"])
+
+
+EFFECT = SupplySag()

@@ -1,0 +1,42 @@
+"""Motors that weaken as they warm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.robot import EffectSpec
+from workbench.servo import Instant, ServoLaw, ServoTerm
+
+
+@dataclass(frozen=True)
+class _Fading(ServoTerm):
+    """rate [1/s]."""
+
+    rate: float
+
+    def strength(self, law: ServoLaw, now: Instant) -> float:
+        return math.exp(-self.rate * now.elapsed)
+
+
+class ThermalFade(Effect):
+    """Motors that weaken as they warm: duty torque fades with the time since each take's first command."""
+
+    name = "thermal_fade"
+    layer = "actuator"
+    places = ("robot",)
+    parameters = (Parameter("rate", "1/s", 0.0, 1.0, 0.01),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"The servos lose {100 * scalar(spec, 'rate'):.1f} % of their torque each second from the first command on."
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        return _Fading(values["rate"])
+
+
+EFFECT = ThermalFade()

@@ -1,0 +1,47 @@
+"""A motor whose torque ends early: the driver's current limit, heat, or another servo of the family."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.robot import EffectSpec, RobotModel
+from workbench.servo import ServoTerm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Ceiling(ServoTerm):
+    """most: (n,) [N m]."""
+
+    most: Array
+
+    def ceiling(self) -> Array:
+        return self.most
+
+
+class TorqueCeiling(Effect):
+    """A motor whose torque, duty torque less back-EMF, goes no further: the driver's current limit, heat, or another servo."""
+
+    name = "torque_ceiling"
+    layer = "actuator"
+    places = ("joint",)
+    parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"The motor of {', '.join(spec.where)} gives no more than {scalar(spec, 'torque'):.2f} N m."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (math.inf,)
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        return _Ceiling(np.where(here, values["torque"], np.inf))
+
+
+EFFECT = TorqueCeiling()
