@@ -1,0 +1,178 @@
+"""The page of a diagnosis and its figures, on takes whose gap is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from tests.view_takes import small_robot, swing
+from workbench.gap.findings import (
+    Alternative,
+    Change,
+    Diagnosis,
+    Estimate,
+    Finding,
+    GapEntry,
+    NextExperiment,
+    Rejected,
+    Unexplained,
+    Verdict,
+)
+from workbench.gap.story import TakeStory
+from workbench.robot import EffectSpec, RobotModel
+from workbench.view.diagnosis_report import diagnosis_report, headline, interval, write_diagnosis
+from workbench.view.figures import encode
+from workbench.view.gap_figures import before_after, gap_map, robot_map, unseen_errors
+
+SIGMA = np.deg2rad(0.1)
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> RobotModel:
+    return small_robot(tmp_path)
+
+
+@pytest.fixture
+def story(model: RobotModel) -> TakeStory:
+    """Two degrees are missing at flm in the nominal model from 0.5 s on, nothing in the fitted one; some frames were not seen."""
+    fitted = swing(model).resampled(np.arange(-0.3, 1.19, 0.01))
+    rng = np.random.default_rng(0)
+    away = np.where((fitted.time > 0.5)[:, None] & (np.array(model.joints) == "flm"), np.deg2rad(2.0), 0.0)
+    q = fitted.q + rng.normal(0, SIGMA, fitted.q.shape)
+    q[40:45] = np.nan
+    recorded = replace(fitted, name="walk", source="recording", q=q)
+    nominal = replace(fitted, q=fitted.q - away)
+    moving = np.where(fitted.time[:, None] > 0, 1.0, np.nan)
+    before, after = ((q - take.q) / SIGMA * moving for take in (nominal, fitted))
+    return TakeStory(recorded, nominal, fitted, model.joints, before, after, (fitted.time > 0.7) & (fitted.time < 0.9))
+
+
+def finding(effect: str = "backlash", confidence: float = 0.97) -> Finding:
+    return Finding(effect, ("flm",), confidence, {"gap": Estimate(2.0, 1.8, 2.3, "deg")}, Change(1.9, 0.12, "deg"),
+                   Change(2.0, 0.11, "deg"), (Alternative("joint_compliance", ("flm",), 0.02),), "It shows where the load turns.")
+
+
+def diagnosis(model: RobotModel, verdict: Verdict = "explained") -> Diagnosis:
+    return Diagnosis(
+        verdict, model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 2.0})), model,
+        gap=tuple(GapEntry("structure", ("flm",), "walk", ((0.5 + k, 1.2 + k),), 2.0, 0.1, "deg", "stance") for k in range(8)),
+        findings=(finding(),),
+        rejected=(Rejected("coulomb_friction", ("flm",), "a placebo at frm does as well", Change(2.0, 1.9, "deg")),
+                  Rejected("payload", ("body_link",), "it does not show")),
+        unexplained=(Unexplained(("frb",), 0.6, 0.2, "deg", "grows with <load>"),),
+        next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
+        provenance={"seed": 7, "seconds": 94.0}, left_out=(("trot", "line 9: the file is cut"),))
+
+
+def test_ratios_are_of_unseen_frames(story: TakeStory) -> None:
+    before, after = story.ratios(story.before), story.ratios(story.after)
+    assert before["flm"] == pytest.approx(20, rel=0.05)
+    assert after["flm"] == pytest.approx(1, abs=0.3)
+    assert before["frb"] == after["frb"]
+    assert story.sigma("flm") == pytest.approx(SIGMA)
+    nowhere = replace(story, before=np.full_like(story.before, np.nan))
+    assert np.isnan(nowhere.ratios(nowhere.before)["flm"])
+    assert np.isnan(nowhere.sigma("flm"))
+
+
+def test_a_story_on_other_frames_is_refused(story: TakeStory) -> None:
+    with pytest.raises(ValueError, match="before: expected residuals of shape"):
+        replace(story, before=story.before[:-1])
+    with pytest.raises(ValueError, match="on the recording's frames"):
+        replace(story, unseen=story.unseen[:-1])
+
+
+def test_the_map_is_dark_where_and_when_the_gap_is(story: TakeStory) -> None:
+    figure = gap_map(story)
+    left, right = (axes.collections[0].get_array() for axes in figure.axes[:2])
+    row = story.channels.index("flm")
+    assert left[row, 8] == pytest.approx(20, rel=0.1)  # 0.8 to 0.9 s
+    assert left[row, 2] < 2
+    assert right.max() < 3
+    others = np.delete(left, row, axis=0)
+    assert others.max() < 3
+    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == list(story.channels)
+    assert left.shape == (4, 12)
+
+
+def test_a_time_that_nobody_saw_is_grey(story: TakeStory) -> None:
+    before = story.before.copy()
+    before[(story.time > 0.3) & (story.time < 0.45)] = np.nan
+    cells = gap_map(replace(story, before=before)).axes[0].collections[0].get_array()
+    assert np.ma.getmaskarray(cells)[:, 3].all()
+    assert not np.ma.getmaskarray(cells)[:, 5].any()
+
+
+def test_the_robot_says_its_worst_joint(model: RobotModel) -> None:
+    said = [t.get_text() for t in robot_map(model, {"flm": 20.0, "frm": 1.1, "flb": float("nan")}).axes[0].texts]
+    assert "flm 20.0×" in said
+    assert "frm" in said  # within the limit: no number
+
+
+def test_before_and_after_shows_the_worst_unseen_stretch(story: TakeStory) -> None:
+    figure = before_after(story, "flm")
+    top, strip = figure.axes
+    low, high = strip.get_xlim()
+    assert low <= 0.7
+    assert high >= 0.9
+    nominal, fitted = strip.get_lines()
+    assert np.nanmax(nominal.get_ydata()) == pytest.approx(2.0, abs=0.5)
+    assert np.nanmax(np.abs(fitted.get_ydata())) < 0.5
+    assert [line.get_label() for line in top.get_lines()] == ["recorded", "nominal", "fitted"]
+
+
+@pytest.mark.parametrize("draw", [gap_map, lambda s: unseen_errors([s]), lambda s: before_after(s, "flb")])
+def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, draw) -> None:
+    nothing = np.full_like(story.before, np.nan)
+    figure = draw(replace(story, before=nothing, after=nothing, unseen=np.zeros(len(story.unseen), dtype=bool)))
+    assert isinstance(figure, Figure)
+    assert len(encode(figure).content) > 1000
+
+
+@pytest.mark.parametrize(("estimate", "said"), [
+    (Estimate(3.1, 2.7, 3.5, "deg"), "3.1 deg (2.7 to 3.5)"),
+    (Estimate(50.0, 20.0, inf, "N m/rad"), "50 N m/rad (at least 20)"),
+    (Estimate(0.1, -inf, 0.3, "N m"), "0.1 N m (at most 0.3)"),
+    (Estimate(0.1, -inf, inf, "N m"), "0.1 N m (not bounded by the data)"),
+    (Estimate((0.0, 0.1, 0.2), (-0.1, 0.0, 0.1), (0.1, 0.2, 0.3), "m"), "0 (-0.1 to 0.1); 0.1 (0 to 0.2); 0.2 (0.1 to 0.3) m"),
+])
+def test_intervals_are_said_as_a_person_would(estimate: Estimate, said: str) -> None:
+    assert interval(estimate) == said
+
+
+def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
+    full = diagnosis(model)
+    assert headline(full) == "Backlash at flm explains all that the model missed."
+    two = replace(full, verdict="partly_explained", findings=(finding(), replace(finding("ground_friction"), where=())))
+    assert headline(two).startswith("Backlash at flm and ground friction explain part of")
+    nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
+    assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
+    assert "nothing that the workbench knows" in headline(replace(nothing, verdict="unexplained"))
+
+
+def test_the_page_reads_from_top_to_bottom(model: RobotModel, story: TakeStory, tmp_path: Path) -> None:
+    paths = write_diagnosis(diagnosis(model), [story], tmp_path / "out", "Session small")
+    assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
+    page = (tmp_path / "out/report.html").read_text()
+    order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
+             "Where the model is wrong", "2 more places and times", "2 deg (1.8 to 2.3)", "joint compliance at flm", "Tried in its place",
+             "a placebo at frm does as well", "Before and after, on what nothing saw", "What is left", "grows with &lt;load&gt;",
+             "What else was tried", "it does not show", "What to record next", "next_experiment.csv", "See it move",
+             "<b>seed</b> 7"]
+    places = [page.find(words) for words in order]
+    assert -1 not in places, order[places.index(-1)]
+    assert places == sorted(places)
+
+
+def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, story: TakeStory) -> None:
+    quiet = replace(story, before=story.after, nominal=story.fitted, unseen=story.time > 0.2)
+    page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
+    assert "Nowhere do the recordings leave the nominal model by more than chance." in page
+    assert "Afterwards all is within" in page
+    assert "What to record next" not in page
+    assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()

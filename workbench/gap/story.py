@@ -1,0 +1,66 @@
+"""What one take was before and after the diagnosis, for figures and for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.take import Take
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TakeStory:
+    """One take against the nominal and the fitted model.
+
+    channels: (c) joints, and on the ground what the body does. before, after: (N, c) recorded less simulated, over what noise,
+    numerics and contact models alone make, on the recording's frames; NaN where unseen or before the first command. unseen: (N,)
+    frames that no choice and no parameter saw. recorded, nominal, fitted: the takes behind, observed alike, on one clock of
+    N frames.
+    """
+
+    recorded: Take
+    nominal: Take
+    fitted: Take
+    channels: tuple[str, ...]
+    before: Array
+    after: Array
+    unseen: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        shape = (len(self.recorded), len(self.channels))
+        for name, length in (("before", np.shape(self.before)), ("after", np.shape(self.after))):
+            if length != shape:
+                raise ValueError(f"{name}: expected residuals of shape {shape}, got {length}")
+        if not len(self.nominal) == len(self.fitted) == len(self.unseen) == len(self.recorded):
+            raise ValueError("expected nominal, fitted and unseen on the recording's frames")
+
+    @property
+    def name(self) -> str:
+        return self.recorded.name
+
+    @property
+    def time(self) -> Array:
+        """Since the first command (N,) [s]."""
+        return self.recorded.since_start
+
+    def ratios(self, residual: Array) -> dict[str, float]:
+        """RMS of `before` or `after` on unseen frames (on all where there are none), by channel; NaN where never seen."""
+        use = self.unseen if self.unseen.any() else np.ones(len(self.unseen), dtype=bool)
+        return {c: rms(residual[use, i]) for i, c in enumerate(self.channels)}
+
+    def sigma(self, joint: str) -> float:
+        """What noise and numerics make of a joint's residual (standard deviation) [rad]; NaN where it was never seen."""
+        difference = self.recorded.q[:, self.recorded.column(joint)] - self.nominal.q[:, self.nominal.column(joint)]
+        residual = self.before[:, self.channels.index(joint)]
+        use = np.isfinite(difference) & np.isfinite(residual) & (residual != 0)
+        return float(np.median(np.abs(difference[use] / residual[use]))) if use.any() else float("nan")
+
+
+def rms(x: Array) -> float:
+    """Root mean square of what is finite; NaN where nothing is."""
+    seen = x[np.isfinite(x)]
+    return float(np.sqrt(np.mean(np.square(seen)))) if len(seen) else float("nan")

@@ -1,0 +1,180 @@
+"""Where and when a recording leaves the model, before and after what was found is added to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, LogNorm
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from workbench.gap.story import TakeStory
+from workbench.robot import RobotModel
+from workbench.view.error_figures import LIMIT
+from workbench.view.shapes import robot_shapes
+from workbench.view.stance import intervals
+from workbench.view.style import ACCENT, COMMAND, NOISE, RECORDED, SIMULATED, STANCE, legend_above, new_figure, styled
+
+Array = NDArray[np.float64]
+BIN = 0.1
+"""Width of a cell of the map [s]."""
+SHOWN = 3.0
+"""Longest stretch that a before-and-after figure shows [s]."""
+_HEAT = LinearSegmentedColormap.from_list("gap", ["#F4F7F5", "#FCE3C5", "#F2A65A", RECORDED, "#7A2E00"]
+                                           ).with_extremes(bad="#D9D9DD")
+_SCALE = LogNorm(LIMIT, 30.0, clip=True)
+_DEGREES = 180 / np.pi
+
+
+@styled
+def gap_map(story: TakeStory) -> Figure:
+    """Places over time: residual over what noise and numerics alone make, RMS in cells of BIN, before and after.
+
+    Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks what no choice and no parameter saw."""
+    time, edges = story.time, np.arange(0.0, max(story.time[-1], BIN) + BIN, BIN)
+    rows = len(story.channels)
+    figure = new_figure(12, 0.21 * rows + 1.5)
+    panels = figure.subplots(1, 2, sharey=True)
+    mesh = None
+    for axes, residual, title in zip(panels, (story.before, story.after), ("before: nominal model", "after: fitted model")):
+        cells = _cells(time, residual, edges)
+        mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells, cmap=_HEAT, norm=_SCALE, rasterized=True)
+        for low, high in intervals(time, story.unseen & (time >= 0)):
+            axes.plot([low, high], [-0.35, -0.35], color=ACCENT, linewidth=4, solid_capstyle="butt", clip_on=False)
+        axes.set_ylim(rows, -0.6)
+        axes.set_yticks(np.arange(rows) + 0.5, story.channels, fontsize=9)
+        axes.grid(False)
+        axes.set_xlabel("time since the first command [s]")
+        axes.set_title(f"{story.name}, {title}")
+    assert mesh is not None
+    bar = figure.colorbar(mesh, ax=panels, pad=0.01, fraction=0.03)
+    bar.set_ticks([LIMIT, 3, 10, 30], labels=[f"≤ {LIMIT:g}×", "3×", "10×", "≥ 30×"])
+    bar.ax.minorticks_off()
+    return figure
+
+
+def _cells(time: Array, residual: Array, edges: Array) -> Array:
+    """RMS of each channel in each bin: (c, bins), masked where nothing was seen."""
+    at = np.digitize(time, edges) - 1
+    inside = (at >= 0) & (at < len(edges) - 1)
+    out = np.full((residual.shape[1], len(edges) - 1), np.nan)
+    for c, column in enumerate(residual.T):
+        use = inside & np.isfinite(column)
+        count = np.bincount(at[use], minlength=out.shape[1])
+        total = np.bincount(at[use], np.square(column[use]), minlength=out.shape[1])
+        np.divide(total, count, out=out[c], where=count > 0)
+    return np.ma.masked_invalid(np.sqrt(out))  # type: ignore[no-any-return, no-untyped-call]
+
+
+@styled
+def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
+    """The robot in neutral, drawn obliquely, each joint coloured and sized by its error over noise and numerics."""
+    k, shapes = model.kinematics, robot_shapes(model)
+    poses = {link: (p[0], R[0]) for link, (p, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
+    figure = new_figure(7.6, 4.6)
+    axes = figure.subplots()
+    segments = []
+    for link, (p, R) in poses.items():
+        joint = k.joint_of(link)
+        if joint is None:
+            continue
+        segments.append([_oblique(poses[k.frames[joint].parent][0]), _oblique(p)])
+        if joint in shapes.feet:
+            segments.append([_oblique(p), _oblique(p + R @ shapes.feet[joint][1])])
+    axes.add_collection(LineCollection(segments, colors=COMMAND, linewidths=5, alpha=0.35, capstyle="round", zorder=1))
+    points = {j: _oblique(poses[k.frames[j].child][0]) for j in model.joints}
+    worst = sorted(ratios, key=lambda j: -np.nan_to_num(ratios[j]))[:4]
+    for joint, (x, y) in points.items():
+        ratio = ratios.get(joint, np.nan)
+        known = np.isfinite(ratio)
+        size, colour = (60 + 90 * np.log(max(ratio, 1.0)), _HEAT(_SCALE(ratio))) if known else (30, "#D9D9DD")
+        axes.scatter(x, y, s=size, color=colour, edgecolor="#555555", linewidth=0.8, zorder=3)
+        loud = known and joint in worst and ratio > LIMIT
+        axes.annotate(f"{joint} {ratio:.1f}×" if loud else joint, (x, y), xytext=(10, 4), textcoords="offset points",
+                      zorder=5 if loud else 4, fontsize=11 if loud else 8, fontweight="bold" if loud else "normal",
+                      color=RECORDED if loud else "#777777")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.15)
+    axes.set_axis_off()
+    axes.set_title("error over noise and numerics, before")
+    return figure
+
+
+def _oblique(p: Array) -> Array:
+    """Seen from the right, ahead and above: forward to the right, left into the picture."""
+    return np.array([p[0] - 0.55 * p[1], p[2] + 0.5 * p[1]])
+
+
+@styled
+def before_after(story: TakeStory, joint: str) -> Figure:
+    """A joint as recorded, as the nominal and as the fitted model have it, and what each leaves, around the stretch that no
+    choice saw on which the nominal model misses most."""
+    low, high = _worst_stretch(story, joint)
+    t = story.time
+    use = (t >= low) & (t <= high)
+    figure = new_figure(10, 4.8)
+    top, strip = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.6])
+    recorded = _DEGREES * story.recorded.q[use, story.recorded.column(joint)]
+    top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
+    for what, take, colour, style in (("nominal", story.nominal, COMMAND, "--"), ("fitted", story.fitted, SIMULATED, "-")):
+        angle = _DEGREES * take.q[use, take.column(joint)]
+        top.plot(t[use], angle, color=colour, linestyle=style, linewidth=1.6, label=what)
+        strip.plot(t[use], recorded - angle, color=colour, linestyle=style, linewidth=1.5)
+    sigma = _DEGREES * story.sigma(joint)
+    if np.isfinite(sigma):
+        strip.axhspan(-2 * sigma, 2 * sigma, color=NOISE, zorder=0)
+    for axes in (top, strip):
+        _shade(axes, story, low, high)
+    top.set_title(f"{story.name}: joint {joint}")
+    top.set_ylabel("angle [deg]")
+    strip.set_ylabel("left over [deg]")
+    strip.set_xlabel("time since the first command [s]; grey: no choice and no parameter saw it; green: noise and numerics, 2σ")
+    strip.set_xlim(low, high)
+    legend_above(top)
+    return figure
+
+
+def _shade(axes: Axes, story: TakeStory, low: float, high: float) -> None:
+    for a, b in intervals(story.time, story.unseen):
+        if b > low and a < high:
+            axes.axvspan(max(a, low), min(b, high), color=STANCE, zorder=-1)
+
+
+def _worst_stretch(story: TakeStory, joint: str) -> tuple[float, float]:
+    t = story.time
+    error = np.square(np.nan_to_num(story.before[:, story.channels.index(joint)]))
+    if story.unseen.any():
+        error = np.where(story.unseen, error, 0.0)
+    width = min(SHOWN, t[-1])
+    sums = np.cumsum(error)
+    ends = np.minimum(np.searchsorted(t, t + width), len(t) - 1)
+    start = float(np.clip(t[int(np.argmax(sums[ends] - sums))], 0.0, max(t[-1] - width, 0.0)))
+    return start, start + width
+
+
+@styled
+def unseen_errors(stories: Sequence[TakeStory]) -> Figure:
+    """Each channel's error on frames that nothing saw, over what noise and numerics alone make, before and after, by take."""
+    ratios = [(s.ratios(s.before), s.ratios(s.after)) for s in stories]
+    worst = {c: max(float(np.nan_to_num(before.get(c, 0.0))) for before, _ in ratios) for s in stories for c in s.channels}
+    order = sorted(worst, key=lambda c: -worst[c])
+    figure = new_figure(12, 0.24 * len(order) + 1.7)
+    panels = figure.subplots(1, len(stories), sharey=True, squeeze=False)[0]
+    for axes, story, (before, after) in zip(panels, stories, ratios):
+        axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g} times")
+        rows = [i for i, c in enumerate(order) if np.isfinite(before.get(c, np.nan))]
+        b, a = ([values[order[i]] for i in rows] for values in (before, after))
+        axes.hlines(rows, b, a, color=COMMAND, linewidth=1.2, zorder=2)
+        axes.scatter(b, rows, s=42, facecolor="white", edgecolor=RECORDED, linewidth=1.8, zorder=3, label="before")
+        axes.scatter(a, rows, s=42, color=SIMULATED, zorder=4, label="after")
+        axes.set_xlim(left=0)
+        axes.grid(False, axis="y")
+        axes.set_title(story.name)
+        axes.set_xlabel("error over noise and numerics")
+    panels[0].set_yticks(range(len(order)), order, fontsize=10)
+    panels[0].set_ylim(len(order) - 0.4, -0.6)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
