@@ -98,6 +98,7 @@ def test_the_map_is_dark_where_and_when_the_gap_is(story: TakeStory) -> None:
     assert others.max() < 3
     assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == list(story.channels)
     assert left.shape == (4, 12)
+    assert len(gap_map(replace(story, after=story.before)).axes) == 2  # one map and its scale
 
 
 def test_a_time_that_nobody_saw_is_grey(story: TakeStory) -> None:
@@ -136,6 +137,7 @@ def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, dr
 
 @pytest.mark.parametrize(("estimate", "said"), [
     (Estimate(3.1, 2.7, 3.5, "deg"), "3.1 deg (2.7 to 3.5)"),
+    (Estimate(0.45, 0.4, 0.5, "1"), "0.45 (0.4 to 0.5)"),
     (Estimate(50.0, 20.0, inf, "N m/rad"), "50 N m/rad (at least 20)"),
     (Estimate(0.1, -inf, 0.3, "N m"), "0.1 N m (at most 0.3)"),
     (Estimate(0.1, -inf, inf, "N m"), "0.1 N m (not bounded by the data)"),
@@ -160,10 +162,10 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, story: TakeStory, 
     assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
     page = (tmp_path / "out/report.html").read_text()
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
-             "Where the model is wrong", "2 more places and times", "2 deg (1.8 to 2.3)", "joint compliance at flm", "Tried in its place",
-             "a placebo at frm does as well", "Before and after, on what nothing saw", "What is left", "grows with &lt;load&gt;",
-             "What else was tried", "it does not show", "What to record next", "next_experiment.csv", "See it move",
-             "<b>seed</b> 7"]
+             "Where the recordings leave the model", "2 more places and times", "2 deg (1.8 to 2.3)", "joint compliance at flm",
+             "Tried in its place", "a placebo at frm does as well", "Before and after, on what nothing saw", "What is left",
+             "grows with &lt;load&gt;", "What else was tried", "it does not show", "What to record next", "next_experiment.csv",
+             "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]
     assert -1 not in places, order[places.index(-1)]
     assert places == sorted(places)

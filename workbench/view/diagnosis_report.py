@@ -94,8 +94,13 @@ def interval(estimate: Estimate) -> str:
     """The value and its 90 % interval; "at least" or "at most" where one side is open."""
     value, low, high = (x if isinstance(x, tuple) else (x,) for x in (estimate.value, estimate.low, estimate.high))
     if len(value) == 1:
-        return f"{value[0]:.3g} {estimate.unit} ({_bounds(low[0], high[0])})"
-    return "; ".join(f"{v:.3g} ({_bounds(a, b)})" for v, a, b in zip(value, low, high)) + f" {estimate.unit}"
+        return f"{value[0]:.3g}{_unit(estimate)} ({_bounds(low[0], high[0])})"
+    return "; ".join(f"{v:.3g} ({_bounds(a, b)})" for v, a, b in zip(value, low, high)) + _unit(estimate)
+
+
+def _unit(estimate: Estimate) -> str:
+    """Nothing for a ratio."""
+    return "" if estimate.unit in ("", "1") else f" {estimate.unit}"
 
 
 def _bounds(low: float, high: float) -> str:
@@ -121,7 +126,7 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
     for f in diagnosis.findings:
         sure = f"{100 * f.confidence:.0f} %"
         first = next(iter(f.parameters.values()), None)
-        value = "is there" if first is None or isinstance(first.value, tuple) else f"{first.value:.3g} {first.unit}"
+        value = "is there" if first is None or isinstance(first.value, tuple) else f"{first.value:.3g}{_unit(first)}"
         numbers.append((title_of(f.effect, f.where), value, f"{sure} sure"))
     for s in stories:
         before, after = s.ratios(s.before), s.ratios(s.after)
@@ -135,12 +140,14 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
     if stories:
         worst = {c: max((_finite(s.ratios(s.before).get(c, math.nan)) for s in stories), default=0.0)
                  for s in stories for c in s.channels}
-        over = sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
+        ledger = sorted(diagnosis.gap, key=lambda g: -g.error / g.floor if g.floor > 0 else -math.inf)
+        over = list(dict.fromkeys(place for g in ledger for place in g.where))
+        over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
         named = over if len(over) < 6 else [*over[:4], f"{len(over) - 4} more places"]
         said = (f"The recordings leave the nominal model at {_listed(named)}." if over and diagnosis.verdict != "no_gap" else
                 "Nowhere do the recordings leave the nominal model by more than chance.")
         parts.append(Text(said))
-        parts.append(Picture(robot_map(diagnosis.nominal, worst), "Each joint, by how far it leaves the nominal model."))
+        parts.append(Picture(robot_map(diagnosis.nominal, worst), "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "floor"]
         parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
@@ -149,7 +156,7 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
     parts += maps[:1]
     if maps[1:]:
         parts.append(Details("The same map of the other takes", maps[1:]))
-    return Section("Where the model is wrong", parts)
+    return Section("Where the recordings leave the model", parts)
 
 
 def _worst(story: TakeStory) -> float:
@@ -217,7 +224,9 @@ def _walks(story: TakeStory) -> bool:
 
 def _left(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
-        return Section("What is left", [Text(f"Nothing beyond {LIMIT:g} times noise and numerics.")])
+        nothing = diagnosis.verdict in ("no_gap", "explained")
+        return Section("What is left", [Text("Nothing beyond what noise, numerics and chance make." if nothing else
+                                             "What is still beyond the green band above has no name yet.")])
     rows = [[_listed(u.where) or "whole robot", f"{u.error:.3g} {u.unit}", f"{u.floor:.2g} {u.unit}", u.description]
             for u in diagnosis.unexplained]
     return Section("What is left", [

@@ -31,15 +31,16 @@ _DEGREES = 180 / np.pi
 
 @styled
 def gap_map(story: TakeStory) -> Figure:
-    """Places over time: residual over what noise and numerics alone make, RMS in cells of BIN, before and after.
+    """Places over time: residual over what noise and numerics alone make, RMS in cells of BIN, before and (if it differs) after.
 
     Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks what no choice and no parameter saw."""
     time, edges = story.time, np.arange(0.0, max(story.time[-1], BIN) + BIN, BIN)
     rows = len(story.channels)
     figure = new_figure(12, 0.21 * rows + 1.5)
-    panels = figure.subplots(1, 2, sharey=True)
+    same = np.array_equal(story.before, story.after, equal_nan=True)
+    panels = figure.subplots(1, 1 if same else 2, sharey=True, squeeze=False)[0]
     mesh = None
-    for axes, residual, title in zip(panels, (story.before, story.after), ("before: nominal model", "after: fitted model")):
+    for axes, residual, title in zip(panels, (story.before, story.after), ("nominal model", "fitted model")):
         cells = _cells(time, residual, edges)
         mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells, cmap=_HEAT, norm=_SCALE, rasterized=True)
         for low, high in intervals(time, story.unseen & (time >= 0)):
@@ -86,16 +87,20 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
             segments.append([_oblique(p), _oblique(p + R @ shapes.feet[joint][1])])
     axes.add_collection(LineCollection(segments, colors=COMMAND, linewidths=5, alpha=0.35, capstyle="round", zorder=1))
     points = {j: _oblique(poses[k.frames[j].child][0]) for j in model.joints}
-    worst = sorted(ratios, key=lambda j: -np.nan_to_num(ratios[j]))[:4]
+    loud = sorted((j for j in points if ratios.get(j, 0.0) > LIMIT), key=lambda j: -ratios[j])[:4]
     for joint, (x, y) in points.items():
         ratio = ratios.get(joint, np.nan)
         known = np.isfinite(ratio)
         size, colour = (60 + 90 * np.log(max(ratio, 1.0)), _HEAT(_SCALE(ratio))) if known else (30, "#D9D9DD")
         axes.scatter(x, y, s=size, color=colour, edgecolor="#555555", linewidth=0.8, zorder=3)
-        loud = known and joint in worst and ratio > LIMIT
-        axes.annotate(f"{joint} {ratio:.1f}×" if loud else joint, (x, y), xytext=(10, 4), textcoords="offset points",
-                      zorder=5 if loud else 4, fontsize=11 if loud else 8, fontweight="bold" if loud else "normal",
-                      color=RECORDED if loud else "#777777")
+        if joint not in loud:
+            axes.annotate(joint, (x, y), xytext=(9, 4), textcoords="offset points", fontsize=8, color="#777777", zorder=2)
+    right, top = np.max(list(points.values()), axis=0)
+    height = top - min(y for _, y in points.values())
+    for row, joint in enumerate(sorted(loud, key=lambda j: -points[j][1])):
+        axes.annotate(f"{joint} {ratios[joint]:.1f}×", points[joint], xytext=(right + 0.5 * height, top - 0.24 * row * height),
+                      va="center", fontsize=12, fontweight="bold", color=RECORDED, zorder=4,
+                      arrowprops={"arrowstyle": "-", "color": RECORDED, "linewidth": 1.0, "alpha": 0.6})
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
     axes.set_axis_off()
@@ -103,9 +108,9 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     return figure
 
 
-def _oblique(p: Array) -> Array:
+def _oblique(p: Array) -> tuple[float, float]:
     """Seen from the right, ahead and above: forward to the right, left into the picture."""
-    return np.array([p[0] - 0.55 * p[1], p[2] + 0.5 * p[1]])
+    return float(p[0] - 0.55 * p[1]), float(p[2] + 0.5 * p[1])
 
 
 @styled
