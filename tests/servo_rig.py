@@ -67,7 +67,8 @@ def rig_model(folder: Path, servo: ServoConstants, mass: float = 0.1) -> RobotMo
 
 
 def make_rig(folder: Path, servo: ServoConstants, mass: float = 0.1, gravity: bool = True, time_step: float = 1e-3,
-             integrator: str = "", accuracy: float = 1e-6, approximation: str = "kLagged", terms: Sequence[ServoTerm] = ()) -> Rig:
+             integrator: str = "", accuracy: float = 1e-6, approximation: str = "kLagged",
+             terms: Sequence[ServoTerm] = ()) -> Rig:
     model = rig_model(folder, servo, mass)
     builder = RobotDiagramBuilder(time_step=time_step)
     plant = builder.plant()

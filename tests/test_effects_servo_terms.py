@@ -20,7 +20,7 @@ from workbench.simulation import Simulation, SimulationConfig
 
 MASS, STEP = 0.1, 5e-4
 PLANTS = {"lagged": {"time_step": STEP}, "lagged 2 ms": {"time_step": 2e-3}, "sap": {"time_step": STEP, "approximation": "kSap"},
-          "runge_kutta3": {"time_step": 0.0, "integrator": "runge_kutta3"}}
+          "runge_kutta3": {"time_step": 0.0, "integrator": "runge_kutta3", "accuracy": 1e-5}}
 each_plant = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
 SMOOTH = ServoConstants(coulomb_friction=0.0, viscous_friction=0.0)
 DRY = ServoConstants(coulomb_friction=0.06, viscous_friction=0.0)
@@ -287,7 +287,7 @@ def test_a_term_that_does_nothing_changes_nothing(tmp_path, plant):
         rig.put(0.1)
     for _ in range(10):
         nominal, idle = (rig.run(0.05) for rig in rigs)
-        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if plant["time_step"] else 1e-4)
+        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if plant["time_step"] else 1e-3)  # a step that an integrator rounds otherwise
 
 
 def test_logged_torque_is_what_turns_the_arm(tmp_path):

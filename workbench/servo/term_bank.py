@@ -68,9 +68,11 @@ class TermBank(ServoBank):
         self._ceiling = np.full(len(joints), np.inf)
         for term in terms:
             self._ceiling = np.minimum(self._ceiling, term.ceiling())
+        self._cuts = bool(np.isfinite(self._ceiling).any())
         self._discrete = plant.time_step() > 0
         self._smoothing = period / (period + LOAD_SMOOTHING)
         self._inertia_rate = law.inertia / period
+        self._none = np.zeros(len(joints))
         self._actuators = _last_actuators(plant, joints)
         super().__init__(plant, joints, law, period, bristles)
 
@@ -113,16 +115,20 @@ class TermBank(ServoBank):
         for term in self.terms:
             torque = torque * term.strength(law, now)
             friction = friction + term.friction(now)
-        friction = np.minimum(friction, self._most)
         ahead = 2.0 * v - last_v if stepped and self._discrete else v
-        push, motor = torque - _beyond(torque - law.back_emf * ahead, self._ceiling), torque - law.back_emf * v
-        motor = motor - _beyond(motor, self._ceiling)
+        push, motor = torque, torque - law.back_emf * v
+        if self._cuts:
+            push = push - _beyond(torque - law.back_emf * ahead, self._ceiling)
+            motor = motor - _beyond(motor, self._ceiling)
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
-        if not self._varies or self._bristles:
-            return _Parts(push, motor, friction, np.zeros_like(v))
+        if not self._varies:
+            return _Parts(push, motor, law.coulomb, self._none)
+        friction = np.minimum(friction, self._most)
+        if self._bristles:
+            return _Parts(push, motor, friction, self._none)
         yielding = np.maximum(friction / 2, 1e-6)  # well below what brakes a joint that slides, so that this counts as sliding
-        direction = np.clip(v / MOVING - held / yielding, -1.0, 1.0)
+        direction = np.minimum(np.maximum(v / MOVING - held / yielding, -1.0), 1.0)
         return _Parts(push, motor, friction, (self._most - friction) * direction)
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
@@ -141,9 +147,12 @@ class TermBank(ServoBank):
 
     def _advance(self, context: Context, values: DiscreteValues) -> None:
         super()._advance(context, values)
+        v = self._state.Eval(context)[self._x_v]
+        if not self._varies:  # nobody asks for the load
+            values.set_value(self._memory, np.concatenate([v, self._none, self._none, self._none, [1.0]]))
+            return
         (_, known, load, _), stepped = self._remembered(context)
         parts: _Parts = self._parts.Eval(context)
-        v = self._state.Eval(context)[self._x_v]
         if stepped:  # implicit damping and the reflected inertia's change of speed, now that the step's end is known
             handed = known - (self.law.damping + self._inertia_rate) * v
             load = load + self._smoothing * (handed - load)
@@ -155,8 +164,6 @@ class TermBank(ServoBank):
         """Dry friction on the joints (n,) [N m] over the step that begins."""
         if self._bristles:
             return -self._bristle_force(context, v)
-        if not self._varies:
-            return np.zeros_like(v)  # nobody asks
         return np.asarray(self._net_actuation.Eval(context)[self._actuators] + parts.relief)
 
     def _bristle_rate(self, context: Context, v: Array) -> tuple[Array, Array]:
@@ -174,7 +181,7 @@ class TermBank(ServoBank):
 
 def _beyond(torque: Array, ceiling: Array) -> Array:
     """What of a torque is beyond the ceiling, with its sign."""
-    return torque - np.clip(torque, -ceiling, ceiling)
+    return torque - np.minimum(np.maximum(torque, -ceiling), ceiling)
 
 
 def _last_actuators(plant: MultibodyPlant, joints: Sequence[RevoluteJoint]) -> NDArray[np.int_]:
