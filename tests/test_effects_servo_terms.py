@@ -287,7 +287,7 @@ def test_a_term_that_does_nothing_changes_nothing(tmp_path, plant):
         rig.put(0.1)
     for _ in range(10):
         nominal, idle = (rig.run(0.05) for rig in rigs)
-        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if plant["time_step"] else 1e-3)  # a step that an integrator rounds otherwise
+        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if plant["time_step"] else 1e-3)
 
 
 def test_logged_torque_is_what_turns_the_arm(tmp_path):
