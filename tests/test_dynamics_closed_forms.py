@@ -11,7 +11,7 @@ from workbench.dynamics import InverseDynamics, RobotTrajectory
 from workbench.dynamics.contact import STICKING, project, share_forces
 from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, torque_margin
 from workbench.motion import Motion
-from workbench.robot import EffectSpec, Ground, InputError, RobotModel, ServoConstants
+from workbench.robot import Ground, InputError, RobotModel, ServoConstants
 
 G = 9.81
 RISE = np.array([0, 0, 0.1])
@@ -70,12 +70,6 @@ def test_pendulum_needs_gravity_and_inertia(pendulum: RobotModel) -> None:
     np.testing.assert_allclose(result.torque, links, atol=1e-12)
     motor = links + 0.005 * a + 0.02 * v + 0.07 * np.clip(v / 0.05, -1, 1)
     np.testing.assert_allclose(result.motor_torque, motor, atol=1e-12)
-
-
-def test_effects_are_said_to_be_left_out(pendulum: RobotModel) -> None:
-    with_load = pendulum.with_effect(EffectSpec("payload", ("arm",), {"mass": 0.1}))
-    result = InverseDynamics(with_load, base="fixed").of(RobotTrajectory.at_rest(("swing",), np.zeros((1, 1))))
-    assert result.problems == ("payload: not in the inverse dynamics, which are the nominal robot's",)
 
 
 def test_the_mount_carries_weight_and_reaction(pendulum: RobotModel) -> None:

@@ -157,9 +157,8 @@ class InverseDynamics:
         torque_left, speed_left = torque_margin(self._servos, motor, trajectory.v), speed_margin(self._servos, trajectory.v)
         loads = {j: servo_load(s, motor[:, i], torque_left[:, i], speed_left[:, i])
                  for i, (j, s) in enumerate(zip(self.model.joints, self._servos))}
-        if self.model.effects:
-            left_out = ", ".join(e.effect for e in self.model.effects)
-            problems.append(f"{left_out}: not in the inverse dynamics, which are the nominal robot's")
+        if self.machine.left_out:
+            problems.append(f"{', '.join(self.machine.left_out)}: not in the inverse dynamics; only effects on masses are")
         feet = self.machine.points.feet if self.base == "free" else ()
         contact = {foot: solution.forces[:, self.machine.points.foot == f].sum(axis=1) for f, foot in enumerate(feet)}
         return InverseDynamicsResult(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 
 from workbench.dynamics.trajectory import RobotTrajectory
+from workbench.effects.apply import physics_of, resolved
 from workbench.recording import quaternions
 from workbench.robot import FEET, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import rotation_about
@@ -45,6 +46,7 @@ class Machine:
     """A model's rigid bodies on a base that floats, in a continuous Drake plant that is built once.
 
     Friction and reflected inertia of the servos, and those that the SDF says, are left out: torques are what the links take.
+    Of a model's effects those that change masses are in; left_out names the others.
     """
 
     def __init__(self, model: RobotModel, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> None:
@@ -58,7 +60,13 @@ class Machine:
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         parser = Parser(plant)
         ConfigureParser(parser)
-        parser.AddModels(str(model.path))
+        loaded = replace(model, effects=tuple(spec for effect, spec, _ in resolved(model) if effect.layer == "inertia"))
+        self.left_out = tuple(spec.effect for spec in model.effects if spec not in loaded.effects)
+        description = physics_of(loaded).description
+        if description is None:
+            parser.AddModels(str(model.path))
+        else:
+            parser.AddModelsFromString(description, "sdf")
         self.mount = _unmount(plant, model.base)
         for index in plant.GetJointIndices():
             joint = plant.get_mutable_joint(index)

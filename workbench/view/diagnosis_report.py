@@ -147,7 +147,8 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
         said = (f"The recordings leave the nominal model at {_listed(named)}." if over and diagnosis.verdict != "no_gap" else
                 "Nowhere do the recordings leave the nominal model by more than chance.")
         parts.append(Text(said))
-        parts.append(Picture(robot_map(diagnosis.nominal, worst), "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
+        parts.append(Picture(robot_map(diagnosis.nominal, worst),
+                             "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "floor"]
         parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
