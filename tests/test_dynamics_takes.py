@@ -37,7 +37,7 @@ def model() -> RobotModel:
 @pytest.fixture(scope="module")
 def walk(model: RobotModel) -> Take:
     motion = load_motion(shared("practice/p0_nothing_hidden/motions/walk.csv"), model)
-    return play_motion(Simulation(model, SimulationConfig(contact_period=1e-3)), motion, cycles=3, lead=0.3)
+    return play_motion(Simulation(model, SimulationConfig(contact_period=1e-3)), motion, cycles=3)
 
 
 def rms(x: np.ndarray) -> float:
@@ -296,7 +296,7 @@ def test_a_floor_believed_too_slippery_shows_in_the_residual(model: RobotModel, 
 def test_at_rest_the_servos_hold_what_statics_says(model: RobotModel) -> None:
     """On the stand nothing is left to choose: simulated and reconstructed torques agree closely."""
     motion = load_motion(shared("practice/p0_nothing_hidden/motions/stand.csv"), model)
-    take = play_motion(Simulation(model, SimulationConfig(base="fixed")), motion, cycles=1, lead=0.3)
+    take = play_motion(Simulation(model, SimulationConfig(base="fixed")), motion, cycles=1)
     part = take.resampled(np.arange(-0.2, 3.0, 1e-3))
     result = inverse_dynamics(model, part, draws=0)
     rotor = np.array([model.servo(j).reflected_inertia for j in model.joints])
