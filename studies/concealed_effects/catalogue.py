@@ -34,14 +34,13 @@ class Range:
 class Entry:
     """One effect. size: the parameter that says how much of it there is, and its range. others: its further parameters, from a
     generator, the robot and the place. place: from a generator and the robot; nothing for the whole robot.
-    weaker: whether a smaller value is more of it. logged: whether a robot that logs its joints can show it, walking: a walker."""
+    logged: whether a robot that logs its joints can show it; walkers can show all."""
 
     parameter: str
     size: Range
     place: Callable[[Rng, Robot], tuple[str, ...]]
     others: Callable[[Rng, Robot, tuple[str, ...]], Mapping[str, Value]] = lambda rng, robot, where: {}
     logged: bool = True
-    walking: bool = True
 
 
 def _whole(rng: Rng, robot: Robot) -> tuple[str, ...]:
@@ -93,6 +92,23 @@ def _stop(rng: Rng, robot: Robot, where: tuple[str, ...]) -> Mapping[str, Value]
     return {"lower": -90.0}
 
 
+def _also(**ranges: tuple[float, float]) -> Callable[[Rng, Robot, tuple[str, ...]], Mapping[str, Value]]:
+    """Further parameters, each evenly from its range."""
+    return lambda rng, robot, where: {k: float(f"{rng.uniform(*r):.3g}") for k, r in ranges.items()}
+
+
+def _slack(rng: Rng, robot: Robot, where: tuple[str, ...]) -> Mapping[str, Value]:
+    return {"from": round(float(rng.choice([-1, 1]) * rng.uniform(5, 15)), 1)}
+
+
+def _swing(rng: Rng, robot: Robot, where: tuple[str, ...]) -> Mapping[str, Value]:
+    return {"length": round(float(rng.uniform(0.05, 0.1)), 3), "position": (0.0, 0.0, -0.02)}
+
+
+def _body(rng: Rng, robot: Robot) -> tuple[str, ...]:
+    return ("body_link",)
+
+
 def _sideways(rng: Rng, robot: Robot, where: tuple[str, ...]) -> Mapping[str, Value]:
     """An axis across the servo's: x or z for a joint about y, y or z for one about x."""
     across = ["y", "z"] if where[0].endswith("t") else ["x", "z"]
@@ -109,7 +125,7 @@ CATALOGUE: dict[str, Entry] = {
     "joint_compliance": Entry("stiffness", Range(2.0, 12.0), _knee_or_hip, logged=False),
     "coulomb_friction": Entry("torque", Range(0.06, 0.2), _joint),
     "viscous_friction": Entry("coefficient", Range(0.05, 0.25), _joint),
-    "stribeck_friction": Entry("torque", Range(0.08, 0.25), _knee_or_hip, lambda g, r, w: {"speed": float(np.round(g.uniform(8, 40), 1))}),
+    "stribeck_friction": Entry("torque", Range(0.08, 0.25), _knee_or_hip, _also(speed=(8, 40))),
     "load_friction": Entry("coefficient", Range(0.25, 0.8), _knee_or_hip),
     "supply_voltage": Entry("voltage", Range(0.65, 0.88), _whole),  # a share of the nominal supply
     "supply_sag": Entry("drop", Range(0.25, 0.9), _whole, logged=False),
@@ -132,27 +148,25 @@ CATALOGUE: dict[str, Entry] = {
     "com_shift": Entry("offset", Range(0.012, 0.035), _trunk, logged=False),
     "ground_friction": Entry("friction", Range(0.12, 0.4), _whole, logged=False),
     "foot_friction": Entry("friction", Range(0.05, 0.3), _foot, logged=False),
-    "ground_tilt": Entry("forward", Range(1.0, 4.0, True), _whole, lambda g, r, w: {"left": float(np.round(g.uniform(-2, 2), 2))}, logged=False),
+    "ground_tilt": Entry("forward", Range(1.0, 4.0, True), _whole, _also(left=(-2, 2)), logged=False),
     "soft_ground": Entry("stiffness", Range(1.5e3, 6e3), _whole, logged=False),
     "tether_force": Entry("force", Range(0.3, 1.5), _whole, logged=False),
     "marker_frame": Entry("rotation", Range(2.0, 9.0), _asset, logged=False),
-    "gear_ripple": Entry("torque", Range(0.12, 0.3), _knee_or_hip, lambda g, r, w: {"period": float(np.round(g.uniform(8, 25), 1))}),
-    "sensor_ripple": Entry("amplitude", Range(1.2, 3.0), _knee_or_hip, lambda g, r, w: {"period": float(np.round(g.uniform(25, 60), 1))},
+    "gear_ripple": Entry("torque", Range(0.12, 0.3), _knee_or_hip, _also(period=(8, 25))),
+    "sensor_ripple": Entry("amplitude", Range(1.2, 3.0), _knee_or_hip, _also(period=(25, 60)),
                            logged=False),
-    "taut_cable": Entry("stiffness", Range(0.6, 2.5), _knee_or_hip,
-                        lambda g, r, w: {"from": float(np.round(g.choice([-1, 1]) * g.uniform(5, 15), 1))}),
-    "warming_friction": Entry("torque", Range(0.15, 0.3), _knee_or_hip, lambda g, r, w: {"share": 0.9, "heat": float(np.round(g.uniform(0.3, 0.9), 2))}),
+    "taut_cable": Entry("stiffness", Range(0.6, 2.5), _knee_or_hip, _slack),
+    "warming_friction": Entry("torque", Range(0.15, 0.3), _knee_or_hip, _also(share=(0.9, 0.9), heat=(0.3, 0.9))),
     "friction_memory": Entry("torque", Range(0.15, 0.3), _knee_or_hip,
-                             lambda g, r, w: {"speed": float(np.round(g.uniform(15, 40), 1)), "time": float(np.round(g.uniform(0.08, 0.25), 3))}),
+                             _also(speed=(15, 40), time=(0.08, 0.25))),
     "one_way_friction": Entry("torque", Range(0.12, 0.25), _knee_or_hip),
-    "power_dips": Entry("share", Range(0.6, 0.9), _whole, lambda g, r, w: {"length": float(np.round(g.uniform(0.08, 0.2), 3)), "rate": 0.7}),
-    "swinging_mass": Entry("mass", Range(0.06, 0.15), lambda g, r: ("body_link",),
-                           lambda g, r, w: {"length": float(np.round(g.uniform(0.05, 0.1), 3)), "position": (0.0, 0.0, -0.02)}, logged=False),
-    "floor_step": Entry("height", Range(0.003, 0.007), _whole, lambda g, r, w: {"x": float(np.round(g.uniform(0.085, 0.12), 3))}, logged=False),
+    "power_dips": Entry("share", Range(0.6, 0.9), _whole, _also(length=(0.08, 0.2), rate=(0.7, 0.7))),
+    "swinging_mass": Entry("mass", Range(0.06, 0.15), _body, _swing, logged=False),
+    "floor_step": Entry("height", Range(0.003, 0.007), _whole, _also(x=(0.085, 0.12)), logged=False),
 }
 assert set(CATALOGUE) == {*VOCABULARY, *OUTSIDE}
-PULLS = ("ground_friction", "foot_friction", "tether_force", "ground_tilt", "servo_gain", "payload", "com_shift", "zero_offset", "link_length",
-         "parallel_spring", "supply_voltage", "torque_ceiling", "dead_band", "backlash", "joint_compliance", "coulomb_friction")
+PULLS = ("ground_friction", "foot_friction", "tether_force", "ground_tilt", "servo_gain", "payload", "com_shift", "zero_offset",
+         "link_length", "parallel_spring", "supply_voltage", "torque_ceiling", "dead_band", "backlash", "joint_compliance", "coulomb_friction")
 """Effects that can pull the body's path either way, with which another may be masked."""
 DIRECTED = ("com_shift", "tether_force", "marker_frame")
 """Effects whose size is a vector's length."""
@@ -200,11 +214,12 @@ def draw(effect: str, rng: Rng, robot: Robot) -> Draw:
     where = entry.place(rng, robot)
     direction = rng.standard_normal(3) * (1, 1, 0 if effect in ("tether_force", "com_shift") else 1)
     sign = float(rng.choice([-1, 1]))
-    return Draw(effect, where, entry.others(rng, robot, where), sign, _three(direction / np.linalg.norm(direction)), robot.servo.supply_voltage)
+    direction /= np.linalg.norm(direction)
+    return Draw(effect, where, entry.others(rng, robot, where), sign, _three(direction), robot.servo.supply_voltage)
 
 
 def possible(robot: Robot, outside: bool) -> list[str]:
     """Effects that this robot can show, in or outside the vocabulary."""
     logs = not robot.rigid_bodies
     names = OUTSIDE if outside else VOCABULARY
-    return [e for e in names if (CATALOGUE[e].logged if logs else CATALOGUE[e].walking)]
+    return [e for e in names if CATALOGUE[e].logged or not logs]

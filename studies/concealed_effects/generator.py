@@ -21,11 +21,9 @@ import yaml
 
 from studies.concealed_effects.conceal import Bench, NoneFoundError, conceal
 from studies.concealed_effects.plan import MAKERS, SessionPlan, plan_sessions
-from studies.concealed_effects.robots import Robot
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import LogPlan, filmed_takes, is_logged, log_csv, log_rows, logged_takes, play_log
 from studies.concealed_effects.visible import FINE
-
 from studies.other_engine.hidden import OUTSIDE
 from studies.other_engine.make_session import TakePlan, random_camera, record, servo_yaml, session_entry
 from studies.other_engine.motive_file import motive_csv
@@ -82,14 +80,15 @@ def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
     hidden = bench.with_effects(effects)
     session = session_entry(model, "robot.sdf" if robot.sdf else model.description, "servo.yaml")
     shown, sealed = {"servo.yaml": servo_yaml(model)}, Files()
-    entries = (_logs if is_logged(robot) else _films)(robot, model, hidden, takes, rng, shown, sealed)  # type: ignore[operator]
+    record_all: Callable[..., tuple[dict[str, object], dict[str, object]]] = _logs if is_logged(robot) else _films
+    entries, facts = record_all(model, hidden, takes, rng, shown, sealed)
     if is_logged(robot):
         session.pop("ground")
         session["robot"].pop("rigid_bodies")  # type: ignore[attr-defined]
         session["robot"]["bus_ids"] = dict(robot.bus_ids)  # type: ignore[index]
-    shown["session.yaml"] = yaml.safe_dump(session | entries[0], sort_keys=False)
+    shown["session.yaml"] = yaml.safe_dump(session | entries, sort_keys=False)
     truth = {"name": plan.name, "robot": robot.kind, "effects": [_truth_of(e) for e in effects], "masked": plan.masked,
-             "outside": [e.effect for e in effects if e.effect in OUTSIDE], "takes": entries[1],
+             "outside": [e.effect for e in effects if e.effect in OUTSIDE], "takes": facts,
              "seconds": round(time.monotonic() - began, 1)}
     sealed["truth.json"] = json.dumps(truth, indent=1) + "\n"
     return shown, sealed
@@ -99,7 +98,7 @@ def _truth_of(effect: EffectSpec) -> dict[str, object]:
     return json.loads(json.dumps(asdict(effect)))  # type: ignore[no-any-return]
 
 
-def _films(robot: Robot, model: RobotModel, hidden: RobotModel, takes: list[TakePlan], rng: np.random.Generator, shown: Files,
+def _films(model: RobotModel, hidden: RobotModel, takes: list[TakePlan], rng: np.random.Generator, shown: Files,
            sealed: Files) -> tuple[dict[str, object], dict[str, object]]:
     camera = random_camera(rng)
     learn: list[dict[str, object]] = []
@@ -130,7 +129,7 @@ def _films(robot: Robot, model: RobotModel, hidden: RobotModel, takes: list[Take
     return {"takes": learn, "predict": predict}, facts
 
 
-def _logs(robot: Robot, model: RobotModel, hidden: RobotModel, takes: list[LogPlan], rng: np.random.Generator, shown: Files,
+def _logs(model: RobotModel, hidden: RobotModel, takes: list[LogPlan], rng: np.random.Generator, shown: Files,
           sealed: Files) -> tuple[dict[str, object], dict[str, object]]:
     learn: list[dict[str, object]] = []
     predict: list[dict[str, object]] = []

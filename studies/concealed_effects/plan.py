@@ -1,4 +1,4 @@
-"""Which sessions there are: quiet ones, named effects alone and together, masks, and physics without a name. All from one seed."""
+"""Which sessions there are, from one seed: quiet ones, named effects alone and together, masks, and physics without a name."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
     with_two = sum(k in ("two", "three") for k in kinds) + len(range(0, kinds.count("outside"), 3))
     masks = (with_two + 1) // 2
     named, unnamed = _deck(VOCABULARY, rng), _deck(OUTSIDE, rng)
-    plans, order = [], rng.permutation(count)
+    plans: list[SessionPlan] = []
+    order = rng.permutation(count)
     walkers = ("quadruped", "quadruped", "quadruped", "quadruped", "puppy")
     for k, kind in enumerate(kinds):
         masked = kind in ("two", "three") and masks > 0

@@ -54,20 +54,22 @@ def quadruped(rng: Rng) -> Robot:
     for leg, x, y, sign in (("fl", 1, 1, 1), ("fr", 1, -1, -1), ("bl", -1, 1, -1), ("br", -1, -1, 1)):
         trunk = "body_link" if x > 0 else "tail_link"
         at = np.array([x * half_length, y * half_width, height - drop])
-        hip = at + [0, y * 0.006, -top]
-        knee = hip + [0, 0, -thigh]
+        hip = at + np.array([0, y * 0.006, -top])
+        knee = hip + np.array([0, 0, -thigh])
         links += [
             _link(f"{leg}t_link", at, masses["t"], (0, 0, -0.007), (0.038, 0.034, 0.045)),
             _link(f"{leg}m_link", hip, masses["m"], (0.003, 0, -thigh / 2), (0.036, 0.044, thigh + 0.02)),
             _link(f"{leg}b_link", knee, masses["b"], (0, 0, -0.42 * shank), (0.024, 0.03, shank - 0.008), _foot(shank)),
         ]
-        joints += [_joint(f"{leg}t", trunk, f"{leg}t_link", "-1 0 0"), _joint(f"{leg}m", f"{leg}t_link", f"{leg}m_link", f"0 {sign} 0"),
+        joints += [_joint(f"{leg}t", trunk, f"{leg}t_link", "-1 0 0"),
+                   _joint(f"{leg}m", f"{leg}t_link", f"{leg}m_link", f"0 {sign} 0"),
                    _joint(f"{leg}b", f"{leg}m_link", f"{leg}b_link", f"0 {-sign} 0")]
     links += [_link("neck_link", (0.085, 0, height + 0.03), masses["neck"], (0.008, 0, 0.022), (0.032, 0.032, 0.055)),
               _link("head_link", (0.105, 0, height + 0.075), masses["head"], (0.024, 0, 0.004), (0.06, 0.045, 0.04))]
     joints += [_joint("neck", "body_link", "neck_link", "0 -1 0"), _joint("head", "neck_link", "head_link", "0 -1 0")]
     ground = Ground(friction=round(float(rng.uniform(0.5, 0.75)), 2), stiffness=1e5, dissipation=20.0)
-    return Robot("quadruped", _sdf("quadruped", links + joints), _servo(rng), ground, "body_link", dict(RIGID_BODIES), dict(BUS_IDS))
+    sdf = _sdf("quadruped", links + joints)
+    return Robot("quadruped", sdf, _servo(rng), ground, "body_link", dict(RIGID_BODIES), dict(BUS_IDS))
 
 
 def arm(rng: Rng) -> Robot:
@@ -100,9 +102,10 @@ def _servo(rng: Rng) -> ServoConstants:
 def _bus_servo(rng: Rng) -> ServoConstants:
     """A small bus servo with a proportional law."""
     return ServoConstants(
-        model="bus servo", stall_torque=1.0, no_load_speed=7.0, rated_voltage=6.0, supply_voltage=round(float(rng.uniform(5.6, 6.2)), 2),
-        coulomb_friction=0.03, viscous_friction=0.01, reflected_inertia=0.004, compliance_slope=None, compliance_margin=None, punch=None,
-        proportional_gain=round(float(rng.uniform(2.5, 5.0)), 2))
+        model="bus servo", stall_torque=1.0, no_load_speed=7.0, rated_voltage=6.0,
+        supply_voltage=round(float(rng.uniform(5.6, 6.2)), 2), coulomb_friction=0.03, viscous_friction=0.01, reflected_inertia=0.004,
+        compliance_slope=None, compliance_margin=None,
+        punch=None, proportional_gain=round(float(rng.uniform(2.5, 5.0)), 2))
 
 
 def _sdf(name: str, parts: list[str]) -> str:
@@ -127,8 +130,10 @@ def _foot(shank: float) -> str:
                 f"<drake:hunt_crossley_dissipation>{FOOT_DISSIPATION:g}</drake:hunt_crossley_dissipation>"
                 "<drake:mu_static>0.6</drake:mu_static><drake:mu_dynamic>0.6</drake:mu_dynamic>")
     return "".join(
-        f'<collision name="foot{k}"><pose>{x} {y} {-shank + 0.006:.5f} 0 0 0</pose><geometry><sphere><radius>0.006</radius></sphere>'
-        f'</geometry><drake:proximity_properties xmlns:drake="http://drake.mit.edu">{material}</drake:proximity_properties></collision>'
+        f'<collision name="foot{k}"><pose>{x} {y} {-shank + 0.006:.5f} 0 0 0</pose>'
+        f'<geometry><sphere><radius>0.006</radius></sphere>'
+        f'</geometry><drake:proximity_properties xmlns:drake="http://drake.mit.edu">{material}</drake:proximity_properties>'
+        "</collision>"
         for k, (x, y) in enumerate(((-0.011, -0.009), (-0.011, 0.009), (0.011, -0.009), (0.011, 0.009))))
 
 

@@ -96,9 +96,8 @@ def log_rows(run: Rollout, plan: LogPlan, rng: np.random.Generator) -> tuple[Arr
 
 def log_csv(plan: LogPlan, position: Array, velocity: Array | None = None, start_only: bool = False) -> str:
     """Text of a joint log; start_only: the commands of a prediction, with the measured state in the first row alone."""
-    header = ["time", *(f"goal.{j}" for j in plan.joints), *(f"enabled.{j}" for j in plan.joints), *(f"position.{j}" for j in plan.joints)]
-    if velocity is not None:
-        header += [f"velocity.{j}" for j in plan.joints]
+    kinds = ("goal", "enabled", "position", *(() if velocity is None else ("velocity",)))
+    header = ["time", *(f"{kind}.{j}" for kind in kinds for j in plan.joints)]
     lines = [",".join(header)]
     for k, t in enumerate(plan.time):
         cells = [f"{t:.4f}", *(f"{x:.5f}" for x in np.rad2deg(plan.goals[k])), *("1" for _ in plan.joints)]

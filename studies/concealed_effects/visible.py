@@ -96,7 +96,8 @@ def excess(hidden: Seen, nominal: Seen, finer: Seen | None) -> float:
     floor = (0.0, 0.0, 0.0) if finer is None else _differences(finer, nominal)
     rotation, place, path = _differences(hidden, nominal)
     walked = 0.0 if finer is None else PATH_FLOOR * nominal.travel
-    return max(float(np.max(rotation / np.hypot(ROTATION_NOISE, floor[0]))), float(np.max(place / np.hypot(POSITION_NOISE, floor[1]))),
+    return max(float(np.max(rotation / np.hypot(ROTATION_NOISE, floor[0]))),
+               float(np.max(place / np.hypot(POSITION_NOISE, floor[1]))),
                0.0 if finer is None else float(path / np.sqrt(POSITION_NOISE**2 + floor[2] ** 2 + walked**2)))
 
 

@@ -1,15 +1,15 @@
 """Do the two engines mean the same by an effect? python -m studies.other_engine.agreement
 
 Each effect is played by the Drake station and by MuJoCo, whose codes share nothing but the contract's words. On a stand, or
-standing on its feet and swaying, the response is what the effect changes: links' angles, their rotation off the servos' axes, and the
-base's place and tilt, with the effect less without. The two responses are compared, not the motions, so that what the engines
+standing on its feet and swaying, the response is what the effect changes: links' angles, their rotation off the servos' axes, and
+the base's place and tilt, with the effect less without. The two responses are compared, not the motions, so that what the engines
 do differently anyway (contact, steps) cancels.
 """
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studies.concealed_effects.robots import quadruped
 from studies.other_engine.excitation import MotionRows
 from studies.other_engine.firmware import commands_from_rows
 from studies.other_engine.player import Rollout, play
+from workbench.effects.registry import known_effects
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
@@ -39,10 +41,11 @@ def E(effect: str, *where: str, **parameters: float | tuple[float, float, float]
 FIXED = (
     E("backlash", "flm", gap=4.0), E("joint_compliance", "flm", stiffness=4.0), E("coulomb_friction", "flm", torque=0.12),
     E("viscous_friction", "flm", coefficient=0.1), E("stribeck_friction", "flm", torque=0.15, speed=20.0),
-    E("load_friction", "flm", coefficient=0.6), E("supply_voltage", voltage=8.5), E("supply_sag", drop=0.8),
+    E("load_friction", "flm", coefficient=0.8), E("supply_voltage", voltage=8.5), E("supply_sag", drop=0.3),
     E("torque_ceiling", "flm", torque=0.15), E("thermal_fade", rate=0.15), E("servo_gain", "flm", ratio=0.5),
     E("dead_band", "flm", margin=2.0), E("reflected_inertia", "flm", inertia=0.006),
-    E("joint_stop", "flm", lower=-10.0, upper=12.0), E("zero_offset", "flm", angle=6.0), E("parallel_spring", "flm", stiffness=0.6),
+    E("joint_stop", "flm", lower=-10.0, upper=12.0), E("zero_offset", "flm", angle=6.0),
+    E("parallel_spring", "flm", stiffness=0.6),
     E("command_delay", "flm", delay=0.02), E("timing_drift", per_pose=0.006), E("clock_rate", ratio=1.015), E("speed_order"),
     E("loose_mount", "flm", play=4.0, axis=(1.0, 0.0, 0.0)), E("payload", "flb_link", mass=0.08, position=(0.01, 0.0, -0.05)),
     E("com_shift", "flm_link", offset=(0.03, 0.0, 0.0)), E("ground_tilt", forward=15.0, left=-10.0),
@@ -119,28 +122,31 @@ def _with_base(channels: Sequence[Array], p: Array, R: Array) -> Array:
     return np.column_stack([*channels, tilt, BASE_SCALE * (p - [p[0, 0], p[0, 1], 0.0])])
 
 
-def agreements(
-    model: RobotModel, effects: Iterable[EffectSpec], base: str, timestep: float = 5e-4, drake_step: float = 1e-3
-) -> list[Agreement]:
-    """Each effect in both engines, from rest on."""
-    commands = short_motion(model.joints, base)
-    time = np.arange(0.0, commands.end + 0.2, 1 / RATE)
+class SideBySide:
+    """One robot on one base in both engines; the nominal one is played once."""
 
-    def mujoco(m: RobotModel) -> Array:
-        return seen_in_mujoco(play(m, commands, commands.end + 0.3, 0.1, base, timestep), model, time)
+    def __init__(self, model: RobotModel, base: str, timestep: float = 5e-4, drake_step: float = 1e-3) -> None:
+        self.model, self.base, self.timestep = model, base, timestep
+        self.config = SimulationConfig(time_step=drake_step, base=base, contact_period=0.0)
+        self.commands = short_motion(model.joints, base)
+        self.time = np.arange(0.0, self.commands.end + 0.2, 1 / RATE)
+        self.nominal = self.mujoco(model), self.drake(model)
 
-    def drake(m: RobotModel) -> Array:
-        config = SimulationConfig(time_step=drake_step, base=base, contact_period=0.0)
-        return seen_in_drake(Simulation(m, config).run(commands, commands.end + 0.3, 0.1), model, time)
+    def agreement(self, effect: EffectSpec) -> Agreement:
+        """Of the two engines' responses to an effect."""
+        hidden = self.model.with_effect(effect)
+        ours, theirs = self.mujoco(hidden) - self.nominal[0], self.drake(hidden) - self.nominal[1]
+        return Agreement(effect.effect, self.base, _size(ours), _size(ours - theirs))
 
-    nominal = mujoco(model), drake(model)
-    out = []
-    for effect in effects:
-        hidden = model.with_effect(effect)
-        ours, theirs = mujoco(hidden) - nominal[0], drake(hidden) - nominal[1]
-        # The height at which the robot hangs on the stand is each engine's own, and so is that of the nominal robot.
-        out.append(Agreement(effect.effect, base, _size(ours), _size(ours - theirs)))
-    return out
+    def mujoco(self, model: RobotModel) -> Array:
+        """What is seen of a run here."""
+        run = play(model, self.commands, self.commands.end + 0.3, 0.1, self.base, self.timestep)
+        return seen_in_mujoco(run, self.model, self.time)
+
+    def drake(self, model: RobotModel) -> Array:
+        """What is seen of a run of the station."""
+        take = Simulation(model, self.config).run(self.commands, self.commands.end + 0.3, 0.1)
+        return seen_in_drake(take, self.model, self.time)
 
 
 def _size(x: Array) -> float:
@@ -149,19 +155,17 @@ def _size(x: Array) -> float:
 
 def main() -> None:
     """Prints the table."""
-    from studies.concealed_effects.robots import quadruped
-    from workbench.effects.registry import known_effects
-
     with tempfile.TemporaryDirectory() as folder:
         model = quadruped(np.random.default_rng(2)).model(Path(folder) / "robot.sdf")
         for base, effects in (("fixed", FIXED), ("free", FREE)):
+            engines = SideBySide(model, base)
             for spec in effects:
                 if spec.effect not in known_effects():
-                    print(f"{spec.effect:18s} {base:6s} not in the station yet")
+                    print(f"{spec.effect:18s} {base:6s} not in the station")
                     continue
-                for a in agreements(model, [spec], base):
-                    print(f"{a.effect:18s} {base:6s} response {np.rad2deg(a.response):7.3f} deg, "
-                          f"difference {np.rad2deg(a.difference):6.3f} deg, ratio {a.ratio:.3f}", flush=True)
+                a = engines.agreement(spec)
+                print(f"{a.effect:18s} {base:6s} response {np.rad2deg(a.response):7.3f} deg, "
+                      f"difference {np.rad2deg(a.difference):6.3f} deg, ratio {a.ratio:.3f}", flush=True)
 
 
 if __name__ == "__main__":

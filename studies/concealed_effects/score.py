@@ -1,0 +1,226 @@
+"""One diagnosis against the truth: what was named, where, how large, how surely; by the rules by which the project is judged.
+
+Named: the effect is the finding's own, or the one alternative beside it (a tie of two). Placed: the true place is in `where`,
+shared out over the places that stand there. Findings below confidence 0.5 are not counted; each one left over is a false alarm, unless
+something outside the vocabulary is hidden there, which no name fits: such a session asks for a verdict other than "explained".
+`soft_ground` is neither hit nor false alarm: contact is each engine's own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from workbench.recording import read_recording
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.files import read_text
+
+Array = NDArray[np.float64]
+NEUTRAL = frozenset({"soft_ground"})
+COUNTS = 0.5
+"""Confidence from which a finding counts."""
+CHANCE = frozenset({"dropped_command", "power_dips"})
+"""Effects that no prediction of an unseen take can know."""
+SIZE = {
+    "backlash": "gap", "joint_compliance": "stiffness", "coulomb_friction": "torque", "viscous_friction": "coefficient",
+    "stribeck_friction": "torque", "load_friction": "coefficient", "supply_voltage": "voltage", "supply_sag": "drop",
+    "torque_ceiling": "torque", "thermal_fade": "rate", "servo_gain": "ratio", "dead_band": "margin",
+    "reflected_inertia": "inertia", "joint_stop": "upper", "zero_offset": "angle", "parallel_spring": "stiffness",
+    "command_delay": "delay", "timing_drift": "per_pose", "clock_rate": "ratio", "dropped_command": "probability",
+    "loose_mount": "play", "link_length": "change", "payload": "mass", "ground_friction": "friction",
+    "foot_friction": "friction", "ground_tilt": "forward",
+}
+"""The scalar parameter by which an effect's size is judged."""
+ZERO = {"clock_rate": 1.0}
+"""Value at which an effect vanishes, where errors relative to the value itself would say nothing."""
+PARENTS = {"tail": "body"} | {
+    f"{leg}{part}": f"{leg}{above}" if above else "tail" if leg[0] == "B" else "body"
+    for leg in ("BL", "BR", "FL", "FR") for part, above in (("btm", "mid"), ("mid", "top"), ("top", ""))}
+"""The rigid body next to each, towards the body."""
+FLOOR = {"fixed": np.deg2rad(0.3), "free": np.deg2rad(0.4), "log": np.deg2rad(0.05)}
+"""What two engines and the noise leave between a good prediction and the recording [rad]."""
+
+
+@dataclass(frozen=True)
+class ParameterScore:
+    """A size that was found beside the true one. error: relative; inside: within the 90 % interval; bounded: it has one."""
+
+    effect: str
+    value: float
+    truth: float
+    error: float
+    inside: bool
+    bounded: bool
+
+
+@dataclass(frozen=True)
+class Score:
+    """One session. named: per true effect (name, what it was called: its own name, "tie: NAME", another's, or "abstained").
+    placed: shares. false_alarms: findings that fit nothing. calibration: (confidence, true) of each finding.
+    closed: take -> share of the gap closed."""
+
+    name: str
+    robot: str
+    verdict: str
+    masked: bool
+    outside: bool
+    seconds: float
+    truth: list[tuple[str, list[str]]]
+    named: list[tuple[str, str]]
+    placed: list[float]
+    false_alarms: list[str]
+    calibration: list[tuple[float, bool]]
+    parameters: list[ParameterScore] = field(default_factory=list)
+    closed: dict[str, float | None] = field(default_factory=dict)
+
+    @property
+    def wrongly_explained(self) -> bool:
+        """A verdict of "explained" over physics that has no name."""
+        return self.outside and self.verdict in ("explained", "no_gap")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain types."""
+        return asdict(self)
+
+
+def score(truth: Mapping[str, Any], findings: Mapping[str, Any], closed: Mapping[str, float | None] | None = None) -> Score:
+    """`truth`: the sealed truth.json; `findings`: findings.json. InputError where the latter is not what the contract says."""
+    found = [f for f in _list(findings, "findings") if f["confidence"] >= COUNTS and f["effect"] not in NEUTRAL]
+    outside = set(truth["outside"])
+    real = [e for e in truth["effects"] if e["effect"] not in NEUTRAL | outside]
+    used: set[int] = set()
+    named, placed, parameters = [], [], []
+    for e in real:
+        best = max(_matches(e, found, used), default=None)
+        if best is None:
+            named.append((e["effect"], _instead(e, found, used)))
+            continue
+        own, share, i = best
+        used.add(i)
+        named.append((e["effect"], e["effect"] if own else f"tie: {found[i]['effect']}"))
+        placed.append(share)
+        if own and e["effect"] in SIZE:
+            parameters += _size(e, found[i])
+    strange = {w for e in truth["effects"] if e["effect"] in outside for w in e["where"]}
+    extra = [f for i, f in enumerate(found) if i not in used]
+    alarms = [f["effect"] for f in extra if not (outside and (not strange or strange & set(f["where"])))]
+    return Score(
+        name=truth["name"], robot=truth["robot"], verdict=findings["verdict"], masked=truth["masked"], outside=bool(outside),
+        seconds=float(findings.get("provenance", {}).get("seconds", np.nan)),
+        truth=[(e["effect"], e["where"]) for e in truth["effects"]], named=named, placed=placed, false_alarms=alarms,
+        calibration=[(float(f["confidence"]), i in used) for i, f in enumerate(found)], parameters=parameters,
+        closed=dict(closed or {}))
+
+
+def score_folder(answer: Mapping[str, bytes], results: Path, work: Path) -> Score:
+    """`answer`: a session's opened seal; `results`: what `workbench diagnose` wrote; `work`: folder for the unseen takes."""
+    truth = json.loads(answer["truth.json"])
+    path = results / "findings.json"
+    findings = json.loads(read_text(path))
+    closed: dict[str, float | None] = {}
+    for take in truth["takes"]:
+        if f"{take}.csv" in answer and not {e["effect"] for e in truth["effects"]} & CHANCE:
+            closed[take] = _closed(take, truth["takes"][take]["lead"], answer, results, work)
+    return score(truth, findings, closed)
+
+
+def _list(findings: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    value = findings.get(key)
+    if not isinstance(value, list) or "verdict" not in findings:
+        raise InputError(None, f"findings.json: '{key}': expected a list, and a 'verdict' beside it")
+    return value
+
+
+def _matches(e: Mapping[str, Any], found: Sequence[Mapping[str, Any]], used: set[int]) -> list[tuple[bool, float, int]]:
+    out = []
+    for i, f in enumerate(found):
+        tie = any(a["effect"] == e["effect"] for a in f.get("alternatives", [])[:1])
+        if i not in used and (f["effect"] == e["effect"] or tie):
+            out.append((f["effect"] == e["effect"], _share(e["where"], f["where"]), i))
+    return out
+
+
+def _share(true: Sequence[str], said: Sequence[str]) -> float:
+    if not true:
+        return 1.0
+    return len(set(true) & set(said)) / len(said) if said else 0.0
+
+
+def _instead(e: Mapping[str, Any], found: Sequence[Mapping[str, Any]], used: set[int]) -> str:
+    """What an effect that was missed was called: the name of a finding at its place that is no other's; else abstained."""
+    for i, f in enumerate(found):
+        if i not in used and _share(e["where"], f["where"]) > 0:
+            return str(f["effect"])
+    return "abstained"
+
+
+def _size(e: Mapping[str, Any], finding: Mapping[str, Any]) -> list[ParameterScore]:
+    parameter = SIZE[e["effect"]]
+    got = finding["parameters"].get(parameter)
+    if not got:
+        return []
+    want = float(e["parameters"][parameter])
+    low = -np.inf if got["low"] is None else got["low"]
+    high = np.inf if got["high"] is None else got["high"]
+    error = abs(got["value"] - want) / abs(want - ZERO.get(e["effect"], 0.0))
+    return [ParameterScore(e["effect"], float(got["value"]), want, float(error), bool(low <= want <= high),
+                           bool(np.isfinite(low) and np.isfinite(high)))]
+
+
+def _closed(take: str, lead: float, answer: Mapping[str, bytes], results: Path, work: Path) -> float | None:
+    """Share of the gap that the prediction closes, over the channels where the hidden physics shows; None where it does not.
+
+    0 where nothing was predicted.
+    """
+    paths = {}
+    for name in (f"{take}.csv", f"{take}.nominal.csv"):
+        paths[name] = work / name
+        paths[name].write_bytes(answer[name])
+    recorded, nominal = (read_recording(p) for p in paths.values())
+    gap = _error(nominal, recorded, lead)
+    floor = FLOOR["log" if not recorded.rigid_bodies else "fixed" if "stand" in take else "free"]
+    shows = [c for c in gap if gap[c] > 1.5 * floor]
+    if not shows:
+        return None
+    path = results / "predict" / f"{take}.csv"
+    if not path.exists():
+        return 0.0
+    fit = _error(read_recording(path), recorded, lead)
+    before, after = (float(np.sqrt(np.mean([x[c] ** 2 for c in shows]))) for x in (gap, fit))
+    return (before - max(after, floor)) / (before - floor)
+
+
+def _error(a: Recording, b: Recording, start: float) -> dict[str, float]:
+    """RMS [rad] after `start` [s]: of logs' positions, by joint; of the rotation between a rigid body and the next, by asset."""
+    n = min(len(a.time), len(b.time))
+    use = b.time[:n] >= start
+    if not b.rigid_bodies:
+        channels = [c for c in b.channels if c.startswith("position.")]
+        return {c: _rms((a.channels[c][:n] - b.channels[c][:n])[use]) for c in channels}
+    out = {}
+    for asset in set(b.rigid_bodies) & set(PARENTS):
+        between = np.einsum("nij,nij->n", _to_next(a, asset, n), _to_next(b, asset, n))
+        out[asset] = _rms(np.arccos(np.clip((between - 1) / 2, -1, 1))[use])
+    return out
+
+
+def _to_next(recording: Recording, asset: str, n: int) -> Array:
+    def matrices(name: str) -> Array:
+        quat = recording.rigid_bodies[name].quat[:n]
+        seen = np.isfinite(quat).all(axis=1)
+        out = np.full((n, 3, 3), np.nan)
+        out[seen] = Rotation.from_quat(quat[seen], scalar_first=True).as_matrix()
+        return out
+    return np.swapaxes(matrices(PARENTS[asset]), 1, 2) @ matrices(asset)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.nanmean(np.square(x))))
