@@ -92,7 +92,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
 
     body = Link("body_link", np.zeros(3), None, None, (
         *(place("ax12a", (servo_x, s * hip_y, 0), z=-X, y=s * Y) for s in (1, -1)),
-        place("ax12a", tail, z=-Y, y=-X),
+        place("ax12a", tail, z=Y, y=-X),
         place("ax12a", neck, z=-Y, y=X),
         place("body_frame", (0, 0, BODY_Z)),
         place("body_hardware", (-0.006, 0, BODY_Z + 3.5 * MM)),
@@ -102,7 +102,7 @@ def links(d: Mapping[str, float]) -> list[Link]:
     ))
     back_servo = np.array([-servo_x, 0, 0]) - tail
     tail_link = Link("tail_link", tail, "tail", "body_link", (
-        *(place("ax12a", back_servo + s * hip_y * Y, z=X, y=s * Y) for s in (1, -1)),
+        *(place("ax12a", back_servo + s * hip_y * Y, z=-X, y=s * Y) for s in (1, -1)),
         place("f2", z=Y, y=X),
         place("tail_frame", back_servo - BODY_Z * Z),
     ))

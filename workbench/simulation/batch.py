@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from joblib import Parallel, delayed
@@ -20,7 +20,8 @@ KEPT_STATIONS = 8
 
 @dataclass(frozen=True)
 class Job:
-    """One run: what Simulation.run takes, of a model in a configuration."""
+    """One run: what Simulation.run takes, of a model in a configuration. times: (N,) [s] after the first command at which
+    the take is wanted, without torques and contact; the whole log if None. Less log is less traffic between processes."""
 
     model: RobotModel
     config: SimulationConfig
@@ -30,6 +31,7 @@ class Job:
     trajectory: tuple[Array, Array] | None = None
     path: Take | None = None
     name: str = "simulation"
+    times: Array | None = None
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
@@ -62,4 +64,5 @@ def run_job(job: Job) -> Take:
     _stations.move_to_end(key)
     while len(_stations) > KEPT_STATIONS:
         _stations.popitem(last=False)
-    return _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, name=job.name)
+    take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, name=job.name)
+    return take if job.times is None else replace(take, torque=None, contact={}).resampled(job.times)
