@@ -166,7 +166,8 @@ CATALOGUE: dict[str, Entry] = {
 }
 assert set(CATALOGUE) == {*VOCABULARY, *OUTSIDE}
 PULLS = ("ground_friction", "foot_friction", "tether_force", "ground_tilt", "servo_gain", "payload", "com_shift", "zero_offset",
-         "link_length", "parallel_spring", "supply_voltage", "torque_ceiling", "dead_band", "backlash", "joint_compliance", "coulomb_friction")
+         "link_length", "parallel_spring", "supply_voltage", "torque_ceiling", "dead_band", "backlash", "joint_compliance",
+         "coulomb_friction")
 """Effects that can pull the body's path either way, with which another may be masked."""
 DIRECTED = ("com_shift", "tether_force", "marker_frame")
 """Effects whose size is a vector's length."""

@@ -1,7 +1,8 @@
 """One diagnosis against the truth: what was named, where, how large, how surely; by the rules by which the project is judged.
 
 Named: the effect is the finding's own, or the one alternative beside it (a tie of two). Placed: the true place is in `where`,
-shared out over the places that stand there. Findings below confidence 0.5 are not counted; each one left over is a false alarm, unless
+shared out over the places that stand there. Findings below confidence 0.5 are not
+counted; each one left over is a false alarm, unless
 something outside the vocabulary is hidden there, which no name fits: such a session asks for a verdict other than "explained".
 `soft_ground` is neither hit nor false alarm: contact is each engine's own.
 """
