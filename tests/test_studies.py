@@ -18,6 +18,8 @@ from studies.common import COORDINATES, body_end, run_study
 from studies.filters.__main__ import filters
 from studies.solvers_and_steps import solvers_and_steps
 from studies.thesis_runs.__main__ import thesis_runs
+from studies.thesis_runs.findings import findings
+from studies.thesis_runs.runs import ANIMATION, SIMULATED, SMOOTH, Run
 from studies.walk_spread import runs as spread_runs
 from studies.walk_spread.__main__ import walk_spread
 from studies.walk_spread.analysis import decompose
@@ -139,6 +141,18 @@ def test_an_ideal_reference_is_as_fine_as_the_step() -> None:
         assert np.diff(trajectory[0]) == pytest.approx(step)
         at = np.searchsorted(path.time, trajectory[0][8] - 1e-9)
         assert trajectory[1][8, model.joints.index("flb")] == pytest.approx(path.q[at, path.column("flb")], abs=1e-6)
+
+
+@pytest.mark.parametrize(("x", "heading", "floor", "said"), [
+    (32.0, 5.0, 1.0, ()), (2.0, 5.0, 1.0, ("miss that by −30.7 and −30.4 cm",)), (2.0, 5.0, 40.0, ()),
+    (32.0, 60.0, 1.0, ("turn,",)), (2.0, 60.0, 1.0, ("turn and miss",))])
+def test_a_walk_unlike_the_thesis_is_named_beyond_the_floor_only(x: float, heading: float, floor: float,
+                                                               said: tuple[str, ...]) -> None:
+    track = np.array([[x, 0, 0, 0, heading, 0.0]])
+    runs = [Run(name, np.zeros(1), track, (track + floor,), track) for name in (*SIMULATED, SMOOTH)]
+    text = " ".join(here for _, here in findings([Run(ANIMATION, np.zeros(1), track), *runs]))
+    assert ("is not as in the thesis" in text) == bool(said)
+    assert all(words in text for words in said)
 
 
 @pytest.mark.parametrize(("name", "study"), [("thesis_runs", thesis_runs), ("solvers_and_steps", solvers_and_steps),

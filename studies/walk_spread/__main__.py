@@ -124,10 +124,10 @@ def rest(ends: Ends) -> str:
     if nearest is not None:
         lines.append(f"Of the single changes outside the design, '{nearest.excursion}' ({NAMES[nearest.drive]}) comes nearest to "
                      f"the robot's distance, with {sign(ends[nearest][_X])} cm and {sign(ends[nearest][_TURN])} deg.")
-    lines.append("Not varied here, and open: the sense in which each servo turns on the model (studies.joint_signs chose it with "
-                 "the distance known, so that nearness confirms nothing), the shape of the feet, backlash and compliance of "
-                 "servos and frames, and when the thesis's six seconds begin. A recording of the robot would tell them apart; a "
-                 "distance does not.")
+    lines.append("Not varied here, and open: the sense in which each servo turns on the model (studies.joint_signs chose it by a "
+                 "rule without distance, after earlier rules had been mended with distances known, so that neither nearness nor "
+                 "farness is a blind test), the shape of the feet, backlash and compliance of servos and frames, and when the "
+                 "thesis's six seconds begin. A recording of the robot would tell them apart; a distance does not.")
     return "\n\n".join(lines)
 
 
