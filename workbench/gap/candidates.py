@@ -18,6 +18,10 @@ from workbench.robot import EffectSpec, RobotModel
 Array = NDArray[np.float64]
 
 
+HEAVY = 0.15
+"""Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
@@ -112,7 +116,16 @@ def _searchable(effect: Effect, neutral: Sequence[float]) -> bool:
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    names = {"joint": seen, "foot": [f for f in foot_points(model.path) if f in seen], "link": model.kinematics.links,
-             "rigid_body": list(model.rigid_bodies)}
+    masses = model.kinematics.masses
+    heavy = [link for link in model.kinematics.links if masses[link] >= HEAVY * sum(masses.values())]
+    if effect.layer == "inertia" and all(p.vector for p in effect.parameters):
+        yield from ((link,) for link in heavy)
+        return
+    frames, feet = model.kinematics.frames, [f for f in foot_points(model.path) if f in seen]
+    links: Sequence[str] = model.kinematics.links
+    if effect.layer == "structure":  # what hangs on a joint and carries the next, or a foot
+        carrying = {f.parent for f in frames.values()} | {frames[f].child for f in feet}
+        links = [f.child for f in frames.values() if f.child in carrying]
+    names = {"joint": seen, "foot": feet, "link": links, "rigid_body": list(model.rigid_bodies)}
     for place in effect.places:
         yield from [()] if place == "robot" else [(name,) for name in names[place]]

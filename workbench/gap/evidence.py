@@ -155,6 +155,12 @@ class Jury:
         rollouts = iter(simulate_batch(jobs, self.n_jobs))
         return [[self.evidence[i].residual(next(rollouts), model) for i in index] for model in models]
 
+    def observed(self, models: Sequence[RobotModel], take: int) -> list[Take]:
+        """One take as each model would show it, observed like the recording."""
+        e = self.evidence[take]
+        rollouts = simulate_batch([self._job(m, e, None) for m in models], self.n_jobs)
+        return [e.take.observed(r, m) for r, m in zip(rollouts, models)]
+
     def _job(self, model: RobotModel, e: TakeEvidence, time_step: float | None) -> Job:
         spec = e.take.spec
         own = replace(model.with_servos(spec.servos), effects=model.effects)

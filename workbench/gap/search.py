@@ -75,7 +75,7 @@ class Search:
             groups.setdefault((c.effect.name, *(() if _at_joint(c) else c.where)), []).append(c)
         for n, group in enumerate(groups.values()):
             report(group[0].effect.name, n / len(groups))
-            takes = self._telling(group[0])
+            takes = self.telling(group[0])
             together = replace(group[0], where=tuple(w for c in group for w in c.where))
             models = [with_effects(self.nominal, [together], x) for x in together.probes()]
             for residuals in self.jury.residuals(models, takes, SCREENING_STEP):
@@ -84,8 +84,9 @@ class Search:
                     parts = [self._own(c, b - of[i], i) if i in of else np.zeros_like(b) for i, b in enumerate(base)]
                     self._signatures.setdefault(c, []).append(parts)
 
-    def _telling(self, c: Candidate) -> list[int]:
-        """The takes on which a candidate is screened: what acts in one joint shows best where nothing else pushes the robot."""
+    def telling(self, c: Candidate) -> list[int]:
+        """The takes on which a candidate is screened and fitted: what acts in one joint shows best where nothing else pushes
+        the robot."""
         held = [i for i, e in enumerate(self.jury.evidence) if e.take.spec.base == "fixed"]
         return held if held and _at_joint(c) else list(range(len(self.jury.evidence)))
 
@@ -118,50 +119,50 @@ class Search:
 
     # ---- fitting ----
 
-    def fit(self, effects: Sequence[Candidate], x: Array, iterations: int = 4, takes: Sequence[int] | None = None) -> Fit:
-        """Levenberg-Marquardt on the stretches for fitting; the Jacobian by batched rollouts. takes: which enter the fit (all are
-        judged at the end)."""
-        x = self._clip(effects, np.asarray(x, dtype=float))
+    def fit(self, effects: Sequence[Candidate], x: Array, iterations: int = 4, takes: Sequence[int] | None = None,
+            free: NDArray[np.int_] | None = None) -> Fit:
+        """Levenberg-Marquardt on the stretches for fitting; the Jacobian by batched rollouts. takes: which enter the fit (all
+        are judged at the end). free: indices of the sizes to fit; the others keep theirs."""
         low, high = self._bounds(effects)
+        x = np.clip(np.asarray(x, dtype=float), low, high)
+        free = np.arange(len(x)) if free is None else free
         r = self._vectors(effects, [x], takes)[0]
         damping = 1e-3
         J = np.zeros((len(r), len(x)))
-        for _ in range(iterations if len(x) else 0):
-            steps = np.where(x + 0.15 * np.maximum(np.abs(x), 0.3) <= high, 1.0, -1.0) * 0.15 * np.maximum(np.abs(x), 0.3)
-            moved = [x + np.eye(len(x))[i] * steps[i] for i in range(len(x))]
-            J = np.stack([(v - r) / s for v, s in zip(self._vectors(effects, moved, takes), steps)], axis=1)
-            H, g = J.T @ J, J.T @ r
+        for _ in range(iterations if len(free) else 0):
+            step = 0.15 * np.maximum(np.abs(x), 0.3)
+            step = np.where(x + step <= high, step, -step)
+            moved = [x + np.eye(len(x))[i] * step[i] for i in free]
+            J[:, free] = np.stack([(v - r) / step[i] for i, v in zip(free, self._vectors(effects, moved, takes))], axis=1)
+            H, g = J[:, free].T @ J[:, free], J[:, free].T @ r
             trials = []
             for scale in (damping, damping * 30 + 0.3):
-                delta = -np.linalg.lstsq(H + scale * np.diag(np.maximum(np.diag(H), 1e-9)), g, rcond=None)[0]
-                trials.append(np.clip(x + delta, low, high))
+                trial = x.copy()
+                trial[free] -= np.linalg.lstsq(H + scale * np.diag(np.maximum(np.diag(H), 1e-9)), g, rcond=None)[0]
+                trials.append(np.clip(trial, low, high))
             tried = self._vectors(effects, trials, takes)
             costs = [float(v @ v) for v in tried]
-            best = int(np.argmin(costs))
-            before = float(r @ r)
-            if costs[best] >= before - 1e-3 * max(1.0, before) * 1e-2:
-                if costs[best] < before:
-                    x, r = trials[best], tried[best]
+            best, before = int(np.argmin(costs)), float(r @ r)
+            if costs[best] >= before:
                 break
-            moved_by, size = float(np.max(np.abs(trials[best] - x))), float(np.max(np.abs(x)))
-            done = before - costs[best] < 1e-3 * before and moved_by < 0.02 * max(1.0, size)
-            x, r = trials[best], tried[best]
+            settled = before - costs[best] < 2e-3 * before
             damping = damping / 3 if best == 0 else damping * 10
-            if done:
+            x, r = trials[best], tried[best]
+            if settled:
                 break
-        return self._finished(effects, x, J, len(r))
+        return self._finished(effects, x, J, len(free))
 
-    def _finished(self, effects: Sequence[Candidate], x: Array, J: Array, n: int) -> Fit:
+    def _finished(self, effects: Sequence[Candidate], x: Array, J: Array, fitted: int) -> Fit:
         residuals = self.jury.residuals([with_effects(self.nominal, effects, x)])[0]
         cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
         samples = int(np.count_nonzero(self.jury.vector(residuals, "fit")))
-        inflation = max(1.0, cost["fit"] / max(1, samples))
+        covariance = np.full((len(x), len(x)), np.inf)
         H = J.T @ J
-        covariance = np.full_like(H, np.inf)
-        if len(x):
+        if fitted and np.any(H):
             scale = np.sqrt(np.maximum(np.diag(H), 1e-12))
             values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-            covariance = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale) * inflation
+            covariance = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale)
+            covariance *= max(1.0, cost["fit"] / max(1, samples))
         return Fit(tuple(effects), x, covariance, cost, residuals)
 
     def _vectors(self, effects: Sequence[Candidate], xs: Sequence[Array], takes: Sequence[int] | None) -> list[Array]:
@@ -171,7 +172,3 @@ class Search:
     def _bounds(self, effects: Sequence[Candidate]) -> tuple[Array, Array]:
         ends = [c.bounds() for c in effects]
         return np.concatenate([e[0] for e in ends] or [np.empty(0)]), np.concatenate([e[1] for e in ends] or [np.empty(0)])
-
-    def _clip(self, effects: Sequence[Candidate], x: Array) -> Array:
-        low, high = self._bounds(effects)
-        return np.asarray(np.clip(x, low, high), dtype=float)

@@ -1,0 +1,48 @@
+"""`workbench diagnose SESSION`: which physics the model left out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.options import add_out
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "diagnose",
+        help="find the physics that a session's model left out",
+        description="Locates where recordings and model differ, screens every known effect at every place, fits what is likely, "
+        "keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, the "
+        "session's predictions and report.html.",
+    )
+    parser.add_argument("session", metavar="SESSION", help="session.yaml")
+    add_out(parser)
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnoses, predicts and writes."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.gap.diagnosis import diagnose_session
+    from workbench.gap.prediction import predict_session
+    from workbench.gap.session import load_session
+    from workbench.view.diagnosis_report import write_diagnosis
+
+    session = load_session(args.session)
+    with output_directory(args.out) as folder, Progress("diagnose") as progress:
+        told = diagnose_session(session, progress)
+        paths = write_diagnosis(told.diagnosis, told.stories, folder, str(args.session), progress)
+        if session.predict:
+            (folder / "predict").mkdir()
+            predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model)
+    for name, reason in told.diagnosis.left_out:
+        print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    print(f"verdict: {told.diagnosis.verdict}")
+    for finding in told.diagnosis.findings:
+        print(f"  {finding.evidence} (confidence {finding.confidence:.2f}; error on unseen stretches "
+              f"{finding.validation.before:.2f} -> {finding.validation.after:.2f} {finding.validation.unit})")
+    print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
+    return 0
