@@ -35,7 +35,8 @@ def draw_cloud(ends: Ends) -> Figure:
     for case, end in ends.items():
         if case.excursion:
             plane.plot(end[_X], end[_TURN], "x", color=COLOURS[case.drive], ms=9, mew=2)
-            plane.annotate(case.excursion, (end[_X], end[_TURN]), xytext=(6, 5 if case.drive == "servo" else -13),
+            above = case.drive == "servo" and case.excursion.startswith("friction")  # clear of the ideal joints' below
+            plane.annotate(case.excursion, (end[_X], end[_TURN]), xytext=(6, 5 if above else -13),
                            textcoords="offset points", fontsize=9)
     _draw_thesis(plane)
     for drive, colour in COLOURS.items():
