@@ -84,7 +84,7 @@ CONDITIONS = (
     Condition("friction 0.7", friction=0.7),
     Condition("hind feet under their joints", hind_foot=0.0),
     Condition("full servo law, 1 ms", config=FULL),
-    Condition("ideal joints, as the thesis simulated", config=IDEAL),
+    Condition("ideal joints, poses joined smoothly", config=IDEAL),
     Condition("ideal joints, hydroelastic", config=replace(IDEAL, contact="hydroelastic")),
 )
 

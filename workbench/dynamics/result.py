@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
+from workbench.recording.numbers import number_columns
 from workbench.robot import InputError
 from workbench.robot.files import read_text, write_whole
 
@@ -110,7 +111,7 @@ def load_inverse_dynamics(path: str | Path) -> InverseDynamicsResult:
                  for joint, load in about["loads"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(path, f"line 2: expected what the table is, as JSON ({type(e).__name__}: {e})") from None
-    table = _table(path, lines[3])
+    table = number_columns(path, lines[3], first_line=4)
     joints = tuple(c.removeprefix("position.") for c in table if c.startswith("position."))
     feet = tuple(dict.fromkeys(c.split(".")[1] for c in table if c.startswith("contact.")))
 
@@ -145,15 +146,3 @@ def _factor(kind: str) -> float:
 
 def _without_nan(loads: Mapping[str, Mapping[str, float]]) -> dict[str, dict[str, float | None]]:
     return {j: {k: v if np.isfinite(v) else None for k, v in load.items()} for j, load in loads.items()}
-
-
-def _table(path: str | Path, text: str) -> dict[str, Array]:
-    width = text.partition("\n")[0].count(",")
-    for i, line in enumerate(text.splitlines()):
-        if line.count(",") != width:
-            raise InputError(path, f"line {i + 4}: expected {width + 1} cells, got {line.count(',') + 1}")
-    try:
-        table = pd.read_csv(io.StringIO(text), dtype=float, keep_default_na=False, na_values=[""], index_col=False)
-    except ValueError as e:  # pandas' parser errors among them
-        raise InputError(path, f"expected numbers below the header ({str(e).strip()})") from None
-    return {str(c): table[c].to_numpy() for c in table.columns}

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from workbench.gap.compare_session import Rollouts
 from workbench.gap.comparison import noise_of
+from workbench.gap.metrics import rms
 from workbench.gap.registered import RegisteredTake
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -39,14 +40,13 @@ LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 class TakeEvidence:
     """One registered take: recorded channels (N, c), their sigma (c,), and which frames serve for what.
 
-    Channels are the take's joints, then BODY on the ground. noise: (c,) of the measurement alone; sigma adds the numerical
-    floor and, on the ground, the spread between contact models.
+    Channels are the take's joints, then BODY on the ground. sigma: measurement noise, the numerical floor and, on the ground, the
+    spread between contact models together.
     """
 
     take: RegisteredTake
     channels: tuple[str, ...]
     recorded: Array
-    noise: Array
     sigma: Array
     uses: Mapping[str, Mask]
     weight: Array
@@ -107,14 +107,14 @@ def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts]) ->
         noise = np.array([known.joints[j] for j in joints])
         if free:
             resting = recorded[t.recorded.resting][:, len(joints):]
-            noise = np.concatenate([noise, _rms(resting - np.nanmean(resting, axis=0))])
+            noise = np.concatenate([noise, rms(resting - np.nanmean(resting, axis=0))])
         sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
         if free:
             sigma[len(joints):] = np.maximum(sigma[len(joints):], LEAST_BODY_SIGMA)
         weight = np.ones(recorded.shape[1])
         if free:  # neighbouring frames of the body tell nearly the same
             weight[len(joints):] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
-        out.append(TakeEvidence(t, (*joints, *(BODY if free else ())), np.where(moving[:, None], recorded, np.nan), noise, sigma,
+        out.append(TakeEvidence(t, (*joints, *(BODY if free else ())), np.where(moving[:, None], recorded, np.nan), sigma,
                                 _uses(t, moving, alone), weight))
     return out
 
@@ -129,14 +129,10 @@ def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
     return {use: moving & (role == use) for use in ("fit", "choose", "validate")}
 
 
-def _rms(x: Array) -> Array:
-    return np.sqrt(np.nanmean(np.square(x), axis=0))
-
-
 def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
     if not others:
         return np.zeros(nominal.shape[1])
-    return np.max([np.nan_to_num(_rms((o - nominal)[use])) for o in others], axis=0)
+    return np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0)
 
 
 class Jury:

@@ -62,10 +62,7 @@ class Search:
 
     def __init__(self, jury: Jury, nominal: RobotModel, pool: Sequence[Candidate]) -> None:
         self.jury, self.nominal, self.pool = jury, nominal, list(pool)
-        self.joints = sorted({c for e in jury.evidence for c in e.channels if c in nominal.joints})
         self._signatures: dict[Candidate, list[list[Array]]] = {}
-
-    # ---- screening ----
 
     def screen(self, report: Callable[[str, float], None] = lambda what, share: None) -> None:
         """Rolls every candidate out at its typical size; joint effects at all joints at once, each read at its own joint."""
@@ -117,8 +114,6 @@ class Search:
             out.append((gain, c, sizes))
         return sorted(out, key=lambda row: -row[0])
 
-    # ---- fitting ----
-
     def fit(self, effects: Sequence[Candidate], x: Array, iterations: int = 4, takes: Sequence[int] | None = None,
             free: NDArray[np.int_] | None = None) -> Fit:
         """Levenberg-Marquardt on the stretches for fitting; the Jacobian by batched rollouts. takes: which enter the fit (all
@@ -126,10 +121,12 @@ class Search:
         low, high = self._bounds(effects)
         x = np.clip(np.asarray(x, dtype=float), low, high)
         free = np.arange(len(x)) if free is None else free
+        if not len(free):
+            return self._finished(effects, x, np.zeros((0, len(x))), 0)
         r = self._vectors(effects, [x], takes)[0]
         damping = 1e-3
         J = np.zeros((len(r), len(x)))
-        for _ in range(iterations if len(free) else 0):
+        for _ in range(iterations):
             step = 0.15 * np.maximum(np.abs(x), 0.3)
             step = np.where(x + step <= high, step, -step)
             moved = [x + np.eye(len(x))[i] * step[i] for i in free]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import io
 import mmap
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
@@ -103,3 +105,17 @@ def rate_of(time: Array) -> float:
     middle = float(np.median(steps))
     even = middle > 0 and np.mean((steps > middle / 2) & (steps < 2 * middle)) > 0.95
     return float((len(time) - 1) / (time[-1] - time[0])) if even else float("nan")
+
+
+def number_columns(path: str | Path, text: str, first_line: int, skip_blank: bool = False) -> dict[str, Array]:
+    """Columns by name of a table that the workbench wrote: a header, then numbers; a blank cell is NaN, a line that is too short
+    or too long an InputError. first_line: of the file, on which `text` begins. skip_blank: blank lines do not count."""
+    width = text.partition("\n")[0].count(",")
+    for i, line in enumerate(text.splitlines()):
+        if line.count(",") != width and not (skip_blank and not line):
+            raise InputError(path, f"line {i + first_line}: expected {width + 1} cells, got {line.count(',') + 1}")
+    try:
+        table = pd.read_csv(io.StringIO(text), dtype=float, keep_default_na=False, na_values=[""], index_col=False)
+    except ValueError as e:  # pandas' parser errors among them
+        raise InputError(path, f"expected numbers below the header ({str(e).strip()})") from None
+    return {str(c): table[c].to_numpy() for c in table.columns}

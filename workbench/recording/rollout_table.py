@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.recording.numbers import number_columns
 from workbench.recording.take import Take
 from workbench.robot import InputError
 from workbench.robot.files import read_text, write_whole
@@ -72,7 +73,7 @@ def load_rollout(path: str | Path) -> Take:
         problems = tuple(about["problems"])
     except (ValueError, KeyError, TypeError, IndexError) as e:
         raise InputError(path, f"line 2: expected what the take is, as JSON ({type(e).__name__}: {e})") from None
-    columns = _columns(path, lines[3])
+    columns = number_columns(path, lines[3], first_line=4, skip_blank=True)
     joints = tuple(c.removeprefix("position.") for c in columns if c.startswith("position."))
     feet = dict.fromkeys(c.split(".")[1] for c in columns if c.startswith("contact."))
     time = columns.get("time")
@@ -99,19 +100,6 @@ def load_rollout(path: str | Path) -> Take:
         torque=stacked([f"torque.{j}" for j in joints]),
         p_WB=None if pose is None else pose[:, :3], quat_WB=None if pose is None else pose[:, 3:],
         contact={f: c for f, c in contact.items() if c is not None}, commands=commands, problems=problems)
-
-
-def _columns(path: str | Path, text: str) -> dict[str, Array]:
-    """Columns of numbers by name; a blank cell is NaN, a line that is too short or long an error."""
-    width = text.partition("\n")[0].count(",")
-    for i, line in enumerate(text.splitlines()):
-        if line and line.count(",") != width:
-            raise InputError(path, f"line {i + 4}: expected {width + 1} cells, got {line.count(',') + 1}")
-    try:
-        table = pd.read_csv(io.StringIO(text), dtype=float, keep_default_na=False, na_values=[""], index_col=False)
-    except ValueError as e:  # pandas' parser errors among them
-        raise InputError(path, f"expected numbers below the header ({str(e).strip()})") from None
-    return {str(c): table[c].to_numpy() for c in table.columns}
 
 
 def _commands_out(c: Commands) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """The nominal servo law, and the servo bank that brings it, and terms beyond it, into a Drake diagram."""
 
 from workbench.servo.bank import AddServos, SetServoPhysics
-from workbench.servo.law import ServoLaw, advance_reference
+from workbench.servo.law import ServoLaw
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import Instant, ServoTerm
 
-__all__ = ["AddServos", "Instant", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank", "advance_reference"]
+__all__ = ["AddServos", "Instant", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank"]

@@ -58,9 +58,3 @@ class ServoLaw:
         """Error reference - measured [rad] at which duty alone balances `torque` [N m] (without friction)."""
         size = np.abs(torque) / self.full_torque
         return np.copysign(self.margin + np.maximum(size - self.punch, 0.0) / self.gain, torque)
-
-
-def advance_reference(reference: Array, goal: Array, speed: Array, dt: float) -> Array:
-    """The ramped reference after dt [s]: toward the goal at the moving speed [rad/s], at once where the speed is 0."""
-    step = np.where(speed > 0, speed * dt, np.inf)
-    return np.asarray(reference + np.clip(goal - reference, -step, step), dtype=float)
