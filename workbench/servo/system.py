@@ -90,6 +90,15 @@ class ServoBank(LeafSystem):
         """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
         context.SetDiscreteState(0, np.asarray(reference, dtype=float))
 
+    def ShiftRamp(self, context: Context, seconds: float) -> None:
+        """Moves the ramp on, or back where `seconds` is negative: a command that comes between two periods has gone on for a while
+        when the next begins, and the one before has gone too far. A ramp that has arrived does not go back."""
+        goal, down, up, on = self._command(context)
+        reference, share = context.get_discrete_state(0).CopyToVector(), abs(seconds) / self._period
+        step = np.minimum(np.maximum(goal - reference, down * share), up * share)
+        moves = True if on is None else on
+        context.SetDiscreteState(0, np.where(moves, reference + np.copysign(1.0, seconds) * step, reference))
+
     def _command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
         """Goal (n,) [rad], how far down and up the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all;
         cached while inputs last."""
