@@ -14,7 +14,7 @@ from workbench.gap.session import Session
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.simulation import SimulationConfig
+from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 
 LEAD = 0.3
@@ -32,13 +32,14 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class Run:
-    """What is to be simulated."""
+    """What is to be simulated. start: where it begins other than at rest in neutral."""
 
     name: str
     model: RobotModel
     commands: Commands | None
     duration: float
     base: str
+    start: Start | None = None
 
 
 def compare_session(session: Session, config: SimulationConfig | None = None, *, progress: Progress = no_progress,
@@ -76,7 +77,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["finer"] = [replace(own, time_step=own.time_step / k, log_period=own.logged_every) for k in (2, 4)]
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
-        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name))
+        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name, start=run.start))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
@@ -106,7 +107,7 @@ def _cost(job: Job) -> float:
 
 
 def run_of(t: ReadTake) -> Run:
-    return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base)
+    return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state())
 
 
 def _compared(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:

@@ -22,7 +22,7 @@ from workbench.recording.take import Take
 from workbench.recording.take_from import named_by_model
 from workbench.recording.tracks import check_assets
 from workbench.robot import InputError, RobotModel
-from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation import Simulation, SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ def predict_log(session: Session, spec: PredictSpec, path: Path, config: Simulat
     known = np.isfinite(first["position"]).any()
     if known and spec.base == "free":
         raise InputError(spec.commands, f"position.{model.joints[0]}: a start away from neutral needs base fixed")
-    start = (np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"])) if known else None
+    start = Start(np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"]), logged=True) if known else None
     since = log.time - log.time[0]
     simulation = Simulation(model, replace(config, base=spec.base))
     take = simulation.run(log.commands, float(since[-1]) + config.logged_every, LEAD, start=start).as_logged()

@@ -10,6 +10,7 @@ from workbench.effects.apply import seen
 from workbench.gap.comparison import aligned
 from workbench.gap.session import Session, TakeSpec
 from workbench.motion.commands import Commands
+from workbench.recording.log_state import first_command, state_at
 from workbench.recording.observe import observe
 from workbench.recording.read import read_recording
 from workbench.recording.recording import Measurement, Recording
@@ -19,6 +20,7 @@ from workbench.recording.take_from import named_by_model, take_from_recording
 from workbench.recording.tracks import check_assets
 from workbench.recording.yaw import session_yaw
 from workbench.robot import InputError, RobotModel
+from workbench.simulation import Start
 
 Progress = Callable[[str, float | None], None]
 LeftOut = tuple[tuple[str, str], ...]
@@ -40,7 +42,18 @@ class ReadTake:
     @property
     def duration(self) -> float:
         """Time from the first command to the recording's end, if it began with the recording [s]."""
-        return float(self.recording.time[-1] - (self.spec.starts_at or 0.0))
+        logged = self.recording.kind != "motive"
+        begin = first_command(self.recording, self.spec.starts_at) if logged else self.spec.starts_at or 0.0
+        return float(self.recording.time[-1] - begin)
+
+    def start_state(self) -> Start | None:
+        """What the joints did at the first command, where a rollout cannot begin at rest in neutral: of a log of a held robot, as
+        its servos told it. None for captured takes, for a robot on the ground, and for a log that begins at rest in neutral to
+        within its resolution."""
+        if self.recording.kind == "motive" or self.spec.base != "fixed":
+            return None
+        state = state_at(self.recording, self.model.joints, first_command(self.recording, self.spec.starts_at))
+        return None if state is None else Start(*state, logged=True)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.angles import Angles, joint_angles
+from workbench.recording.log_state import first_command, resolution
 from workbench.recording.mending import mend
 from workbench.recording.pivots import base_origin, find_pivots
 from workbench.recording.recording import Measurement, Recording
@@ -64,17 +65,13 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
 def _register_log(recording: Recording, model: RobotModel, starts_at: float | None) -> Measurement:
     """A log's clock is its own; SAGE's first command may come before or after the first measurement."""
     recording = named_by_model(recording, model)
-    first = float(recording.metadata.get("first command", recording.time[0]))
     noise = {}
     for joint in model.joints:
         position = recording.channels.get(f"position.{joint}")
         if position is not None:
-            steps = np.abs(np.diff(position[np.isfinite(position)]))
-            steps = steps[steps > 1e-9]
-            resolution = float(steps.min()) if len(steps) else 0.0  # one count of the encoder
             still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
-            noise[joint] = float(np.fmax(still, resolution / np.sqrt(12)))
-    return Measurement(starts_at=first if starts_at is None else starts_at, noise=noise)
+            noise[joint] = float(np.fmax(still, resolution(position) / np.sqrt(12)))
+    return Measurement(starts_at=first_command(recording, starts_at), noise=noise)
 
 
 def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Commands | None, predicted: Take | None,

@@ -3,7 +3,7 @@
 from workbench.servo import AddServos
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Simulation
+from workbench.simulation.rollout import Simulation, Start
 from workbench.simulation.station import MakePuppyStation
 
-__all__ = ["AddServos", "Job", "MakePuppyStation", "Simulation", "SimulationConfig", "simulate_batch"]
+__all__ = ["AddServos", "Job", "MakePuppyStation", "Simulation", "SimulationConfig", "Start", "simulate_batch"]

@@ -13,7 +13,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Array, Simulation
+from workbench.simulation.rollout import Array, Simulation, Start
 
 KEPT_STATIONS = 8
 
@@ -32,6 +32,8 @@ class Job:
     path: Take | None = None
     name: str = "simulation"
     times: Array | None = None
+    start: Start | tuple[Array, Array] | None = None
+    elapsed: float = 0.0
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
@@ -64,5 +66,6 @@ def run_job(job: Job) -> Take:
     _stations.move_to_end(key)
     while len(_stations) > KEPT_STATIONS:
         _stations.popitem(last=False)
-    take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, name=job.name)
+    take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, start=job.start,
+                              elapsed=job.elapsed, name=job.name)
     return take if job.times is None else replace(take, torque=None, contact={}).resampled(job.times)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from workbench.motion.smoothing import interpolate
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.servo.bank import servo_joints
+from workbench.servo.system import ServoBank
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.contact import lowest_point
 from workbench.simulation.forces import FootForces
@@ -27,6 +29,16 @@ from workbench.simulation.reference import linear_trajectory, reference_columns
 from workbench.simulation.structure import Structure
 
 Array = NDArray[np.float64]
+
+
+class Start(NamedTuple):
+    """State of the joints at the first command: angles q and velocities v (n,) [rad, rad/s] in the model's order of joints.
+
+    logged: the servos' own, as their sensors tell them (a log's), else the links'."""
+
+    q: Array
+    v: Array
+    logged: bool = False
 
 
 class Simulation:
@@ -61,14 +73,15 @@ class Simulation:
 
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
             trajectory: tuple[Array, Array] | None = None, path: Take | None = None,
-            start: tuple[Array, Array] | None = None, elapsed: float = 0.0, name: str = "simulation") -> Take:
+            start: Start | tuple[Array, Array] | None = None, elapsed: float = 0.0, name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
         default: smoothly through the commands' poses).
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
-        this one (base "path"). start: link angles and velocities (n,) [rad, rad/s] in self.joints' order at the first
-        command, in place of rest in neutral (base "fixed" or "path"); there is no lead then. elapsed [s]: how long the
-        robot has played before these commands, for effects that grow with it. Returns a Take with time 0 at the first command.
+        this one (base "path"). start: angles and velocities (n,) [rad, rad/s] in self.joints' order at the first command, in
+        place of rest in neutral (base "fixed" or "path"): the links', or the servos' own by Start; there is no lead then.
+        elapsed [s]: how long the robot has played before these commands, for effects that grow with it. Returns a Take with
+        time 0 at the first command.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -88,7 +101,7 @@ class Simulation:
         if base_path is not None:
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
         if start is not None:
-            self._put(start, commands)
+            self._put(Start(*start), commands)
         self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
         sampled, forces = self._advance(commands, lead, lead + duration)
@@ -178,24 +191,29 @@ class Simulation:
 
     def _set_first_command(self, time: float) -> None:
         if self.config.drive == "servo":
-            bank = self.diagram.GetSubsystemByName("servo_bank")
-            bank.SetFirstCommand(self.diagram.GetMutableSubsystemContext(bank, self.context), time)
+            bank, context = self._bank()
+            bank.SetFirstCommand(context, time)
 
-    def _put(self, start: tuple[Array, Array], commands: Commands | None) -> None:
+    def _bank(self) -> tuple[ServoBank, Context]:
+        bank = self.diagram.GetSubsystemByName("servo_bank")
+        return bank, self.diagram.GetMutableSubsystemContext(bank, self.context)
+
+    def _put(self, start: Start, commands: Commands | None) -> None:
         """Starts from given joint angles and velocities, with the ramp of each servo at its first goal."""
         if self.config.base == "free":
             raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
-        servos = start[0]
-        if self._structure is not None:  # play and springs stay as they rested
+        servos = np.asarray(start.q, dtype=float)
+        if start.logged:
+            servos = servos + self._zero
+        elif self._structure is not None:  # play and springs stay as they rested
             standing = np.atleast_2d(self.plant.GetPositionsAndVelocities(self._plant_context))
-            servos = self._structure.servo_angles(start[0], self._logs.joints_named(self._structure.joints, standing)[0][0])
-        for joint, angle, rate in zip(self._joints, servos, start[1]):
+            servos = self._structure.servo_angles(servos, self._logs.joints_named(self._structure.joints, standing)[0][0])
+        for joint, angle, rate in zip(self._joints, servos, start.v):
             joint.set_angle(self._plant_context, float(angle))
             joint.set_angular_rate(self._plant_context, float(rate))
         if self.config.drive == "servo":
-            bank = self.diagram.GetSubsystemByName("servo_bank")
-            first = servos if commands is None else commands.goals[0] + self._zero
-            bank.SetReference(self.diagram.GetMutableSubsystemContext(bank, self.context), first)
+            bank, context = self._bank()
+            bank.SetReference(context, servos if commands is None else commands.goals[0] + self._zero)
 
     def _centre_base(self) -> None:
         """Takes the millimetres and the heading that settling added out of the state: the floor is the same everywhere."""
@@ -259,10 +277,22 @@ class Simulation:
                 sampled.append(t)
             if t in changes:
                 assert commands is not None
-                k = changes[t]
-                self._command(commands.goals[k], commands.speeds[k], commands.enabled[k].astype(float))
+                self._command_at(t, commands, changes[t])
         stacked = np.array(forces).reshape(len(forces), len(self._foot_forces.feet), 3)
         return np.array(sampled), {foot: stacked[:, i] for i, foot in enumerate(self._foot_forces.feet)}
+
+
+    def _command_at(self, t: float, commands: Commands, k: int) -> None:
+        """Sends command k at time t [s]; one that comes between two steps of a discrete plant ramps from then on, not from the next
+        step on."""
+        step = self.config.time_step
+        late = step * np.ceil(t / step - 1e-6) - t if step and self.config.drive == "servo" else 0.0
+        bank, context = self._bank()
+        if late > 1e-9:
+            bank.ShiftRamp(context, -late)
+        self._command(commands.goals[k], commands.speeds[k], commands.enabled[k].astype(float))
+        if late > 1e-9:
+            bank.ShiftRamp(context, late)
 
 
 def smooth_through_poses(commands: Commands, step: float) -> tuple[Array, Array]:

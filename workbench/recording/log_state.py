@@ -1,0 +1,58 @@
+"""Where a servo log's robot was at the first command."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.recording import Recording
+
+Array = NDArray[np.float64]
+_SPAN = 0.03
+"""Of positions from which a velocity is told where a log tells none [s]."""
+
+
+def first_command(recording: Recording, starts_at: float | None = None) -> float:
+    """Time of a log's first command on its own clock [s]: as the session says, as the log says, or its first row."""
+    return float(recording.metadata.get("first command", recording.time[0])) if starts_at is None else starts_at
+
+
+def resolution(values: Array) -> float:
+    """The smallest step between neighbouring values (N,): one count of what measured them; 0 where nothing changes."""
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    steps = steps[steps > 1e-9]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def state_at(recording: Recording, joints: Sequence[str], time: float) -> tuple[Array, Array] | None:
+    """Angles and velocities (n,) [rad, rad/s] of the servos at `time` [s] on the log's clock; a joint whose position is not
+    logged is taken to rest in neutral. None where all joints do, to within a count of position and of velocity."""
+    q, v = np.zeros(len(joints)), np.zeros(len(joints))
+    neutral = True
+    for i, joint in enumerate(joints):
+        position = recording.channels.get(f"position.{joint}")
+        if position is None or not np.isfinite(position).any():
+            continue
+        q[i], v[i] = _at(recording.time, position, time), _velocity(recording, joint, position, time)
+        speed = recording.channels.get(f"velocity.{joint}")
+        count = resolution(speed) if speed is not None else resolution(position) / _SPAN
+        neutral &= abs(q[i]) < 1.5 * resolution(position) and abs(v[i]) < 1.5 * count
+    return None if neutral else (q, v)
+
+
+def _at(time: Array, values: Array, when: float) -> float:
+    known = np.isfinite(values)
+    return float(np.interp(when, time[known], values[known]))
+
+
+def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
+    """As logged, else the slope of the first positions."""
+    speed = recording.channels.get(f"velocity.{joint}")
+    if speed is not None and np.isfinite(speed).any():
+        return _at(recording.time, speed, time)
+    known = np.isfinite(position) & (recording.time >= time - 1e-9)
+    t, q = recording.time[known], position[known]
+    near = t <= t[0] + _SPAN if len(t) else np.zeros(0, dtype=bool)
+    return float(np.polyfit(t[near] - t[0], q[near], 1)[0]) if near.sum() >= 3 else 0.0
