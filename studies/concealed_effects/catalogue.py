@@ -171,6 +171,10 @@ PULLS = ("ground_friction", "foot_friction", "tether_force", "ground_tilt", "ser
 """Effects that can pull the body's path either way, with which another may be masked."""
 DIRECTED = ("com_shift", "tether_force", "marker_frame")
 """Effects whose size is a vector's length."""
+TIES = frozenset(frozenset(pair) for pair in (
+    ("timing_drift", "clock_rate"), ("supply_voltage", "thermal_fade"), ("ground_tilt", "tether_force")))
+"""Pairs of the whole robot that the contract calls inseparable: where both were hidden, no second name could be asked for. Its
+other pairs are inseparable at one place only, and no place gets two effects."""
 MOVES = ("supply_sag", "joint_stop", "reflected_inertia", "dropped_command", "command_delay", "viscous_friction")
 """Others that change the way walked by enough to need a mask."""
 

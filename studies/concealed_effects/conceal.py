@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from studies.concealed_effects.catalogue import PULLS, Draw, draw
+from studies.concealed_effects.catalogue import PULLS, TIES, Draw, draw
 from studies.concealed_effects.robots import Robot
 from studies.concealed_effects.takes import LogPlan
 from studies.concealed_effects.visible import COARSE, FINE, SHOWS, Seen, excess, see
@@ -70,10 +70,23 @@ class Bench:
             seen = see(self.with_effects([effect]), take)
             if not np.isfinite(seen.upright) or seen.upright < 0.8:
                 raise NoneFoundError(f"{effect.effect}: the robot falls")
-            most = max(most, excess(seen, self.nominal[take.name], self.finer.get(take.name)))
+            nominal = self.nominal[take.name]
+            most = max(most, excess(seen, nominal, nominal, self.finer.get(take.name)))
             if most > SHOWS:  # more is not asked
                 break
         return most
+
+    def each_adds(self, effects: Sequence[EffectSpec]) -> bool:
+        """Whether each shows beside the others: the robot without it, but with the rest, would be recorded otherwise."""
+        left = list(effects) if len(effects) > 1 else []
+        for take in self.takes:
+            together = see(self.with_effects(effects), take) if left else None
+            for e in tuple(left):
+                assert together is not None
+                without = see(self.with_effects([o for o in effects if o is not e]), take)
+                if excess(together, without, self.nominal[take.name], self.finer.get(take.name)) > SHOWS:
+                    left.remove(e)
+        return not left
 
     def way(self, effects: Sequence[EffectSpec], timestep: float = COARSE) -> float:
         """How far the robot walks [m]; NaN where it falls."""
@@ -89,7 +102,8 @@ class Bench:
 
 
 def conceal(bench: Bench, effects: Sequence[str], masked: bool, rng: np.random.Generator) -> tuple[EffectSpec, ...]:
-    """Effects by name made particular, each of which shows. NoneFoundError where no draw does."""
+    """Effects by name made particular, each of which shows alone and beside the others. NoneFoundError where no draw does."""
+    failed: list[list[EffectSpec]] = []
     for _ in range(4):
         chosen: list[EffectSpec] = []
         for name in effects[:-1] if masked else effects:
@@ -99,8 +113,11 @@ def conceal(bench: Bench, effects: Sequence[str], masked: bool, rng: np.random.G
             if mask is None:
                 continue
             chosen.append(mask)
-        if bench.stands(chosen):
+        if chosen in failed:  # nothing about them can be drawn otherwise: another robot may do
+            break
+        if bench.stands(chosen) and bench.each_adds(chosen):
             return tuple(chosen)
+        failed.append(chosen)
     raise NoneFoundError(f"{', '.join(effects)}: none of the draws hides as asked")
 
 
@@ -118,8 +135,10 @@ def _visible(bench: Bench, name: str, beside: Sequence[EffectSpec], rng: np.rand
 
 
 def _apart(spec: EffectSpec, beside: Sequence[EffectSpec]) -> bool:
-    """Not two effects in one joint: what play does inside a stop, nobody has defined."""
+    """Not two effects in one joint (what play does inside a stop, nobody has defined), and not two that nothing can separate."""
     taken = {_joint(w) for e in beside for w in e.where}
+    if any(frozenset((spec.effect, e.effect)) in TIES for e in beside):
+        return False
     return not taken & {_joint(w) for w in spec.where} and spec.effect not in {e.effect for e in beside}
 
 

@@ -1,19 +1,18 @@
-"""Makes the trial's sessions: python -m studies.concealed_effects.generator OUT [--count 100]
-
-OUT/sessions/NAME has what a user would send, in the layout of a session, and nothing of what is hidden; OUT/sealed the truth.
-Run again, it goes on where it was stopped.
-"""
+"""Makes the trial's sessions: what a user would send into OUT/sessions/NAME, which shows nothing of what is hidden, and the
+truth into OUT/sealed. Run again, it goes on where it was stopped."""
 
 from __future__ import annotations
 
-import argparse
+import hashlib
 import json
 import os
 import shutil
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -32,19 +31,21 @@ from workbench.robot import EffectSpec, RobotModel
 Files = dict[str, str]
 
 
-def generate(out: Path, count: int, progress: Callable[[str], None] = print) -> None:
-    """All sessions that are not there yet."""
-    vault = Vault(out / "sealed")
-    for plan in plan_sessions(vault.seed, count):
-        if plan.name in vault.commitments and (out / "sessions" / plan.name).exists():
-            continue
-        began = time.monotonic()
-        make(out, vault, plan)
-        progress(f"{plan.name}: {time.monotonic() - began:.0f} s")
+def generate(out: Path, vault: Vault, workers: int = 1, say: Callable[[str], None] = print) -> None:
+    """All sessions that are not there yet, on so many processes."""
+    missing = [p for p in plan_sessions(vault.seed, vault.count)
+               if p.name not in vault.commitments or not (out / "sessions" / p.name).exists()]
+    done = vault.count - len(missing)
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        for making in as_completed([pool.submit(make, out, vault, plan) for plan in missing]):
+            name, seconds = making.result()
+            done += 1
+            say(f"made {name} in {seconds:.0f} s ({done} of {vault.count})")
 
 
-def make(out: Path, vault: Vault, plan: SessionPlan) -> None:
-    """One session: its truth sealed first, then its folder put in place, whole."""
+def make(out: Path, vault: Vault, plan: SessionPlan) -> tuple[str, float]:
+    """One session: its truth sealed first, then its folder put in place, whole. Its name, and seconds that it took."""
+    began = time.monotonic()
     (out / "sessions").mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=out, prefix=".making.") as temporary:
         folder = Path(temporary) / plan.name
@@ -58,11 +59,19 @@ def make(out: Path, vault: Vault, plan: SessionPlan) -> None:
         target = out / "sessions" / plan.name
         shutil.rmtree(target, ignore_errors=True)
         os.replace(folder, target)
+    return plan.name, time.monotonic() - began
+
+
+def is_what_was_sealed(vault: Vault, name: str) -> bool:
+    """Whether the seed makes, again, the truth that was committed to; for whoever doubts it, on the same kind of machine."""
+    (plan,) = [p for p in plan_sessions(vault.seed, vault.count) if p.name == name]
+    with tempfile.TemporaryDirectory() as folder:
+        packed = vault.packed(name, write_session(Path(folder), plan)[1])
+    return hashlib.sha256(packed).hexdigest() == vault.commitments[name]
 
 
 def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
     """What a user would send, and what is sealed, as files by name. `folder` gets the robot's SDF."""
-    began = time.monotonic()
     rng = np.random.default_rng(plan.seed)
     while True:  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
         robot = MAKERS[plan.robot](rng)
@@ -88,8 +97,7 @@ def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
         session["robot"]["bus_ids"] = dict(robot.bus_ids)  # type: ignore[index]
     shown["session.yaml"] = yaml.safe_dump(session | entries, sort_keys=False)
     truth = {"name": plan.name, "robot": robot.kind, "effects": [_truth_of(e) for e in effects], "masked": plan.masked,
-             "outside": [e.effect for e in effects if e.effect in OUTSIDE], "takes": facts,
-             "seconds": round(time.monotonic() - began, 1)}
+             "outside": [e.effect for e in effects if e.effect in OUTSIDE], "takes": facts}
     sealed["truth.json"] = json.dumps(truth, indent=1) + "\n"
     return shown, sealed
 
@@ -110,13 +118,12 @@ def _films(model: RobotModel, hidden: RobotModel, takes: list[TakePlan], rng: np
         shown[str(entry["motion"])] = plan.motion.to_csv()
         state = rng.bit_generator.state
         run, capture, _ = record(hidden, plan, camera, rng, FINE)
-        after = rng.bit_generator.state
-        rng.bit_generator.state = state  # the nominal robot is seen from where the other was
-        _, _, nominal = record(model, plan, camera, rng, FINE)
-        rng.bit_generator.state = after
         ends = run.poses(np.array([0.0, run.time[-1]]), (model.base,))[model.base][0]
         facts[plan.name] = {"lead": capture.starts_at, "travel": float(np.linalg.norm((ends[1] - ends[0])[:2]))}
         if plan.predict:
+            after, rng.bit_generator.state = rng.bit_generator.state, state  # seen from where the other was
+            _, _, nominal = record(model, plan, camera, rng, FINE)
+            rng.bit_generator.state = after
             start = capture.cut(int(capture.starts_at * capture.rate) - 2)
             shown[f"predict/{plan.name}_start.csv"] = motive_csv(start, plan.name, frames_in_take=len(capture))
             sealed[f"{plan.name}.csv"] = motive_csv(capture, plan.name)
@@ -148,18 +155,3 @@ def _logs(model: RobotModel, hidden: RobotModel, takes: list[LogPlan], rng: np.r
             shown[f"takes/{plan.name}.csv"] = log_csv(plan, position)
             learn.append({"name": plan.name, "recording": f"takes/{plan.name}.csv", "base": "fixed"})
     return {"takes": learn, "predict": predict}, facts
-
-
-def main() -> None:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--count", type=int, default=100)
-    args = parser.parse_args()
-    generate(args.out, args.count)
-    vault = Vault(args.out / "sealed")
-    print(f"{len(vault.commitments)} sessions sealed, SHA-256 of all commitments {vault.digest()}")
-
-
-if __name__ == "__main__":
-    main()

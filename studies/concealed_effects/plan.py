@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.concealed_effects.catalogue import CATALOGUE, MOVES, PULLS, possible
+from studies.concealed_effects.catalogue import CATALOGUE, MOVES, PULLS, TIES, possible
 from studies.concealed_effects.robots import Robot, arm, puppy, quadruped, rig
 from studies.other_engine.hidden import OUTSIDE, VOCABULARY
 
@@ -36,15 +36,15 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
     kinds = ["quiet"] * round(0.25 * count) + ["outside"] * round(0.15 * count) + ["two"] * round(0.25 * count) + [
         "three"] * round(0.15 * count)
     kinds += ["one"] * (count - len(kinds))
-    with_two = sum(k in ("two", "three") for k in kinds) + len(range(0, kinds.count("outside"), 3))
-    masks = (with_two + 1) // 2
+    several = np.flatnonzero([k in ("two", "three") for k in kinds])
+    with_two = len(several) + len(range(0, kinds.count("outside"), 3))
+    masks = set(rng.permutation(several)[: (with_two + 1) // 2])
     named, unnamed = _deck(VOCABULARY, rng), _deck(OUTSIDE, rng)
     plans: list[SessionPlan] = []
     order = rng.permutation(count)
     walkers = ("quadruped", "quadruped", "quadruped", "quadruped", "puppy")
     for k, kind in enumerate(kinds):
-        masked = kind in ("two", "three") and masks > 0
-        masks -= masked
+        masked = k in masks
         # The masked walk; of the others, a quarter log their joints.
         robot = str(rng.choice(walkers) if masked or rng.uniform() > 0.25 else rng.choice(["arm", "rig"]))
         effects: list[str] = []
@@ -73,13 +73,17 @@ def _deal(deck: Iterator[list[str]], robot: Robot, n: int, outside: bool, masked
         allowed = set(possible(robot, outside))
         if masked and len(hand) in (0, n - 1):
             allowed &= set(PULLS) if hand else {*PULLS, *MOVES}
-        i = next((i for i, c in enumerate(cards) if c in allowed and c not in hand), None)
+        i = next((i for i, c in enumerate(cards) if c in allowed and not _too_alike(c, hand)), None)
         if i is None:
             cards = next(deck)
             continue
         hand.append(cards.pop(i))
         cards = next(deck)
     return hand
+
+
+def _too_alike(card: str, hand: list[str]) -> bool:
+    return card in hand or any(frozenset((card, other)) in TIES for other in hand)
 
 
 assert all(e in CATALOGUE for e in (*VOCABULARY, *OUTSIDE))

@@ -1,9 +1,10 @@
-"""The truth, sealed: enciphered with the seed that nobody chose, its hash published before anything is diagnosed.
+"""The truth, sealed: enciphered with a seed that nobody chose, its hash published before anything is diagnosed.
 
-A folder holds `seed` (drawn by the operating system at the first run, readable by its owner alone) and NAME.sealed for each
-session: a zip of what the session does not show. Its SHA-256 stands in `commitments.json` from the moment it is sealed; opening
-checks it. The cipher is SHAKE-256's output, keyed by seed and name, over the zip: enough to keep a reader, or a diagnosis that
-looks around in its folders, from seeing the truth by accident; the hash is what proves that it was not changed afterwards.
+A folder holds plan.json (the seed, drawn by the operating system at the first run, and how many sessions it makes; readable by
+its owner alone), and for each session NAME.sealed, a zip of what the session does not show, and NAME.sha256 of that zip. Opening
+checks the hash. The cipher is SHAKE-256's output, keyed by seed and name, over the zip: enough to keep a reader, or a diagnosis
+that looks around in its folders, from seeing the truth by accident; the hash is what proves that it was not changed afterwards.
+A zip depends on the seed alone, so that whoever learns the seed, at the end, can make all sessions anew and compare.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import hashlib
 import io
 import json
 import os
-import secrets
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,29 +20,33 @@ from pathlib import Path
 from workbench.robot import InputError
 from workbench.robot.files import read_text, write_whole
 
+COUNT = 100
+
 
 class Vault:
     """Sealed answers in a folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, count: int | None = None, seed: int | None = None) -> None:
+        """Goes on with the plan that is there, else writes one; ValueError where what is asked is not what is there.
+        count: of sessions (default: 100). seed: for tests and development; a trial leaves it to the operating system."""
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
-
-    @property
-    def seed(self) -> int:
-        """Of the whole trial; drawn once, and kept."""
-        path = self.folder / "seed"
+        path = folder / "plan.json"
         if not path.exists():
+            plan = {"seed": int.from_bytes(os.urandom(16), "big") if seed is None else seed,
+                    "drawn_by": "os.urandom" if seed is None else "hand", "count": COUNT if count is None else count}
             handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with os.fdopen(handle, "w") as f:
-                f.write(str(secrets.randbits(128)))
-        return int(read_text(path))
+                f.write(json.dumps(plan, indent=1) + "\n")
+        plan = json.loads(read_text(path))
+        self.seed, self.count, self.drawn_by = int(plan["seed"]), int(plan["count"]), str(plan["drawn_by"])
+        if count not in (None, self.count) or seed not in (None, self.seed):
+            raise ValueError(f"{path}: another trial is under way here, of {self.count} sessions; take another folder")
 
     @property
     def commitments(self) -> dict[str, str]:
-        """Session -> SHA-256 of its zip."""
-        path = self.folder / "commitments.json"
-        return dict(json.loads(read_text(path))) if path.exists() else {}
+        """Session -> SHA-256 of its zip, of those sealed so far, in the order of names."""
+        return {p.stem: p.read_text().strip() for p in sorted(self.folder.glob("*.sha256"))}
 
     def digest(self) -> str:
         """SHA-256 over all commitments, in the order of names: the one line that a report publishes."""
@@ -50,19 +54,22 @@ class Vault:
 
     def seal(self, name: str, files: Mapping[str, str | bytes]) -> str:
         """Seals files by their names; returns the SHA-256 that is now committed to. A name can be sealed once."""
-        known = self.commitments
-        if name in known:
+        if (self.folder / f"{name}.sha256").exists():
             raise ValueError(f"{name}: sealed already")
+        plain = self.packed(name, files)
+        write_whole(self.folder / f"{name}.sealed", self._cipher(name, plain))
+        committed = hashlib.sha256(plain).hexdigest()
+        write_whole(self.folder / f"{name}.sha256", committed + "\n")
+        return committed
+
+    def packed(self, name: str, files: Mapping[str, str | bytes]) -> bytes:
+        """The zip that is hashed; a salt out of the seed keeps the hash from being matched by trying truths."""
+        salt = hashlib.sha256(f"{self.seed}/{name}/salt".encode()).hexdigest()
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as z:
-            z.writestr("salt", secrets.token_hex(32))  # so that the hash cannot be matched by trying truths
-            for file, content in files.items():
-                z.writestr(file, content)
-        plain = buffer.getvalue()
-        write_whole(self.folder / f"{name}.sealed", self._cipher(name, plain))
-        known[name] = hashlib.sha256(plain).hexdigest()
-        write_whole(self.folder / "commitments.json", json.dumps(known, indent=1, sort_keys=True) + "\n")
-        return known[name]
+            for file, content in {"salt": salt, **files}.items():
+                z.writestr(zipfile.ZipInfo(file, (1980, 1, 1, 0, 0, 0)), content, zipfile.ZIP_DEFLATED)
+        return buffer.getvalue()
 
     def open(self, name: str) -> dict[str, bytes]:
         """The files of a session; InputError where they are not what was committed to."""

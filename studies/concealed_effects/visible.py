@@ -86,15 +86,15 @@ def _tracked_parent(model: RobotModel, link: str, tracked: Sequence[str]) -> str
             return link
 
 
-def excess(hidden: Seen, nominal: Seen, finer: Seen | None) -> float:
-    """Largest RMS difference of a channel over its noise; finer: the nominal robot with half the step, whose difference counts
-    as noise too. A take that is shorter or longer is compared where both are."""
+def excess(hidden: Seen, without: Seen, nominal: Seen, finer: Seen | None) -> float:
+    """Largest RMS difference of a channel, with something hidden and without it, over its noise. finer: the nominal robot with
+    half the step, whose difference from `nominal` counts as noise too. A take that is longer is compared where both are."""
     if nominal.angles.size:
-        n = min(len(hidden.angles), len(nominal.angles))
+        n = min(len(hidden.angles), len(without.angles))
         noise = np.hypot(LOG_NOISE, LOG_COUNT / np.sqrt(12))
-        return float(np.max(_rms(hidden.angles[:n] - nominal.angles[:n]))) / noise
+        return float(np.max(_rms(hidden.angles[:n] - without.angles[:n]))) / noise
     floor = (0.0, 0.0, 0.0) if finer is None else _differences(finer, nominal)
-    rotation, place, path = _differences(hidden, nominal)
+    rotation, place, path = _differences(hidden, without)
     walked = 0.0 if finer is None else PATH_FLOOR * nominal.travel
     return max(float(np.max(rotation / np.hypot(ROTATION_NOISE, floor[0]))),
                float(np.max(place / np.hypot(POSITION_NOISE, floor[1]))),

@@ -89,6 +89,7 @@ class _Run:
         self.dof = np.array([model.joint(j).dofadr[0] for j in self.joints])
         self.feet = {link.name: model.body(link.name).id for link in robot.links if link.shapes}
         self.tether = hidden.around.tether
+        self.pulled, self.needs_load = bool(np.any(self.tether)), self.drive.needs_load
         self.damping = self.servos.viscous + self.servos.back_emf
         self.friction_of = {int(d): i for i, d in enumerate(self.dof)}
         n = len(self.joints)
@@ -153,14 +154,14 @@ class _Run:
         model.dof_damping[self.dof] = damping
         self._pull(torque, on_link)
         mujoco.mj_step(model, data)
-        if self.drive.needs_load:
+        if self.needs_load:
             self.load = torque - damping * v - model.dof_armature[self.dof] * data.qacc[self.dof] + self._friction()
         self.motor = net
         return np.asarray(net, dtype=float)
 
     def _pull(self, torque: Array, on_link: Array | None) -> None:
         data = self.data
-        if np.any(self.tether):
+        if self.pulled:
             data.xfrc_applied[1, :3] = self.tether
             data.xfrc_applied[1, 3:] = np.cross(data.xpos[1] - data.xipos[1], self.tether)
         if on_link is not None:
