@@ -10,6 +10,7 @@ from typing import Literal
 
 from workbench.motion.commands import Commands
 from workbench.motion.motion import load_motion
+from workbench.recording.read import recording_of_take
 from workbench.robot import InputError, RobotModel
 from workbench.robot.robot_section import read_model
 from workbench.robot.yaml_file import Fields, read_yaml
@@ -105,13 +106,21 @@ def _take(f: Fields, model: RobotModel) -> TakeSpec:
     name = _entry_name(f)
     use = f.text("use", choices=("fit", "validate"))
     take = TakeSpec(
-        name=name, recording=f.required("recording", f.file("recording")), motion=f.file("motion"),
+        name=name, recording=_recording(f, name), motion=f.file("motion"),
         cycles=f.whole("cycles", 1, least=1) or 1, base=_base(f, model), starts_at=f.number("starts_at", least=0),
         servos=_changes(f, model), use=use,  # type: ignore[arg-type]
     )
     f.done()
     take.commands(model)  # a motion that the robot cannot play is the session's error, not a damaged take
     return take
+
+
+def _recording(f: Fields, take: str) -> Path:
+    written = f.required("recording", f.text("recording"))
+    try:
+        return recording_of_take(f.path.parent / written, take)
+    except InputError as e:
+        raise f.error("recording", e.problem) from None
 
 
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:

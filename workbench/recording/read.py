@@ -9,10 +9,37 @@ from workbench.recording.joint_log import looks_like_joint_log, read_joint_log
 from workbench.recording.motive import read_motive
 from workbench.recording.motive_header import looks_like_motive
 from workbench.recording.recording import Recording
-from workbench.recording.sage import read_sage_npz, read_sage_raw
+from workbench.recording.sage import read_sage_npz, read_sage_raw, sage_programmes
 from workbench.robot import InputError
 
 _HEAD = 1 << 16
+
+
+def recording_of_take(path: Path, take: str) -> Path:
+    """What `read_recording` is to read for a session's take: `path` itself, a file, the folder of a SAGE programme or
+    FILE#PROGRAMME; of an npz of several programmes the one that is called as the take is. InputError says what is missing."""
+    file, programme = _programme_of(path)
+    if path.is_dir():
+        if not (path / "state_motor.csv").is_file():
+            raise InputError(None, f"expected a recording, found a folder without state_motor.csv: {path}")
+        return path
+    if not file.is_file():
+        raise InputError(None, f"file not found: {file}")
+    known = sage_programmes(file) if programme is not None or file.suffix == ".npz" else ()
+    if programme is not None and programme not in known:
+        raise InputError(None, f"no programme '{programme}' in {file}; expected one of {', '.join(known) or 'an npz of them'}")
+    if programme is None and len(known) > 1:
+        if take not in known:
+            raise InputError(None, f"{file} holds {len(known)} programmes; expected FILE#PROGRAMME, or a take called like one")
+        return file.with_name(f"{file.name}#{take}")
+    return path
+
+
+def _programme_of(path: Path) -> tuple[Path, str | None]:
+    if path.exists() or "#" not in path.name:
+        return path, None
+    name, _, programme = path.name.partition("#")
+    return path.with_name(name), programme
 
 
 def read_recording(path: str | Path) -> Recording:
@@ -20,11 +47,7 @@ def read_recording(path: str | Path) -> Recording:
 
     One programme of an npz of several is called FILE#PROGRAMME. InputError where the content is none of these or is damaged.
     """
-    path = Path(path)
-    programme = None
-    if not path.exists() and "#" in path.name:
-        name, _, programme = path.name.partition("#")
-        path = path.with_name(name)
+    path, programme = _programme_of(Path(path))
     if path.is_dir():
         if (path / "state_motor.csv").is_file():
             return read_sage_raw(path)

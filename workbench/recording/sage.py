@@ -20,8 +20,19 @@ from workbench.robot.files import read_text
 Array = NDArray[np.float64]
 JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
 """Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""
+URDF_JOINTS = dict(zip(JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")))
+"""The same joints by their names in the arm's published URDF."""
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
 _MORE = {"v_meas": "velocity", "tau_abs": "torque_magnitude"}
+
+
+def sage_programmes(path: str | Path) -> tuple[str, ...]:
+    """Names of the programmes in an npz, without reading them; none where it is no such file."""
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
+            return tuple(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError):
+        return ()
 
 
 def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:

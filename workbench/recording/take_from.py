@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from workbench.recording import quaternions as quat
 from workbench.recording.angles import angle_sigma, base_row, in_world, joint_angles
 from workbench.recording.mending import mend
 from workbench.recording.recording import Measurement, Recording
+from workbench.recording.sage import URDF_JOINTS
 from workbench.recording.take import BodyTrack, Take
 from workbench.recording.tracks import Tracks, check_assets, tracks_of
 from workbench.robot import InputError, RobotModel
@@ -75,16 +77,27 @@ def _take_of_log(recording: Recording, measurement: Measurement, model: RobotMod
 
 
 def named_by_model(recording: Recording, model: RobotModel) -> Recording:
-    """A log with the model's joint names: a BAM log's one joint is the model's one; others must be the model's by name."""
+    """A log with the model's joint names: a BAM log's one joint is the model's one, a SAGE programme's six are those of the arm's
+    URDF where the model has these; others must be the model's by name."""
     joints = tuple(dict.fromkeys(c.partition(".")[2] for c in recording.channels if "." in c))
     if recording.kind == "bam_log":
         if len(model.joints) != 1:
             raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
-        mine, theirs = model.joints[0], joints[0]
-        channels = {c.replace(f".{theirs}", f".{mine}"): values for c, values in recording.channels.items()}
-        commands = recording.commands and replace(recording.commands, joints=(mine,))
-        return replace(recording, channels=channels, commands=commands)
+        return _renamed(recording, {joints[0]: model.joints[0]})
+    if recording.kind == "sage" and set(joints) == set(URDF_JOINTS) and set(URDF_JOINTS.values()) <= set(model.joints):
+        return _renamed(recording, URDF_JOINTS)
     unknown = [j for j in joints if j not in model.joints]
     if unknown:
         raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
     return recording
+
+
+def _renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
+    """With joints called otherwise, `names` by those of the recording."""
+    channels = {}
+    for channel, values in recording.channels.items():
+        what, dot, joint = channel.partition(".")
+        channels[f"{what}{dot}{names.get(joint, joint)}"] = values
+    sent = recording.commands
+    commands = sent and replace(sent, joints=tuple(names.get(j, j) for j in sent.joints))
+    return replace(recording, channels=channels, commands=commands)
