@@ -39,13 +39,19 @@ class Bench:
     model: RobotModel
     takes: Takes
     nominal: dict[str, Seen] = field(default_factory=dict)
-    finer: dict[str, Seen] = field(default_factory=dict)
+    _finer: dict[str, Seen] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for take in self.takes:
             self.nominal[take.name] = see(self.model, take)
-            if isinstance(take, TakePlan) and take.base == "free":
-                self.finer[take.name] = see(self.model, take, FINE)
+
+    def finer(self, take: TakePlan | LogPlan) -> Seen | None:
+        """A take on the ground at half the step; None for others, which are the same at any."""
+        if isinstance(take, LogPlan) or take.base != "free":
+            return None
+        if take.name not in self._finer:
+            self._finer[take.name] = see(self.model, take, FINE)
+        return self._finer[take.name]
 
     @property
     def walk(self) -> TakePlan:
@@ -57,7 +63,7 @@ class Bench:
     def sound(self) -> bool:
         """Whether the nominal robot walks, upright."""
         return all(s.upright > 0.9 for s in self.nominal.values()) and (
-            not self.finer or 0.06 < self.nominal["walk"].travel < 0.6)
+            "walk" not in self.nominal or 0.06 < self.nominal["walk"].travel < 0.6)
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
         """The robot with these."""
@@ -71,7 +77,7 @@ class Bench:
             if not np.isfinite(seen.upright) or seen.upright < 0.8:
                 raise NoneFoundError(f"{effect.effect}: the robot falls")
             nominal = self.nominal[take.name]
-            most = max(most, excess(seen, nominal, nominal, self.finer.get(take.name)))
+            most = max(most, excess(seen, nominal, nominal, self.finer(take)))
             if most > SHOWS:  # more is not asked
                 break
         return most
@@ -84,7 +90,7 @@ class Bench:
             for e in tuple(left):
                 assert together is not None
                 without = see(self.with_effects([o for o in effects if o is not e]), take)
-                if excess(together, without, self.nominal[take.name], self.finer.get(take.name)) > SHOWS:
+                if excess(together, without, self.nominal[take.name], self.finer(take)) > SHOWS:
                     left.remove(e)
         return not left
 
@@ -172,8 +178,9 @@ def _sized(bench: Bench, chosen: Sequence[EffectSpec], drawn: Draw, nominal: flo
     for _ in range(5):
         best = int(np.argmin(np.abs(np.nan_to_num(ways, nan=np.inf))))
         if abs(ways[best]) < MASKED * nominal:
-            spec = drawn.at(shares[best])
-            good = abs(bench.way([*chosen, spec], FINE) - bench.finer["walk"].travel) < 2 * MASKED * nominal
+            spec, finer = drawn.at(shares[best]), bench.finer(bench.walk)
+            assert finer is not None
+            good = abs(bench.way([*chosen, spec], FINE) - finer.travel) < 2 * MASKED * nominal
             try:
                 return spec if good and bench.shows(spec) > SHOWS else None
             except NoneFoundError:

@@ -51,86 +51,150 @@ FLOOR = {"fixed": np.deg2rad(0.3), "free": np.deg2rad(0.4), "log": np.deg2rad(0.
 
 
 @dataclass(frozen=True)
+class EffectScore:
+    """One true effect. called: its own name, that of another finding at its place, "abstained", or "failed" where nothing came
+    out. tie: it is the alternative of the finding so called. share: of the true place in `where`; None where it was missed."""
+
+    effect: str
+    where: list[str]
+    called: str
+    tie: bool
+    share: float | None
+
+    @property
+    def named(self) -> bool:
+        """Exactly, or as one of a tie of two."""
+        return self.tie or self.called == self.effect
+
+
+@dataclass(frozen=True)
 class ParameterScore:
-    """A size that was found beside the true one. error: relative; inside: within the 90 % interval; bounded: it has one."""
+    """A size that was found, its 90 % interval (infinite where it has no end) and the true one."""
 
     effect: str
     value: float
+    low: float
+    high: float
     truth: float
-    error: float
-    inside: bool
-    bounded: bool
+
+    @property
+    def scale(self) -> float:
+        """What errors are relative to."""
+        return abs(self.truth - ZERO.get(self.effect, 0.0))
+
+    @property
+    def error(self) -> float:
+        """Relative."""
+        return abs(self.value - self.truth) / self.scale
+
+    @property
+    def inside(self) -> bool:
+        """Whether the true one is in the interval."""
+        return self.low <= self.truth <= self.high
 
 
 @dataclass(frozen=True)
 class Score:
-    """One session. named: per true effect (name, what it was called: its own name, "tie: NAME", another's, or "abstained").
-    placed: shares. false_alarms: findings that fit nothing. calibration: (confidence, true) of each finding.
-    closed: take -> share of the gap closed."""
+    """One session. verdict: "failed" where nothing came out, with the reason in `complaint`. hidden: all that is, in words;
+    outside: names of what has none in the vocabulary; effects: those that are to be named. said: the findings, in words.
+    false_alarms: findings that fit nothing. calibration: (confidence, true) of each finding. closed: unseen take -> share of
+    the gap closed. seconds of wall and of processor, memory [bytes], code: of what answered."""
 
     name: str
     robot: str
     verdict: str
     masked: bool
-    outside: bool
-    seconds: float
-    truth: list[tuple[str, list[str]]]
-    named: list[tuple[str, str]]
-    placed: list[float]
-    false_alarms: list[str]
-    calibration: list[tuple[float, bool]]
+    hidden: list[str]
+    outside: list[str]
+    effects: list[EffectScore]
+    said: list[str] = field(default_factory=list)
+    false_alarms: list[str] = field(default_factory=list)
+    calibration: list[tuple[float, bool]] = field(default_factory=list)
     parameters: list[ParameterScore] = field(default_factory=list)
     closed: dict[str, float | None] = field(default_factory=dict)
+    complaint: str = ""
+    seconds: float = float("nan")
+    processor_seconds: float = float("nan")
+    memory: float = float("nan")
+    code: str = ""
+
+    @property
+    def quiet(self) -> bool:
+        """Nothing is hidden."""
+        return not self.hidden
 
     @property
     def wrongly_explained(self) -> bool:
         """A verdict of "explained" over physics that has no name."""
-        return self.outside and self.verdict in ("explained", "no_gap")
+        return bool(self.outside) and self.verdict in ("explained", "no_gap")
 
     def to_json(self) -> dict[str, Any]:
-        """Plain types."""
-        return asdict(self)
+        """Plain types; an open end of an interval is null."""
+        return json.loads(json.dumps(_finite(asdict(self))))  # type: ignore[no-any-return]
 
 
 def score(truth: Mapping[str, Any], findings: Mapping[str, Any], closed: Mapping[str, float | None] | None = None) -> Score:
     """`truth`: the sealed truth.json; `findings`: findings.json. InputError where the latter is not what the contract says."""
     found = [f for f in _list(findings, "findings") if f["confidence"] >= COUNTS and f["effect"] not in NEUTRAL]
     outside = set(truth["outside"])
-    real = [e for e in truth["effects"] if e["effect"] not in NEUTRAL | outside]
     used: set[int] = set()
-    named, placed, parameters = [], [], []
-    for e in real:
+    effects, parameters = [], []
+    for e in _asked(truth):
         best = max(_matches(e, found, used), default=None)
         if best is None:
-            named.append((e["effect"], _instead(e, found, used)))
+            effects.append(EffectScore(e["effect"], e["where"], _instead(e, found, used), False, None))
             continue
         own, share, i = best
         used.add(i)
-        named.append((e["effect"], e["effect"] if own else f"tie: {found[i]['effect']}"))
-        placed.append(share)
+        effects.append(EffectScore(e["effect"], e["where"], found[i]["effect"], not own, share))
         if own and e["effect"] in SIZE:
             parameters += _size(e, found[i])
     strange = {w for e in truth["effects"] if e["effect"] in outside for w in e["where"]}
     extra = [f for i, f in enumerate(found) if i not in used]
-    alarms = [f["effect"] for f in extra if not (outside and (not strange or strange & set(f["where"])))]
+    alarms = [f for f in extra if not (outside and (not strange or strange & set(f["where"])))]
     return Score(
-        name=truth["name"], robot=truth["robot"], verdict=findings["verdict"], masked=truth["masked"], outside=bool(outside),
-        seconds=float(findings.get("provenance", {}).get("seconds", np.nan)),
-        truth=[(e["effect"], e["where"]) for e in truth["effects"]], named=named, placed=placed, false_alarms=alarms,
+        name=truth["name"], robot=truth["robot"], verdict=findings["verdict"], masked=truth["masked"],
+        hidden=[_words(e) for e in truth["effects"]], outside=sorted(outside), effects=effects,
+        said=[f"{_words(f)} {f['confidence']:.2f}" for f in found], false_alarms=[_words(f) for f in alarms],
         calibration=[(float(f["confidence"]), i in used) for i, f in enumerate(found)], parameters=parameters,
         closed=dict(closed or {}))
+
+
+def score_nothing(truth: Mapping[str, Any], why: str) -> Score:
+    """Of a session whose diagnosis failed: all that is hidden was missed."""
+    effects = [EffectScore(e["effect"], e["where"], "failed", False, None) for e in _asked(truth)]
+    return Score(truth["name"], truth["robot"], "failed", truth["masked"], [_words(e) for e in truth["effects"]],
+                 sorted(truth["outside"]), effects, complaint=why)
 
 
 def score_folder(answer: Mapping[str, bytes], results: Path, work: Path) -> Score:
     """`answer`: a session's opened seal; `results`: what `workbench diagnose` wrote; `work`: folder for the unseen takes."""
     truth = json.loads(answer["truth.json"])
-    path = results / "findings.json"
-    findings = json.loads(read_text(path))
+    findings = json.loads(read_text(results / "findings.json"))
     closed: dict[str, float | None] = {}
     for take in truth["takes"]:
         if f"{take}.csv" in answer and not {e["effect"] for e in truth["effects"]} & CHANCE:
             closed[take] = _closed(take, truth["takes"][take]["lead"], answer, results, work)
     return score(truth, findings, closed)
+
+
+def _asked(truth: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The effects that are to be named."""
+    return [e for e in truth["effects"] if e["effect"] not in NEUTRAL | set(truth["outside"])]
+
+
+def _words(e: Mapping[str, Any]) -> str:
+    """`backlash` at ["flm"] -> "backlash flm"; with a finding's alternative behind a stroke."""
+    tie = "".join(f"/{a['effect']}" for a in e.get("alternatives", [])[:1])
+    return " ".join([e["effect"] + tie, *e["where"]])
+
+
+def _finite(x: Any) -> Any:
+    if isinstance(x, dict):
+        return {k: _finite(v) for k, v in x.items()}
+    if isinstance(x, (list, tuple)):
+        return [_finite(v) for v in x]
+    return None if isinstance(x, float) and not np.isfinite(x) else x
 
 
 def _list(findings: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
@@ -168,12 +232,9 @@ def _size(e: Mapping[str, Any], finding: Mapping[str, Any]) -> list[ParameterSco
     got = finding["parameters"].get(parameter)
     if not got:
         return []
-    want = float(e["parameters"][parameter])
-    low = -np.inf if got["low"] is None else got["low"]
-    high = np.inf if got["high"] is None else got["high"]
-    error = abs(got["value"] - want) / abs(want - ZERO.get(e["effect"], 0.0))
-    return [ParameterScore(e["effect"], float(got["value"]), want, float(error), bool(low <= want <= high),
-                           bool(np.isfinite(low) and np.isfinite(high)))]
+    low = -np.inf if got["low"] is None else float(got["low"])
+    high = np.inf if got["high"] is None else float(got["high"])
+    return [ParameterScore(e["effect"], float(got["value"]), low, high, float(e["parameters"][parameter]))]
 
 
 def _closed(take: str, lead: float, answer: Mapping[str, bytes], results: Path, work: Path) -> float | None:

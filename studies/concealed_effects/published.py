@@ -1,0 +1,79 @@
+"""What the repository keeps of a trial: results/trial.json, and a table of it in studies/README.md."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from workbench.robot.files import read_text, write_whole
+
+RESULTS = Path(__file__).parent / "results" / "trial.json"
+README = Path(__file__).parents[1] / "README.md"
+BEGIN, END = "<!-- trial: written by `python -m studies.concealed_effects --keep` -->", "<!-- /trial -->"
+
+
+def keep(result: Mapping[str, Any], results: Path = RESULTS, readme: Path = README) -> None:
+    """Writes both; ValueError where the README has no place for the table."""
+    text = read_text(readme)
+    before, _, rest = text.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    if not after:
+        raise ValueError(f"{readme}: expected the lines '{BEGIN}' and '{END}'")
+    write_whole(results, as_text(result))
+    write_whole(readme, f"{before}{BEGIN}\n{section(result)}{END}{after}")
+
+
+def kept(results: Path = RESULTS) -> dict[str, Any] | None:
+    """The trial that is in the repository, if there is one."""
+    return dict(json.loads(read_text(results))) if results.exists() else None
+
+
+def kept_section(readme: Path = README) -> str:
+    """What the README says of it."""
+    return read_text(readme).partition(BEGIN + "\n")[2].partition(END)[0]
+
+
+def as_text(result: Mapping[str, Any]) -> str:
+    """JSON with a line for each session and each row of a list."""
+    lines = []
+    for key, value in result.items():
+        if isinstance(value, list):
+            inside = ",\n".join("  " + json.dumps(v) for v in value)
+            lines.append(f' {json.dumps(key)}: [\n{inside}\n ]' if value else f" {json.dumps(key)}: []")
+        else:
+            lines.append(f" {json.dumps(key)}: {json.dumps(value)}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def section(result: Mapping[str, Any] | None) -> str:
+    """The table and what has to be said beside it, in Markdown."""
+    if result is None:
+        return "No trial has been run yet.\n"
+    rows = ["| | asked | got | met |", "|---|---|---|---|"]
+    words = {True: "yes", False: "**no**", None: "–"}
+    rows += [f"| {c['what']} | {c['asked']} | {c['got']} | {words[c['met']]} |" for c in result["criteria"]]
+    n, planned = result["diagnosed"], result["planned"]
+    partial = "" if n == planned else f"**Partial: {n} of {planned} sessions.** "
+    seconds = result["seconds"]
+    said = (f"{partial}{n} sessions: {result['quiet']} quiet, {result['outside']} outside the vocabulary, "
+            f"{result['two_or_more']} with two effects or more, of which {result['masked']} masked; "
+            f"{result['failed']} diagnoses failed. ")
+    if seconds is not None:
+        said += (f"A diagnosis took {seconds['median'] / 60:.1f} minutes (median; longest {seconds['most'] / 60:.1f}) and at "
+                 f"most {result['memory']['most'] / 1e9:.1f} GB. ")
+    if result["gap_closed"] is not None:
+        said += f"The models close {100 * result['gap_closed']:.0f} % of the gap on unseen takes (median). "
+    drawn = "the operating system" if result["seed_drawn_by"] == "os.urandom" else "hand: this is no trial"
+    said += f"Seed drawn by {drawn}; seal {result['sha256_of_all'][:16]}. Every session: concealed_effects/results/trial.json."
+    return "\n".join([*rows, "", *_wrapped(said)]) + "\n"
+
+
+def _wrapped(text: str, width: int = 125) -> list[str]:
+    lines = [""]
+    for word in text.split():
+        if len(lines[-1]) + len(word) >= width:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    return lines
