@@ -44,10 +44,11 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
     source = str(path)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
-            fields = {key: np.asarray(content[key], dtype=float) for key in content.files}
+            names = list(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
+            wanted = [k for k in content.files if programme is None or k.rpartition("/")[0] == programme]
+            fields = {key: np.asarray(content[key], dtype=float) for key in wanted}
     except (OSError, ValueError, zipfile.BadZipFile, EOFError) as e:
         raise InputError(source, f"not a whole npz of number arrays: {e}") from None
-    names = list(dict.fromkeys(key.rpartition("/")[0] for key in fields))
     if programme is not None and programme not in names:
         raise InputError(source, f"no programme '{programme}'; expected one of {', '.join(names)}")
     parts = [_npz_programme(source, fields, n) for n in ([programme] if programme is not None else names)]
