@@ -28,6 +28,8 @@ def main() -> int:
     args = _arguments()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     try:
+        if (args.report or args.keep or args.verify or args.again) and not (args.out / "sealed").exists():
+            raise ValueError(f"{args.out}: no trial was begun here")
         vault = Vault(args.out / "sealed", args.count, args.seed)
         if args.verify:
             same = is_what_was_sealed(vault, args.verify)

@@ -40,6 +40,7 @@ class Bench:
     takes: Takes
     nominal: dict[str, Seen] = field(default_factory=dict)
     _finer: dict[str, Seen] = field(default_factory=dict)
+    _seen: dict[tuple[str, str], Seen] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for take in self.takes:
@@ -52,6 +53,13 @@ class Bench:
         if take.name not in self._finer:
             self._finer[take.name] = see(self.model, take, FINE)
         return self._finer[take.name]
+
+    def seen(self, effects: Sequence[EffectSpec], take: TakePlan | LogPlan) -> Seen:
+        """A take of the robot with these effects."""
+        key = repr(tuple(effects)), take.name
+        if key not in self._seen:
+            self._seen[key] = see(replace(self.model, effects=tuple(effects)), take)
+        return self._seen[key]
 
     @property
     def walk(self) -> TakePlan:
@@ -73,7 +81,7 @@ class Bench:
         """How many times its noise the effect alone changes some channel of some take."""
         most = 0.0
         for take in self.takes:
-            seen = see(self.with_effects([effect]), take)
+            seen = self.seen([effect], take)
             if not np.isfinite(seen.upright) or seen.upright < 0.8:
                 raise NoneFoundError(f"{effect.effect}: the robot falls")
             nominal = self.nominal[take.name]
@@ -86,11 +94,9 @@ class Bench:
         """Whether each shows beside the others: the robot without it, but with the rest, would be recorded otherwise."""
         left = list(effects) if len(effects) > 1 else []
         for take in self.takes:
-            together = see(self.with_effects(effects), take) if left else None
             for e in tuple(left):
-                assert together is not None
-                without = see(self.with_effects([o for o in effects if o is not e]), take)
-                if excess(together, without, self.nominal[take.name], self.finer(take)) > SHOWS:
+                without = self.seen([o for o in effects if o is not e], take)
+                if excess(self.seen(effects, take), without, self.nominal[take.name], self.finer(take)) > SHOWS:
                     left.remove(e)
         return not left
 
@@ -104,7 +110,7 @@ class Bench:
 
     def stands(self, effects: Sequence[EffectSpec]) -> bool:
         """Whether the robot stays upright in all takes."""
-        return all(see(self.with_effects(effects), t).upright > 0.8 for t in self.takes)
+        return all(self.seen(effects, t).upright > 0.8 for t in self.takes)
 
 
 def conceal(bench: Bench, effects: Sequence[str], masked: bool, rng: np.random.Generator) -> tuple[EffectSpec, ...]:

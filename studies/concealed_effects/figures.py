@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from studies.concealed_effects.score import ParameterScore
 from studies.concealed_effects.summary import NOTHING, Bin
-from workbench.view.style import ACCENT, COMMAND, RECORDED, SIMULATED, new_figure, styled
+from workbench.view.style import ACCENT, COMMAND, RECORDED, SIMULATED, legend_above, new_figure, styled
 
 LAST = ("abstained", "failed")
 """Columns that stand behind all names."""
@@ -31,13 +31,13 @@ def confusion_figure(counts: Counter[tuple[str, str]]) -> Figure:
     axes.grid(False)
     right = np.array([[t == c for c in columns] for t in rows])
     wrong = np.array([[c not in LAST for c in columns] for _ in rows]) & ~right
-    top = max(1, int(table.max()))
     for where, colour in ((right, ACCENT), (wrong, RECORDED), (~right & ~wrong, COMMAND)):
         shades = LinearSegmentedColormap.from_list("shade", ["white", colour])
-        axes.imshow(np.ma.masked_where(~where, table), cmap=shades, vmin=0, vmax=1.15 * top, aspect="auto")
+        top = max(1, int(table[where].max(initial=0)))
+        axes.imshow(np.ma.masked_where(~where, table), cmap=shades, vmin=0, vmax=1.3 * top, aspect="auto")
     for (i, j), n in np.ndenumerate(table):
         if n:
-            axes.text(j, i, str(n), ha="center", va="center", fontsize=10, color="white" if n > 0.6 * top else "#222222")
+            axes.text(j, i, str(n), ha="center", va="center", fontsize=10, color="#222222")
     axes.set_xticks(range(len(columns)), [_spoken(c) for c in columns], rotation=60, ha="right", rotation_mode="anchor",
                     fontsize=10)
     axes.set_yticks(range(len(rows)), [_spoken(t) for t in rows], fontsize=10)
@@ -106,7 +106,7 @@ def time_figure(seconds: Sequence[float], memory: Sequence[float]) -> Figure:
         if len(known):
             axes.hist(known, bins=min(20, max(5, len(known) // 4)), color=SIMULATED)
             axes.axvline(np.median(known), color=RECORDED, label=f"median {np.median(known):.1f}")
-            axes.legend(loc="upper right")
+            legend_above(axes)
         axes.set_xlabel(label)
         axes.set_ylabel("sessions")
     return figure

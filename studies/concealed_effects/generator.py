@@ -64,7 +64,9 @@ def make(out: Path, vault: Vault, plan: SessionPlan) -> tuple[str, float]:
 
 def is_what_was_sealed(vault: Vault, name: str) -> bool:
     """Whether the seed makes, again, the truth that was committed to; for whoever doubts it, on the same kind of machine."""
-    (plan,) = [p for p in plan_sessions(vault.seed, vault.count) if p.name == name]
+    plan = next((p for p in plan_sessions(vault.seed, vault.count) if p.name == name), None)
+    if plan is None or name not in vault.commitments:
+        raise ValueError(f"{name}: expected one of the {len(vault.commitments)} sessions that are sealed")
     with tempfile.TemporaryDirectory() as folder:
         packed = vault.packed(name, write_session(Path(folder), plan)[1])
     return hashlib.sha256(packed).hexdigest() == vault.commitments[name]

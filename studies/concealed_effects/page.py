@@ -31,8 +31,8 @@ def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -
     if counts:
         report.add(Section("What was called what", [Picture(confusion_figure(counts), (
             "Hidden effects down, what the diagnosis called them across. **Green**: their own name, alone or as one of a tie of "
-            "two. **Orange**: another's name at their place, and, in the last row, findings that fit nothing. **Grey**: nothing "
-            "was said, or nothing came out.")), _effects_table(scores)]))
+            "two. **Orange**: another's name at their place, and, in the last row, all findings that fit nothing, those of the "
+            "other orange fields among them. **Grey**: nothing was said, or nothing came out.")), _effects_table(scores)]))
     if bins:
         report.add(Section("How sure, and how often right", [Picture(reliability_figure(bins), (
             "Findings by the confidence that they state. A bar is the 95 % interval (Clopper and Pearson) of the share that is "
@@ -61,7 +61,8 @@ def headline(asked: Sequence[Criterion], result: Mapping[str, Any]) -> str:
 def criteria_table(asked: Sequence[Criterion]) -> Table:
     """What is asked beside what came."""
     words = {True: "yes", False: "**no**", None: "–"}
-    return Table(["", "asked", "got", "met"], [[c.what, c.asked, c.got, words[c.met]] for c in asked])
+    rows = [[text.replace(" %", "\u00a0%") for text in (c.what, c.asked, c.got)] for c in asked]
+    return Table(["", "asked", "got", "met"], [[*row, words[c.met]] for row, c in zip(rows, asked)])
 
 
 def _remarks(result: Mapping[str, Any]) -> str:
@@ -74,7 +75,7 @@ def _remarks(result: Mapping[str, Any]) -> str:
                     "(median).")
     said.append(f"False alarms in sessions that do hide something: {result['false_alarms_elsewhere']}.")
     if result["failed"]:
-        said.append(f"{result['failed']} diagnoses failed; all that they should have named counts as missed.")
+        said.append(f"Failed diagnoses: {result['failed']}; all that they should have named counts as missed.")
     if len(result["code"]) > 1:
         by = ", ".join(f"{n} by {code}" for code, n in result["code"].items())
         said.append(f"**The workbench changed during the trial**: {by}.")

@@ -59,7 +59,7 @@ def section(result: Mapping[str, Any] | None) -> str:
     seconds = result["seconds"]
     said = (f"{partial}{n} sessions: {result['quiet']} quiet, {result['outside']} outside the vocabulary, "
             f"{result['two_or_more']} with two effects or more, of which {result['masked']} masked; "
-            f"{result['failed']} diagnoses failed. ")
+            f"failed diagnoses: {result['failed']}. ")
     if seconds is not None:
         said += (f"A diagnosis took {seconds['median'] / 60:.1f} minutes (median; longest {seconds['most'] / 60:.1f}) and at "
                  f"most {result['memory']['most'] / 1e9:.1f} GB. ")
