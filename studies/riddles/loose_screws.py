@@ -41,17 +41,17 @@ def loose(joint: str, axis: str, play: float = PLAY, floors: bool = False) -> Hy
 
 def hypotheses() -> list[Hypothesis]:
     """Loose screws at each place and axis of the leg, and what else turns a walk to one side."""
-    mounts = [loose(j, a, floors=j == "flm") for j in LEG for a in ACROSS[j]]
+    mounts = [loose(j, a, floors=(j, a) == SOUGHT) for j in LEG for a in ACROSS[j]]
     return [
         Hypothesis(TIGHT, "Nothing is loose; the shipped puppy.", floors=True), *mounts,
         Hypothesis(BACKLASH, f"The gear of flm has {PLAY:g} deg of free play, about its own axis.",
-                   (EffectSpec("backlash", ("flm",), {"gap": PLAY}),), floors=True),
+                   (EffectSpec("backlash", ("flm",), {"gap": PLAY}),)),
         Hypothesis(BACKLASH_LEG, f"All three gears of the front left leg have {PLAY:g} deg of free play.",
                    (EffectSpec("backlash", LEG, {"gap": PLAY}),)),
         Hypothesis(WEAK, "The servo of flm gives at most 0.3 N m.",
-                   (EffectSpec("torque_ceiling", ("flm",), {"torque": 0.3}),), floors=True),
+                   (EffectSpec("torque_ceiling", ("flm",), {"torque": 0.3}),)),
         Hypothesis(TILT, "The floor falls to the left by 1 deg.",
-                   (EffectSpec("ground_tilt", (), {"forward": 0.0, "left": 1.0}),), floors=True),
+                   (EffectSpec("ground_tilt", (), {"forward": 0.0, "left": 1.0}),)),
         Hypothesis(SLIP, "The front left foot has friction 0.3, the others 0.5.",
                    (EffectSpec("foot_friction", ("flb",), {"friction": 0.3}),)),
         Hypothesis(SHORT, "The front left shank is 2 mm shorter than the right one.",
@@ -79,8 +79,8 @@ class Result:
         return self.ends[name]["ry"].value - self.ends[TIGHT]["ry"].value
 
     def drift_sigma(self, name: str) -> float:
-        """The same over floors and spreads of both, where known."""
-        doubt = np.hypot(self.ends[name]["ry"].doubt, self.ends[TIGHT]["ry"].doubt)
+        """The same over floors and spreads of both; TIGHT's stand for those of a hypothesis without its own."""
+        doubt = np.hypot(self.ends[name]["ry"].doubt or self.ends[TIGHT]["ry"].doubt, self.ends[TIGHT]["ry"].doubt)
         return float(abs(self.drift(name)) / doubt) if doubt > 0 else float("nan")
 
 

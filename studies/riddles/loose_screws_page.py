@@ -62,21 +62,17 @@ def answer(r: Result, model: RobotModel) -> Answer:
         f"(at most {times(max(rivals.values()))}). The drift itself decides nothing: the same play turns the walk by "
         f"{sign(min(drifts), 0)} to {sign(max(drifts), 0)} deg, to either side, depending on which screw it is.")
     question = (
-        "The thesis (8.1) saw its robot drift to the left where the simulation drifted slightly to the right, found loose screws "
-        "in the "
-        "front left leg, and took them for the cause. What would a recording show of loose screws, and what of anything else "
-        "that makes "
-        "a robot drift?")
+        "The thesis (8.1) saw its robot drift to the left where the simulation drifted slightly to the right, found loose "
+        "screws in the front left leg, and took them for the cause. What would a recording show of loose screws, and what of "
+        "anything else that makes a robot drift?")
     shows: list[Part] = [
         _table(r),
         picture(figures, "channels", draw_channels(r),
-                "Two channels of each recording against the simulation with all screws tight: the drift over floor and spread of "
-                "the "
-                "heading, and the rotation off its axis of the front left joint that shows most."),
+                "Two channels of each recording against the simulation with all screws tight: the drift over floor and spread "
+                "of the heading, and the rotation off its axis of the front left joint that shows most."),
         picture(figures, "off_axis", draw_off_axis(r, model),
                 f"What the servo of {SOUGHT[0]} does not turn, in the first three cycles: loose screws, backlash, and tight. "
-                f"Noise is the "
-                "cameras'."),
+                "Noise is the cameras'."),
         picture(figures, "heading", draw_heading(r), f"Heading in {r.seconds:.0f} s. Band: floor and spread of the tight robot's "
                                                      f"end."),
     ]
@@ -101,9 +97,9 @@ def _table(r: Result) -> Table:
                      f"{np.degrees(found.off_axis[j].error):.2f}", times(found.sigma(worst)), worst])
     return Table(("recorded", "heading, left [deg]", "more than tight", "z, right [cm]", "off axis [sigma]", "of", "[deg]",
                   "worst angle [sigma]", "of"), rows,
-                 "Against the simulation with all tight. Off axis: rotation that no servo turns, of the front left joint that "
-                 "shows "
-                 "most; noise alone is 1 and 0.25 deg. Worst angle: of all 13 recorded joints.", emphasis=(0,))
+                 "Against the simulation with all tight. Off axis: rotation that no servo turns, of the front "
+                 "left joint that shows most; noise alone is 1 and 0.25 deg. Worst angle: of all 13 recorded "
+                 "joints.", emphasis=(0,))
 
 
 def _small_table(r: Result) -> Table:
@@ -125,20 +121,15 @@ def _decides(r: Result) -> str:
     unknown = [n for n, s in angle.items() if s <= BOUND]
     named = listed([f"{n} ({r.found[n].worst()}, {times(angle[n])} sigma)" for n in known])
     return (
-        f"**The rotation across the servo's axis.** The cameras record each rigid body's whole rotation, so this is in the "
-        f"thesis's own "
-        f"recordings; its animation plays it back (gimbal joints), its simulation leaves it out. Only a loose mount moves it, in "
-        f"its own "
-        f"joint, from {_least(r)} of play on.\n\n"
+        "**The rotation across the servo's axis.** The cameras record each rigid body's whole rotation, so this is in the "
+        "thesis's own recordings; its animation plays it back (gimbal joints), its simulation leaves it out. Only a loose mount "
+        f"moves it, in its own joint, from {_least(r)} of play on.\n\n"
         f"**The rivals by other channels.** {named or 'No rival'} change a joint's angle by more than {BOUND}; "
-        f"{listed(unknown) or 'none'} leave every angle within it. "
-        f"A tilted floor: walk there and back. Over 1 deg the robot ends {sign(there[1])} cm to the right with the slope falling "
-        f"to its "
-        f"left, {sign(back[1])} cm with the slope falling to its right: the part that changes sides is the floor's, the rest the "
-        f"robot's. The capture's axes: {ASKEW:g} deg askew move a straight robot's end by {sign(r.askew[0])} cm to the right in "
-        f"the "
-        f"capture's own z, and by {sign(r.askew[1], 2)} cm after registration, which takes the heading from the robot's own "
-        f"joints.")
+        f"{listed(unknown) or 'none'} leave every angle within it. A tilted floor: walk there and back. Over 1 deg the robot "
+        f"ends {sign(there[1])} cm to the right with the slope falling to its left, {sign(back[1])} cm with the slope falling "
+        f"to its right: the part that changes sides is the floor's, the rest the robot's. The capture's axes: {ASKEW:g} deg "
+        f"askew move a straight robot's end by {sign(r.askew[0])} cm to the right in the capture's own z, and by "
+        f"{sign(r.askew[1], 2)} cm after registration, which takes the heading from the robot's own joints.")
 
 
 def _excluded(r: Result) -> str:
@@ -150,19 +141,16 @@ def _excluded(r: Result) -> str:
               f"({listed(left) or 'none'} to the left, {listed(right) or 'none'} to the right).") if sure else (
               "Of those whose own floor was run none turns by more than the doubt.")
     return (
-        f"The thesis gives no number for the drift, and after the repair its robot ended 0.1 cm left of straight. So nothing is "
-        f"excluded "
-        f"by numbers. What is measured here: heading is a poor witness. Numerics and the contact model alone move the end's "
-        f"heading by "
-        f"{tight.doubt:.1f} deg (tight) and {shown.doubt:.1f} deg ({SHOWN}). {beyond} That the drift was gone after the screws "
-        f"were "
-        "tightened is good evidence that they caused it; that the drift was to the left is none, as far as this model tells.")
+        "The thesis gives no number for the drift, and after the repair its robot ended 0.1 cm left of straight. So nothing is "
+        "excluded by numbers. What is measured here: heading is a poor witness. Numerics and the contact model alone move the "
+        f"end's heading by {tight.doubt:.1f} deg (tight) and {shown.doubt:.1f} deg ({SHOWN}). {beyond} That the drift was gone "
+        "after the screws were tightened is good evidence that they caused it; that the drift was to the left is none, as far "
+        "as this model tells.")
 
 
 def _open(r: Result) -> str:
     return (f"How loose the screws were and where. {PLAY:g} deg is our choice, and the mount's play here is nearly free of "
-            f"friction; a "
-            "screw that slips and sticks shows less and drifts otherwise. Signs and feet of the model are a choice "
+            "friction; a screw that slips and sticks shows less and drifts otherwise. Signs and feet of the model are a choice "
             "(studies.joint_signs), and which way a loose leg turns the walk depends on them.")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,16 +83,15 @@ class Lagging:
 
 @dataclass(frozen=True)
 class Result:
-    """All of it. slower: growth with dwells SLOWER times as long. slope: of the rounded walk with floor and spread [s/s].
-    pairs: how far a recording of the first is from a simulation of the second. same: RMS between rounded and exact dwells at the
-    fine step, the worst joint [rad]."""
+    """All of it. slower: growth with dwells SLOWER times as long. slope: of the rounded walk in the first SHORT with floor and
+    spread [s/s]; over longer they are smaller. pairs: how far a recording of the first is from a simulation of the second. same:
+    RMS between rounded and exact dwells at the fine step in SHORT, the worst joint [rad]."""
 
     motion: Motion
     runs: dict[str, Run]
     lagging: dict[str, Lagging]
     slower: dict[str, Growth]
     slope: Number
-    slope_short: Number
     pairs: dict[tuple[str, str], Apart]
     same: float
     seconds: float
@@ -106,7 +104,7 @@ def measure(model: RobotModel, quick: bool, progress: Progress) -> Result:
     seconds, short = (4.0, 3.0) if quick else (SECONDS, SHORT)
     setting = Setting(seconds, motion, CYCLES)
     named = hypotheses(motion)
-    runs = run_all(named, model, setting, progress, floors=not quick)
+    runs = run_all(named, model, setting, progress, floors=False)
     reference = interpolate_motion(motion, CYCLES + 1, 1e-3, "rest")
     believed = runs[ROUNDED].take
     progress("recording", None)
@@ -122,13 +120,14 @@ def measure(model: RobotModel, quick: bool, progress: Progress) -> Result:
     slower = {name: growth(record(run.take, model, seconds, slow_runs[ROUNDED].take).take, slow_reference, slow.duration)
               for name, run in slow_runs.items()}
 
-    def slope(upto: float) -> Callable[[Take], float]:
-        return lambda t: growth(_filmed(t, seconds), reference, motion.duration, upto).slope
-
-    pairs = {(a, b): apart(runs[a], replace(runs[b], finer=(), other_contact=()), model, seconds)
-             for a, b in ((PACKET, CLOCK), (EXACT, ROUNDED))}
-    return Result(motion, runs, lagging, slower, number(runs[ROUNDED], slope(np.inf)), number(runs[ROUNDED], slope(short)), pairs,
-                  _same(model, motion, seconds, runs[ROUNDED], named, progress), seconds, short)
+    pairs = {(a, b): apart(runs[a], runs[b], model, seconds) for a, b in ((PACKET, CLOCK), (EXACT, ROUNDED))}
+    brief = Setting(short, motion, CYCLES)
+    floors = run_all([h for h in named if h.name == ROUNDED], model, brief, progress)[ROUNDED]
+    slope = number(floors, lambda t: growth(_filmed(t, short), reference, motion.duration).slope)
+    fine = run_all([h for h in named if h.name == EXACT], model, replace(brief, time_step=FINE), progress)[EXACT]
+    a, b = (_filmed(t, short).q for t in (floors.finer[-1], fine.take))
+    same = float(np.sqrt(np.mean((a - b) ** 2, axis=0)).max())
+    return Result(motion, runs, lagging, slower, slope, pairs, same, seconds, short)
 
 
 def _filmed(take: Take, seconds: float) -> Take:
@@ -142,16 +141,3 @@ def _amplitude(take: Take, cycle: float) -> float:
     first, last = (clock > cycle) & (clock < 4 * cycle), clock > clock[-1] - 3 * cycle
     q = take.q[:, np.nanstd(take.q[clock > 0], axis=0) > np.radians(1.0)]
     return float(np.min(np.nanstd(q[last], axis=0) / np.nanstd(q[first], axis=0)))
-
-
-def _same(model: RobotModel, motion: Motion, seconds: float, rounded: Run, named: list[Hypothesis], progress: Progress) -> float:
-    """RMS between rounded and exact dwells at the fine step, which resolves them, of the worst joint [rad]."""
-    if rounded.finer:
-        fine = {ROUNDED: rounded.finer[-1]}
-    else:
-        fine = {ROUNDED: run_all([replace(named[0], floors=False)], model, Setting(seconds, motion, CYCLES, time_step=FINE),
-                                 progress)[ROUNDED].take}
-    exact = next(h for h in named if h.name == EXACT)
-    fine[EXACT] = run_all([exact], model, Setting(seconds, motion, CYCLES, time_step=FINE), progress)[EXACT].take
-    a, b = (_filmed(fine[n], seconds).q for n in (ROUNDED, EXACT))
-    return float(np.sqrt(np.mean((a - b) ** 2, axis=0)).max())

@@ -55,24 +55,22 @@ def answer(r: Result, model: RobotModel) -> Answer:
     headline = (
         f"Rounding cannot make a lag that grows: in this walk it never exceeds {worst:.1f} ms and is gone after every cycle. "
         f"{per_pose:.2f} ms lost at each pose, the time of its packet, would make {per_second:.1f} ms a second. How fast a "
-        f"recording "
-        f"of {r.seconds:.0f} s lags shows which, and one with dwells twice as long tells loss per pose from a slow clock.")
+        f"recording of {r.seconds:.0f} s lags shows which, and one with dwells twice as long tells loss per pose from a slow "
+        "clock.")
     question = (
         "The thesis (7.2.1) sees the recording lag behind the ROBOTIS angles more and more and suspects the rounding of the "
-        "dwells to "
-        "milliseconds. What would its recording show if that were so, and what if something else is late?")
+        "dwells to milliseconds. What would its recording show if that were so, and what if something else is late?")
     shows: list[Part] = [
         picture(figures, "rounding_errors", draw_errors(r),
                 "By how much rounding alone brings a pose late, from the table: four errors that cancel in every cycle."),
         picture(figures, "lag", draw_lag(r),
-                "Lag of the recorded joints behind the ROBOTIS angles (median over 13 joints, windows of two cycles). Servos are "
-                "always "
-                "some 50 ms behind; what matters is the slope. Band: the doubt of the rounded walk's slope (floor, spread)."),
+                "Lag of the recorded joints behind the ROBOTIS angles (median over 13 joints, windows of two cycles). Servos "
+                f"are always behind, by {1e3 * r.lagging[ROUNDED].long.at_start:.0f} ms here; what matters is the slope. Band: "
+                "the doubt of the rounded walk's slope (standard error, floor, spread)."),
         _table(r),
         picture(figures, "end", draw_end(r, model),
-                f"{SHOWN} in the last cycles as the cameras would have seen it. Rounded or not is one curve to the eye; what is "
-                f"late by "
-                "a fifth of a second after half a minute is not."),
+                f"{SHOWN} in the last cycles as the cameras would have seen it. Rounded or not is one curve to the eye; what "
+                f"is {1e3 * r.seconds * r.lagging[PACKET].long.slope:.0f} ms late by then is not."),
     ]
     return Answer(
         "Riddle: why does the recording lag more and more?", headline, question, hypotheses(r.motion), shows, _decides(r),
@@ -83,16 +81,18 @@ def _table(r: Result) -> Table:
     rows = []
     for name, x in r.lagging.items():
         rows.append([name, _slope(x.short), _slope(x.long), sign(1e3 * r.seconds * x.long.slope, 0),
-                     f"{sign(1e3 * min(x.long.by_joint.values()))} to {sign(1e3 * max(x.long.by_joint.values()))}",
-                     sign(1e3 * x.long.at_start, 0), f"{x.amplitude:.2f}"])
+                     _joints(r, name), sign(1e3 * x.long.at_start, 0), f"{x.amplitude:.2f}"])
     return Table(
         ("hypothesis", f"growth in {r.short:.0f} s [ms/s]", f"in {r.seconds:.0f} s [ms/s]", "lag added by the end [ms]",
          "growth, joint by joint [ms/s]", "constant lag [ms]", "smallest swing left"), rows,
-        f"± is the standard error of the slope in one recording. Numerical floor and contact spread of the slope of the rounded "
-        f"walk: "
-        f"{1e3 * r.slope_short.doubt:.2f} ms/s in {r.short:.0f} s, {1e3 * r.slope.doubt:.3f} ms/s in {r.seconds:.0f} s. Last "
-        f"column: "
+        "± is the standard error of the slope in one recording. Numerical floor and contact spread of the slope of the rounded "
+        f"walk: {1e3 * r.slope.doubt:.2f} ms/s in {r.short:.0f} s, which is also taken for {r.seconds:.0f} s. Last column: "
         "swing in the last three cycles over that in the first, of the joint that keeps least.")
+
+
+def _joints(r: Result, name: str) -> str:
+    slopes = r.lagging[name].long.by_joint.values()
+    return f"{sign(1e3 * min(slopes), 2)} to {sign(1e3 * max(slopes), 2)}"
 
 
 def _slope(g: Growth) -> str:
@@ -102,35 +102,30 @@ def _slope(g: Growth) -> str:
 def sigma_short(r: Result, name: str, long: bool = False) -> float:
     """By how many sigma (standard error, floor, spread) a hypothesis's growth differs from that of the rounded walk."""
     mine, other = ((x.long if long else x.short) for x in (r.lagging[name], r.lagging[ROUNDED]))
-    doubt = r.slope.doubt if long else r.slope_short.doubt
-    doubt = doubt if np.isfinite(doubt) else 0.0
-    return float(abs(mine.slope - other.slope) / np.sqrt(mine.sigma**2 + other.sigma**2 + doubt**2))
+    return float(abs(mine.slope - other.slope) / np.sqrt(mine.sigma**2 + other.sigma**2 + r.slope.doubt**2))
 
 
 def slower_sigma(r: Result) -> float:
     """By how many sigma loss per pose and slow clock differ in the slower walk."""
     a, b = r.slower[PACKET], r.slower[CLOCK]
-    doubt = r.slope.doubt if np.isfinite(r.slope.doubt) else 0.0
-    return float(abs(a.slope - b.slope) / np.sqrt(a.sigma**2 + b.sigma**2 + doubt**2))
+    return float(abs(a.slope - b.slope) / np.sqrt(a.sigma**2 + b.sigma**2 + r.slope.doubt**2))
 
 
 def _decides(r: Result) -> list[Text | Table]:
     together, rounded = r.pairs[PACKET, CLOCK], r.pairs[EXACT, ROUNDED]
     first = Text(
         f"**The slope over {r.seconds:.0f} s.** Loss per pose stands {times(sigma_short(r, PACKET, True))} sigma from rounding "
-        f"there, "
-        f"{times(sigma_short(r, PACKET))} in {r.short:.0f} s; the very worst rounding {times(sigma_short(r, UP, True))} and "
-        f"{times(sigma_short(r, UP))}. Rounded and exact dwells cannot be told apart by any joint ({rounded.worst()} "
+        f"there, {times(sigma_short(r, PACKET))} in {r.short:.0f} s; the very worst rounding {times(sigma_short(r, UP, True))} "
+        f"and {times(sigma_short(r, UP))}. Rounded and exact dwells cannot be told apart by any joint ({rounded.worst()} "
         f"{times(rounded.sigma(rounded.worst()))} sigma; without noise, at a step that resolves the dwells, "
         f"{np.degrees(r.same):.2f} deg RMS at most).\n\n"
         f"**Loss per pose or a slow clock?** Played once they make the same recording: {r.seconds:.0f} s of one against the "
-        f"other "
-        f"differ by {times(together.sigma(together.worst()))} sigma in the worst joint ({together.worst()}). Play the same poses "
-        f"with "
-        f"every dwell {SLOWER:g} times as long: a loss per pose then halves its slope, a clock keeps it "
+        f"other differ by {times(together.sigma(together.worst()))} sigma in the worst joint ({together.worst()}). Play the "
+        f"same poses with every dwell {SLOWER:g} times as long: a loss per pose then halves its slope, a clock keeps it "
         f"({times(slower_sigma(r))} sigma apart).\n\n"
-        f"**Timing or power?** A supply that is weak, sags or fades makes every joint's lag and swing change by its own load; "
-        "timing makes all joints late alike, and leaves their swing as it was.")
+        f"**Timing or power?** Timing makes all joints late alike ({_joints(r, PACKET)} ms/s) and leaves their swing as it was. "
+        f"Motors that fade do not: {_joints(r, FADE)} ms/s, joint by joint, and the worst joint's swing shrinks to "
+        f"{r.lagging[FADE].amplitude:.2f} of what it was ({r.lagging[ROUNDED].amplitude:.2f} in the rounded walk).")
     rows = [[n, _slope(r.lagging[n].long), _slope(r.slower[n])] for n in (ROUNDED, PACKET, CLOCK)]
     return [first, Table(("hypothesis", "growth, dwells as they are [ms/s]", f"dwells × {SLOWER:g} [ms/s]"), rows)]
 
@@ -140,27 +135,22 @@ def _excluded(r: Result) -> str:
     most = 0.5 * len(r.motion.times[1:]) / r.motion.duration
     return (
         "The thesis prints the dwells of figure 3.4, 140, 103, 94 and 131 ms, and the times they come from, 0.1404, 0.2436, "
-        "0.3372 and "
-        f"0.468 s. The sum of both is 468 ms: rounding adds nothing from cycle to cycle and {worst:.1f} ms at most within one, a "
-        f"fourteenth of a camera frame ({1e3 / RATE:.1f} ms). **Rounding is excluded by the thesis's own table**, unless the "
-        f"program "
-        f"held other dwells than it prints. At the very worst, for a walk whose dwells all end on half a millisecond, it would "
-        f"be "
-        f"{most:.1f} ms/s. Moving speeds are rounded too, and ramps are 0.4 % slow; neither adds up, as each pose starts at its "
-        f"own "
-        "time. A weak supply is late by a constant amount and does not lag more and more.")
+        f"0.3372 and 0.468 s. The sum of both is 468 ms: rounding adds nothing from cycle to cycle and {worst:.1f} ms at most "
+        f"within one, where a camera frame is {1e3 / RATE:.1f} ms. **Rounding is excluded by the thesis's own table**, unless "
+        "the program held other dwells than it prints. At the very worst, for a walk whose dwells all end on half a "
+        f"millisecond, it would be {most:.1f} ms/s. Moving speeds are rounded too, and ramps are 0.4 % slow; both are in the "
+        f"rounded walk, whose lag grows by {_slope(r.lagging[ROUNDED].long)} ms/s. A weak supply is late by a constant amount "
+        "and does not lag more and more.")
 
 
 def _open(r: Result) -> str:
     fade, sag, weak = (1e3 * r.lagging[n].long.slope for n in (FADE, SAG, WEAK))
     return (
-        f"The thesis gives no number for its lag, so that none of the rest is excluded. Supply hypotheses grow by "
-        f"{sign(weak, 2)} (weak), "
-        f"{sign(sag, 2)} (sagging) and {sign(fade, 2)} ms/s (warming by 2 % a second). The packet's time is computed from the "
-        f"protocol; "
-        "what the program's loop takes besides, and whether the wait starts before or after sending, is not in the thesis. Whose "
-        "clock "
-        "is off, the controller's or the cameras', no recording of the robot alone can tell: film a stopwatch.")
+        "The thesis gives no number for its lag, so that none of the rest is excluded. Supply hypotheses grow by "
+        f"{sign(weak, 2)} (weak), {sign(sag, 2)} (sagging) and {sign(fade, 2)} ms/s (warming by 2 % a second). The packet's "
+        "time is computed from the protocol; what the program's loop takes besides, and whether the wait starts before or after "
+        "sending, is not in the thesis. Whose clock is off, the controller's or the cameras', no recording of the robot alone "
+        "can tell: film a stopwatch.")
 
 
 def _numbers(r: Result) -> dict[str, object]:
@@ -171,7 +161,7 @@ def _numbers(r: Result) -> dict[str, object]:
                 "long_sigma": 1e3 * x.long.sigma, "constant_lag_ms": 1e3 * x.long.at_start, "swing_left": x.amplitude}
             for n, x in r.lagging.items()},
         "slower_ms_per_s": {n: [1e3 * g.slope, 1e3 * g.sigma] for n, g in r.slower.items()},
-        "doubt_ms_per_s": [1e3 * float(np.nan_to_num(x.doubt)) for x in (r.slope_short, r.slope)],
+        "floor_and_spread_ms_per_s": [1e3 * r.slope.floor, 1e3 * r.slope.spread],
         "sigma_from_rounded": {n: [sigma_short(r, n), sigma_short(r, n, True)] for n in r.lagging if n != ROUNDED},
         "per_pose_against_clock_sigma": {"walk": r.pairs[PACKET, CLOCK].sigma(r.pairs[PACKET, CLOCK].worst()),
                                          "slower": slower_sigma(r)},
@@ -221,7 +211,7 @@ def _lags(axes: Axes, r: Result, names: tuple[str, ...]) -> None:
                   lw=2.4 if dashed else 1.6, label=name)
     base = r.lagging[ROUNDED].long
     span = np.array([0.0, r.seconds])
-    doubt = np.nan_to_num(r.slope.doubt) + base.sigma
+    doubt = r.slope.doubt + base.sigma
     low, high = (1e3 * (base.at_start + (base.slope + s * doubt) * span) for s in (-1, 1))
     axes.fill_between(span, low, high, color=style.FLOOR, alpha=0.5, lw=0)
 

@@ -37,10 +37,8 @@ def answer(r: Result, model: RobotModel) -> Answer:
     worst = max(late, key=lambda j: r.late[j][0])
     headline = (
         f"A last pose that is never sent leaves {joint} {np.degrees(apart):.0f} deg from where it should stand; the first pose "
-        f"is "
-        f"missed by up to {np.degrees(r.late[worst][1]):.0f} deg ({worst}), once; the body leans back by "
-        f"{r.lean['servo law']:.1f} deg, which "
-        "a recording zeroed in neutral does not show.")
+        f"is missed by up to {np.degrees(r.late[worst][1]):.0f} deg ({worst}), once; the body leans back by "
+        f"{r.lean['servo law']:.1f} deg, which a recording zeroed in neutral does not show.")
     question = "Three small things in the thesis that a recording, or a level, would settle."
     hypotheses = [Hypothesis(ALL, "All poses of all cycles are sent."),
                   Hypothesis(LAST, "Algorithm 3.1 read literally: the program steps on, sees the last pose and resets before it "
@@ -50,33 +48,27 @@ def answer(r: Result, model: RobotModel) -> Answer:
         _last_table(r),
         picture(figures, "first_pose", draw_first(r, model, worst),
                 f"{worst} in the first two cycles: from neutral it has further to go than from the last pose, at the same "
-                f"speed."),
+                "speed."),
         _late_table(r),
     ]
     decides = [Text(
         f"**The last pose.** Where the joints stand after the walk. {joint} is {np.degrees(apart):.1f} deg apart, "
         f"{times(apart / (np.sqrt(2.0) * r.noise))} times the noise of such a mean; the walk need only be recorded to its "
-        f"end.\n\n"
+        "end.\n\n"
         f"**The first pose.** When pose 2 is sent, the ramps of {listed(late) or 'no joint'} have not reached pose 1 in the "
-        f"first cycle by "
-        f"more than {np.degrees(LATE):.0f} deg, {worst} by {np.degrees(r.late[worst][0]):.1f}; recorded, {worst} is "
-        f"{np.degrees(r.late[worst][1]):.1f} deg short then and {np.degrees(r.late[worst][2]):.1f} in later cycles. {once} So it "
-        f"explains "
-        "the missed peaks at the start and no lag that grows.\n\n"
-        f"**The lean.** Geometry alone (hind feet against front feet, joints at neutral) leans the body back by "
-        f"{sign(r.lean['geometry'], 2)} "
-        f"deg; at rest it leans by {sign(r.lean['ideal joints'], 2)} deg with ideal joints and {sign(r.lean['servo law'], 2)} "
-        f"deg with the "
-        f"servo law, whose joints give under the weight; in the walk by {sign(r.lean['walk'], 2)} deg on average. The recording "
-        "does not show it: Motive's frames are made parallel to the room in the neutral pose as it stands, so that the lean is "
-        "its zero. "
-        "A level on the body, or the heights of a front and a hind marker, would.")]
+        f"first cycle by more than {np.degrees(LATE):.0f} deg, {worst} by {np.degrees(r.late[worst][0]):.1f}; recorded, "
+        f"{worst} is {np.degrees(r.late[worst][1]):.1f} deg short then and {np.degrees(r.late[worst][2]):.1f} in later cycles. "
+        f"{once} So it explains the missed peaks at the start and no lag that grows.\n\n"
+        "**The lean.** Geometry alone (hind feet against front feet, joints at neutral) leans the body back by "
+        f"{sign(r.lean['geometry'], 2)} deg; at rest it leans by {sign(r.lean['ideal joints'], 2)} deg with ideal joints and "
+        f"{sign(r.lean['servo law'], 2)} deg with the servo law, whose joints give under the weight; in the walk by "
+        f"{sign(r.lean['walk'], 2)} deg on average. The recording does not show it: Motive's frames are made parallel to the "
+        "room in the neutral pose as it stands, so that the lean is its zero. A level on the body, or the heights of a front "
+        "and a hind marker, would.")]
     excluded = [Text(
         "The thesis's simulation starts with a small positive z rotation (7.2.2), which it explains by the shorter hind legs: "
-        "here "
-        f"{sign(r.lean['ideal joints'], 2)} deg with ideal joints, as it simulated. Its figure 7.2 shows missed peaks at the "
-        f"start, which "
-        "fits the first pose. Nothing in it speaks about the last pose.")]
+        f"here {sign(r.lean['ideal joints'], 2)} deg with ideal joints, as it simulated. Its figure 7.2 shows missed peaks at "
+        "the start, which fits the first pose. Nothing in it speaks about the last pose.")]
     return Answer("Smaller riddles", headline, question, hypotheses, shows, decides, excluded, [], _numbers(r), figures)
 
 
@@ -98,16 +90,15 @@ def only_once(r: Result) -> str:
     same = [j for j, x in extra.items() if abs(x) < LATE]
     return ("All of them are late once only." if not same else
             f"{listed(same)} {'is' if len(same) == 1 else 'are'} as far off in every later cycle, for another reason than the "
-            f"start.")
+            "start.")
 
 
 def _last_table(r: Result) -> Table:
     rows = [[j, sign(np.degrees(a)), sign(np.degrees(r.stands[LAST][j])), sign(np.degrees(r.stands[LAST][j] - a))]
             for j, a in r.stands[ALL].items()]
     return Table(("joint", "stands at, all poses [deg]", "last pose missing [deg]", "difference [deg]"), rows,
-                 f"Means over the last quarter of a second, {AFTER} s after {WALKED} cycles began their last dwell's end; "
-                 f"against the rest "
-                 "before the walk.")
+                 f"Means over the last quarter of a second of the recording, which ends {AFTER} s after {WALKED} cycles; "
+                 "against the rest before the walk.")
 
 
 def _late_table(r: Result) -> Table:

@@ -127,7 +127,8 @@ def _given(motion: Motion, model: RobotModel) -> dict[str, float]:
 
 
 def _swing(take: Take, motion: Motion) -> dict[str, float]:
-    """Peak to peak of each joint's angle over that of its goals; the middle one of the cycles after the first."""
+    """Peak to peak of each joint's angle over that of its goals; the middle one of the cycles after the first. A joint that was
+    not seen for a whole cycle is left out."""
     clock = take.since_start
     cycles = range(1, int(clock[-1] / motion.duration))
     out = {}
@@ -135,7 +136,9 @@ def _swing(take: Take, motion: Motion) -> dict[str, float]:
         goals = np.ptp(motion.angles[:, motion.joints.index(joint)])
         q = take.q[:, i]
         parts = [q[(clock >= k * motion.duration) & (clock < (k + 1) * motion.duration)] for k in cycles]
-        out[joint] = float(np.median([np.ptp(p) for p in parts]) / goals)
+        whole = [np.ptp(p) for p in parts if np.isfinite(p).all()]
+        if whole:
+            out[joint] = float(np.median(whole) / goals)
     return out
 
 

@@ -48,26 +48,28 @@ def answer(r: Result, model: RobotModel) -> Answer:
     first = min(r.sure_after, key=lambda j: r.sure_after[j])
     headline = (
         f"Misplaced speeds would show in every recorded joint, {times(min(map(found.sigma, found.compared.joints)))} to "
-        f"{times(found.sigma(worst))} sigma off, {worst} most, and in {first} {1e3 * r.sure_after[first]:.0f} ms after the first "
-        f"command. They turn the walk by {sign(r.ends[ORDER]['ry'].value, 0)} deg in {r.seconds:.0f} s; the thesis's robot went "
-        f"straight.")
+        f"{times(found.sigma(worst))} sigma off, {worst} most, and in {first} {1e3 * r.sure_after[first]:.0f} ms after the "
+        f"first command. They turn the walk {_to_a_side(r.ends[ORDER]['ry'].value)} in {r.seconds:.0f} s; the thesis's robot "
+        "went straight.")
     question = (
         "In figure 3.4 of the thesis pos.txt lists the goals in the order of bus IDs, speed.txt the speeds in that of names. If "
-        "one loop "
-        "reads both, every servo gets another's speed. Did that happen?")
+        "one loop reads both, every servo gets another's speed. Did that happen?")
     shows: list[Part] = [
         _table(r),
         picture(figures, "joints", draw_joints(r), "How far each joint of a recording is from the simulation of the right "
                                                    "order."),
         picture(figures, "angles", draw_angles(r, model, _shown(r)),
-                "Recorded angles in the first two cycles: the joint that tells most, and the one that tells first. A servo that "
-                "gets too "
-                "low a speed never arrives; one that gets 0, which means at once, jumps."),
+                "Recorded angles in the first two cycles: the joint that tells most, and the one that tells first. A servo "
+                "that gets too low a speed never arrives; one that gets 0, which means at once, jumps."),
         _given_table(r),
         picture(figures, "path", draw_paths(r), f"Where the body goes in {r.seconds:.0f} s, seen from above."),
     ]
     return Answer("Riddle: did the speeds reach the wrong servos?", headline, question, hypotheses(), shows, [Text(_decides(r))],
                   [Text(_excluded(r)), _elsewhere_table(r)], [Text(_open())], _numbers(r), figures)
+
+
+def _to_a_side(turn: float) -> str:
+    return f"{abs(turn):.0f} deg to the {'left' if turn > 0 else 'right'}"
 
 
 def _shown(r: Result) -> tuple[str, ...]:
@@ -83,27 +85,26 @@ def _table(r: Result) -> Table:
         row = [name]
         for model in (RIGHT, ORDER):
             found = r.pairs[name, model]
-            row += [times(found.sigma(found.worst())), found.worst()]
+            row.append(f"{times(found.sigma(found.worst()))} ({found.worst()})")
         found = r.pairs[name, RIGHT]
         row.append(f"{np.degrees(np.median([c.error for c in found.compared.joints.values()])):.2f}")
         row += [told(r.ends[name][c]) for c in ("x", "z", "ry")]
         rows.append(row)
-    rows.append(["thesis: real robot", "–", "", "–", "", "–", sign(REAL[0]), sign(REAL[2]), "–"])
-    return Table(("recorded", "from right order [sigma]", "worst", "from misplaced [sigma]", "worst", "median joint error [deg]",
-                  "x [cm]", "z, right [cm]", "heading, left [deg]"), rows,
-                 "The worst joint of a recording of each hypothesis against simulations of the right and of the misplaced order. "
-                 "±: "
-                 "floor and spread, where they were run.", emphasis=(0, 1))
+    rows.append(["thesis: real robot", "–", "–", "–", sign(REAL[0]), sign(REAL[2]), "–"])
+    return Table(("recorded", "from right order [sigma]", "from misplaced [sigma]", "median error [deg]", "x [cm]",
+                  "z, right [cm]", "heading, left [deg]"), rows,
+                 "The worst joint of a recording of each hypothesis against simulations of the right and of "
+                 "the misplaced order. ±: floor and spread, where they were run.", emphasis=(0, 1))
 
 
 def _given_table(r: Result) -> Table:
     swing = r.swing
-    rows = [[j, f"{r.given[j]:.2f}", f"{swing[RIGHT][j]:.2f}", f"{swing[ORDER][j]:.2f}",
+    rows = [[j, f"{r.given[j]:.2f}" if r.given[j] else "at once", f"{swing[RIGHT][j]:.2f}", f"{swing[ORDER][j]:.2f}",
              times(r.pairs[ORDER, RIGHT].sigma(j)), f"{1e3 * r.sure_after[j]:.0f}" if j in r.sure_after else "–"]
             for j in r.pairs[ORDER, RIGHT].compared.joints]
     return Table(("joint", "speed it gets / its own", "swing / commanded, right order", "the same, misplaced", "sigma",
                   f"{SURE:.0f} noises off after [ms]"), rows,
-                 "Speeds are means of the four poses; a pose's speed of 0 means at once and counts as 0 here.")
+                 "Speeds are means of the four poses. A speed of 0 means at once.")
 
 
 def _short(r: Result, name: str, share: float = 0.7) -> list[str]:
@@ -114,21 +115,18 @@ def _decides(r: Result) -> str:
     right, wrong = r.pairs[ORDER, RIGHT], r.pairs[RIGHT, ORDER]
     quick = r.pairs[QUICK, RIGHT]
     return (
-        f"**Any recording with joint angles, half a second of it.** Recorded with misplaced speeds, the worst joint is "
-        f"{times(right.sigma(right.worst()))} sigma from the right order; recorded in the right order it is "
-        f"{times(wrong.sigma(wrong.worst()))} sigma from the misplaced one; {len(r.sure_after)} of "
+        f"**Any recording with joint angles, the first {max(r.sure_after.values()):.2f} s of it.** Recorded with misplaced "
+        f"speeds, the worst joint is {times(right.sigma(right.worst()))} sigma from the right order; recorded in the right "
+        f"order it is {times(wrong.sigma(wrong.worst()))} sigma from the misplaced one; {len(r.sure_after)} of "
         f"{len(right.compared.joints)} joints are {SURE:.0f} noises off within {1e3 * max(r.sure_after.values()):.0f} ms of the "
-        f"first "
-        "command, before any foot's slip matters. So the thesis's own recording decides it today: lay its joint angles over both "
-        "simulations. On the bus it is decided without any recording, by reading each servo's register of moving speed after a "
-        "pose.\n\n"
+        "first command. So the thesis's own recording decides it today: lay its joint angles over both simulations. On the bus "
+        "it is decided without any recording, by reading each servo's register of moving speed after a pose.\n\n"
         f"**Ramps 0.4 % slow are another matter.** In the walk they are {times(quick.sigma(quick.worst()))} sigma from the "
-        f"servo's unit in "
-        f"the worst joint: nothing. A slow sweep of one joint decides: {SWEPT} on the stand from {np.degrees(SWEEP):.0f} to "
-        f"{-np.degrees(SWEEP):.0f} deg at a whole count of speed, so that no rounding enters. Its recorded slope over the "
-        f"simulated one is "
-        f"{r.sweep[RIGHT].ratio:.5f} ± {r.sweep[RIGHT].sigma:.5f} with the servo's unit and {r.sweep[QUICK].ratio:.5f} ± "
-        f"{r.sweep[QUICK].sigma:.5f} with the thesis's, {times(_sweep_sigma(r))} sigma apart.")
+        f"servo's unit in the worst joint: nothing. A slow sweep of one joint decides: {SWEPT} on the stand from "
+        f"{np.degrees(SWEEP):.0f} to {-np.degrees(SWEEP):.0f} deg at a whole count of speed, so that no rounding enters. Its "
+        f"recorded slope over the simulated one is {r.sweep[RIGHT].ratio:.5f} ± {r.sweep[RIGHT].sigma:.5f} with the servo's "
+        f"unit and {r.sweep[QUICK].ratio:.5f} ± {r.sweep[QUICK].sigma:.5f} with the thesis's, {times(_sweep_sigma(r))} sigma "
+        "apart.")
 
 
 def _sweep_sigma(r: Result) -> float:
@@ -145,20 +143,16 @@ def _excluded(r: Result) -> str:
     wrong, right = _short(r, ORDER), _short(r, RIGHT)
     return (
         f"**Direction.** The thesis's robot ended at x {REAL[0]:.2f}, z {sign(REAL[2], 2)} cm: straight. With misplaced speeds "
-        f"the "
-        f"simulated one turns by {sign(min(off), 0)} to {sign(max(off), 0)} deg over friction {FRICTIONS[0]} to {FRICTIONS[-1]} "
-        f"and both "
-        f"contact models, in the right order by {sign(min(on), 0)} to {sign(max(on), 0)}; floor and spread are "
-        f"{r.ends[ORDER]['ry'].doubt:.0f} and {r.ends[RIGHT]['ry'].doubt:.0f} deg. "
-        f"{_straight(r)}\n\n"
+        f"the simulated one turns by {sign(min(off), 0)} to {sign(max(off), 0)} deg over friction {FRICTIONS[0]} to "
+        f"{FRICTIONS[-1]} and both contact models, in the right order by {sign(min(on), 0)} to {sign(max(on), 0)}; floor and "
+        f"spread are {r.ends[ORDER]['ry'].doubt:.0f} and {r.ends[RIGHT]['ry'].doubt:.0f} deg. {_straight(r)}\n\n"
         "**Swing.** The thesis (7.2.1) says that the recording misses peaks at the start, and that the tail turns significantly "
-        "less than "
-        f"told, probably the tops too. With misplaced speeds {listed(wrong) or 'no joint'} would swing by less than 70 % of what "
-        f"is "
-        f"commanded, in the right order {listed(right) or 'no joint'}. {_swing_says(wrong)}\n\n"
-        f"**Goals misplaced** (speeds right) would have been seen by eye: the body ends at x {sign(r.ends[GOALS]['x'].value)} cm "
-        f"with a "
-        f"heading of {sign(r.ends[GOALS]['ry'].value, 0)} deg.")
+        f"less than told, probably the tops too. With misplaced speeds {listed(wrong) or 'no joint'} would swing by less than "
+        f"70 % of what is commanded, in the right order {listed(right) or 'no joint'}; the tail would swing by "
+        f"{r.swing[ORDER]['tail']:.2f} of it, in the right order by {r.swing[RIGHT]['tail']:.2f}. "
+        f"{_swing_says(r, wrong)}\n\n"
+        f"**Goals misplaced** (speeds right) would have been seen by eye: the body ends at x {sign(r.ends[GOALS]['x'].value)} "
+        f"cm with a heading of {sign(r.ends[GOALS]['ry'].value, 0)} deg.")
 
 
 def _straight(r: Result) -> str:
@@ -166,32 +160,37 @@ def _straight(r: Result) -> str:
     most = max(abs(t) for t in _turns(r, RIGHT))
     if least > 2 * most:
         return ("No condition that was tried brings a walk with misplaced speeds near straight, so that the thesis's straight "
-                "end speaks "
-                "clearly against them, as far as this model walks like the robot.")
+                "end speaks clearly against them, as far as this model walks like the robot.")
     return "The ranges are not far apart, so that direction alone does not exclude them."
 
 
-def _swing_says(wrong: list[str]) -> str:
-    legs = [j for j in wrong if j[-1] in "bm" and j != "tail"]
+def _swing_says(r: Result, wrong: list[str]) -> str:
+    said = []
+    legs = [j for j in wrong if j[-1] in "bm"]
     if legs:
-        return (f"Knees and thighs among them ({listed(legs)}) do not fit what the thesis saw in its figure 7.2, where only tail "
-                f"and tops "
-                "fall short: a second reason against it.")
-    return "That alone does not speak against it."
+        said.append(f"That thighs and shanks ({listed(legs)}) fall that short does not fit the thesis, which names tail and tops "
+                    f"alone.")
+    if r.swing[ORDER]["tail"] > 1:
+        said.append("Nor does a tail that turns further than told.")
+    return " ".join(said) or "That alone does not speak against it."
 
 
 def _open() -> str:
     return ("The exclusion by direction leans on a model whose signs and feet are a choice (studies.joint_signs). That by joint "
-            "angles "
-            "would not, but the thesis prints them only as a figure. Reading the recording itself settles it.")
+            "angles would not, but the thesis prints them only as a figure. Reading the recording itself settles it.")
 
 
 def _elsewhere_table(r: Result) -> Table:
-    rows = [[f"{friction:g}", contact, *(sign(v, 0 if i == 2 else 1) for n in (RIGHT, ORDER)
-                                         for i, v in enumerate(r.elsewhere[n, friction, contact]))]
-            for contact in CONTACTS for friction in FRICTIONS if (ORDER, friction, contact) in r.elsewhere]
-    ends = ("x [cm]", "z [cm]", "heading [deg]")
-    return Table(("friction", "contact", *(f"right: {e}" for e in ends), *(f"misplaced: {e}" for e in ends)), rows)
+    rows = []
+    for contact in CONTACTS:
+        for friction in (f for f in FRICTIONS if (ORDER, f, contact) in r.elsewhere):
+            row = [f"{friction:g}", contact]
+            for name in (RIGHT, ORDER):
+                x, z, turn = r.elsewhere[name, friction, contact]
+                row += [sign(x), sign(z), sign(turn, 0)]
+            rows.append(row)
+    ends = ("x [cm]", "z [cm]", "turn [deg]")
+    return Table(("friction", "contact", *(f"right: {ends[0]}", *ends[1:]), *(f"misplaced: {ends[0]}", *ends[1:])), rows)
 
 
 def _numbers(r: Result) -> dict[str, object]:
