@@ -102,15 +102,16 @@ def _write_joint(model: Element, name: str, joint: Element) -> None:
 def servo(jaw_range: float | None = None) -> ServoConstants:
     """Nominal constants of one servo; `jaw_range` [rad]: of the jaw, whose angle the recordings give as a share of this range.
 
-    In units of a share, speeds are smaller by the range, torques and gain larger, viscous friction and inertia by its square, and
-    half the duty is as much as half the supply and twice the gain.
+    In shares, speeds and the error are smaller by the range. Stiffness, damping and inertia are kept as numbers, so that torques
+    are smaller by it too: what hangs on the jaw, 12 g, weighs nothing beside its servo. Half the duty is half the supply and
+    twice the gain.
     """
     s, part = (1.0, 1.0) if jaw_range is None else (jaw_range, GRIPPER_LIMIT)
     return ServoConstants(
         model="STS3215" if jaw_range is None else "STS3215, per share of the jaw's range, half duty",
-        stall_torque=round(s * KT * VOLTAGE / RESISTANCE, 5), no_load_speed=round(VOLTAGE / KT / s, 5), rated_voltage=VOLTAGE,
-        supply_voltage=VOLTAGE * part, coulomb_friction=round(s * COULOMB, 6), viscous_friction=round(s * s * VISCOUS, 6),
-        reflected_inertia=round(s * s * ARMATURE, 6), proportional_gain=round(s * DUTY_PER_RADIAN / part, 5),
+        stall_torque=round(KT * VOLTAGE / RESISTANCE / s, 5), no_load_speed=round(VOLTAGE / KT / s, 5), rated_voltage=VOLTAGE,
+        supply_voltage=VOLTAGE * part, coulomb_friction=round(COULOMB / s, 6), viscous_friction=VISCOUS,
+        reflected_inertia=ARMATURE, proportional_gain=round(s * DUTY_PER_RADIAN / part, 5),
         compliance_slope=None, compliance_margin=None, punch=None)
 
 
