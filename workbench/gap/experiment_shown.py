@@ -121,15 +121,21 @@ def shown(pair: Pair, takes: Sequence[Take], sight: Sight, finer: Take | None = 
     weight = counts / np.sqrt(1 + floor**2)
     of_a = [(o - a) / s for o, s in zip(others[:p], pair.a.steps())]
     of_b = [(o - b) / s for o, s in zip(others[p:], pair.b.steps())]
-    nuisance = []
-    if sight.captured:
-        nuisance.append(np.gradient(a, axis=0) * sight.rate * START)
-        for i, sigma in enumerate(sight.sigma.values()):
-            column = np.zeros((n, c))
-            column[:, i] = ZERO / sigma
-            nuisance.append(column)
     return Shown((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n),
-                 _flat(nuisance, weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
+                 _flat(left_open(a, sight), weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
+
+
+def left_open(y: Array, sight: Sight) -> list[Array]:
+    """What a recording leaves open of channels (N, c) over sigma, each (N, c) by one standard deviation: before cameras, when the
+    first command came, and where each joint stood when its angle was called zero."""
+    if not sight.captured:
+        return []
+    out = [np.gradient(y, axis=0) * sight.rate * START]
+    for i, sigma in enumerate(sight.sigma.values()):
+        column = np.zeros(y.shape)
+        column[:, i] = ZERO / sigma
+        out.append(column)
+    return out
 
 
 def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
