@@ -32,7 +32,7 @@ def read_off(nominal: RobotModel, moving: Mapping[str, Response], resting: Mappi
         stands = resting[joint]
         dry = 0.0 if stands is None else max(0.0, stands.width.value * k - law.coulomb[i])
         damping = max(0.0, moving[joint].late.value * k - law.damping[i])
-        effects += [EffectSpec("servo_gain", (joint,), {"ratio": round(ratio, 4)}),
+        effects += [EffectSpec("servo_gain", (joint,), {"ratio": round(float(ratio), 4)}),
                     EffectSpec("coulomb_friction", (joint,), {"torque": round(float(dry), 5)}),
                     EffectSpec("viscous_friction", (joint,), {"coefficient": round(float(damping), 5)})]
     return replace(nominal, effects=tuple(effects))
