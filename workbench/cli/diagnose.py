@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from workbench.cli.options import add_out
+from workbench.cli.options import add_out, positive
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -13,31 +13,38 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "diagnose",
         help="find the physics that a session's model left out",
-        description="Locates where recordings and model differ, screens every known effect at every place, fits what is likely, "
-        "keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, the "
-        "session's predictions and report.html.",
+        description="Locates where recordings and model differ, tries every known effect where it could act, fits what is "
+        "likely, keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, "
+        "the "
+        "session's predictions and report.html. A run that was stopped goes on where it was.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml")
     add_out(parser)
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, predicts and writes."""
+    from workbench.cli.memory import rollout_memory
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gap.diagnosis import diagnose_session
     from workbench.gap.prediction import predict_session
     from workbench.gap.session import load_session
+    from workbench.motion import save_motion
     from workbench.view.diagnosis_report import write_diagnosis
 
     session = load_session(args.session)
-    with output_directory(args.out) as folder, Progress("diagnose") as progress:
-        told = diagnose_session(session, progress)
+    with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
+        told = diagnose_session(session, progress, args.jobs, memory)
         paths = write_diagnosis(told.diagnosis, told.stories, folder, str(args.session), progress)
+        if told.motion is not None and told.diagnosis.next_experiment is not None:
+            paths.append(folder / told.diagnosis.next_experiment.motion)
+            save_motion(told.motion, paths[-1])
         if session.predict:
             (folder / "predict").mkdir()
-            predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model)
+            predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
     for name, reason in told.diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
     print(f"verdict: {told.diagnosis.verdict}")

@@ -17,69 +17,100 @@ from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
 
-
 HEAVY = 0.15
 """Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows."""
+ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
+"""What a search from neutral cannot find: a stop shows nothing until the joint meets it, a mount's axis has to be known first;
+`special` reads them off the recordings."""
 
 
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
-    speed at which friction fades), whose neutral value is its typical one, x is the number of doublings."""
+    speed at which friction fades), whose neutral value is its typical one, x is the number of doublings. held: by number, whether
+    it is no matter of fitting (an axis that was read off the recording)."""
 
     effect: Effect
     where: tuple[str, ...]
     neutral: tuple[float, ...]
+    typical: tuple[float, ...]
+    held: tuple[bool, ...]
+
+    @staticmethod
+    def of(effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
+           held: Sequence[bool] | None = None) -> Candidate:
+        """typical: default the effect's own."""
+        own = tuple(p.typical for p in effect.parameters for _ in range(3 if p.vector else 1))
+        return Candidate(effect, where, tuple(neutral), tuple(typical or own), tuple(held or (False,) * len(own)))
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """What it is and where."""
+        return self.effect.name, self.where
+
+    @property
+    def joint(self) -> str | None:
+        """The one joint in which it acts."""
+        return self.where[0] if "joint" in self.effect.places and len(self.where) == 1 else None
+
+    @property
+    def read_off(self) -> bool:
+        """Whether its sizes were read off the recordings, 1 being what they say."""
+        return self.effect.name in ASKED_APART
 
     @property
     def parameters(self) -> list[Parameter]:
         """The parameter behind each number; a vector has three."""
         return [p for p in self.effect.parameters for _ in range(3 if p.vector else 1)]
 
+    @property
+    def size(self) -> int:
+        """How many numbers are fitted."""
+        return self.held.count(False)
+
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the contract's units, cut to what is possible."""
+        """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
+        sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
-        for p, n, size in zip(self.parameters, self.neutral, x):
-            if math.isinf(n):
-                value = p.typical / max(size, p.typical / p.high)
+        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
+            size = 1.0 if held else next(sizes)
+            if held:
+                value = t
+            elif math.isinf(n):
+                value = t / max(size, t / p.high)
             else:
-                value = n * 2.0**size if n == p.typical else n + size * (p.typical - n)
+                value = n * 2.0**size if n == t else n + size * (t - n)
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 
     def bounds(self) -> tuple[Array, Array]:
         """Of the sizes x."""
         low, high = [], []
-        for p, n in zip(self.parameters, self.neutral):
-            if n == p.typical:
-                ends = [math.log2(end / n) for end in (p.low, p.high)]
+        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
+            if held:
+                continue
+            if math.isinf(n):
+                ends = [0.0, t / p.low]
+            elif n == t:
+                ends = [math.log2(end / n) if end > 0 else -10.0 for end in (p.low, p.high)]
             else:
-                ends = [(end - n) / (p.typical - n) for end in (p.low, p.high)] if math.isfinite(n) else [0.0, p.typical / p.low]
+                ends = [(end - n) / (t - n) for end in (p.low, p.high)]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)
 
-    @property
-    def _probed(self) -> list[int]:
-        """Numbers that show from neutral on: not those that shape an effect, nor a vector that says where a scalar acts."""
-        scalar = any(not p.vector for p in self.effect.parameters)
-        return [i for i, (p, n) in enumerate(zip(self.parameters, self.neutral)) if n != p.typical and not (scalar and p.vector)]
-
     def probes(self) -> list[Array]:
-        """Sizes at which each probed number alone is typical; one empty for an effect without numbers."""
-        n = len(self.neutral)
-        return [np.eye(n)[i] for i in self._probed] or [np.zeros(n)]
-
-    def start(self, probed: Array) -> Array:
-        """Sizes within bounds to start a fit from, given those of the probed numbers."""
-        x = np.zeros(len(self.neutral))
-        x[self._probed] = probed[:len(self._probed)]
-        return np.asarray(np.clip(x, *self.bounds()))
-
-    def probed(self, x: Array) -> Array:
-        """Of sizes x, those that were probed; one for an effect without numbers, which is there or not."""
-        return x[self._probed] if len(x) else np.ones(1)
+        """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
+        that says where a scalar acts; one empty for an effect without numbers."""
+        scalar = any(not p.vector for p in self.effect.parameters)
+        fitted = [(p, n, t) for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held) if not held]
+        shown = [i for i, (p, n, t) in enumerate(fitted) if n != t and not (scalar and p.vector)]
+        return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
 
     def spec(self, x: Sequence[float] | Array) -> EffectSpec:
         """The effect at these sizes."""
@@ -94,30 +125,56 @@ class Candidate:
 
 
 def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
-    """All that this installation knows and these takes could show: at seen joints; what the ground does, in free takes."""
+    """All that this installation knows and a search from neutral could find in these takes."""
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
-    out = []
+    start_known = not any(e.start_is_free for e in evidence)
+    out: list[Candidate] = []
     for effect in known_effects().values():
         if effect.layer == "measurement" or (effect.layer == "ground" and not free and effect.name != "ground_tilt"):
             continue
-        if effect.name == "speed_order" and set(model.bus_ids) < set(model.joints):
+        if effect.name in ASKED_APART or (effect.name == "zero_offset" and not free and _zeroed(evidence)):
+            continue
+        if effect.name == "speed_order" and (set(model.bus_ids) < set(model.joints) or len(model.joints) < 2):
+            continue
+        if effect.name == "speed_order" and not any(c is not None and np.any(c.speeds > 0) for c in commands_of(evidence)):
             continue
         neutral = effect.neutral(model)
-        if _searchable(effect, neutral):
-            out += [Candidate(effect, where, neutral) for where in _places(effect, model, seen)]
+        for where in _places(effect, model, seen):
+            if effect.name == "command_delay" and not where and not start_known:
+                continue  # a late start and a delay of all joints are the same
+            out.append(Candidate.of(effect, where, _at_rest(effect, model, where, neutral)[0],
+                                    _at_rest(effect, model, where, neutral)[1]))
     return out
 
 
-def _searchable(effect: Effect, neutral: Sequence[float]) -> bool:
-    """Whether a search from neutral can find it: not a stop, which shows nothing until the joint meets it, nor a mount whose
-    axis has to be known first."""
-    return effect.name != "loose_mount" and -math.inf not in neutral
+def commands_of(evidence: Sequence[TakeEvidence]) -> list:  # type: ignore[type-arg]
+    """What went out on the bus, take by take."""
+    return [e.take.commands for e in evidence]
+
+
+def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
+    return all(e.take.recorded.zeroed for e in evidence)
+
+
+def _at_rest(effect: Effect, model: RobotModel, where: tuple[str, ...], neutral: tuple[float, ...]
+             ) -> tuple[tuple[float, ...], tuple[float, ...] | None]:
+    """Neutral and typical numbers; a mass is sought from its link's centre of mass on, not from its joint."""
+    if effect.name != "payload":
+        return neutral, None
+    center = np.asarray(model.kinematics.centers.get(where[0], np.zeros(3)), dtype=float)
+    mass, position = effect.parameters[0], effect.parameters[1]
+    return (0.0, *center.tolist()), (mass.typical, *(center + position.typical).tolist())
+
+
+def heavy_links(model: RobotModel) -> list[str]:
+    """Links with at least the share HEAVY of the robot's mass."""
+    masses = model.kinematics.masses
+    return [link for link in model.kinematics.links if masses[link] >= HEAVY * sum(masses.values())]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    masses = model.kinematics.masses
-    heavy = [link for link in model.kinematics.links if masses[link] >= HEAVY * sum(masses.values())]
+    heavy = heavy_links(model)
     if effect.layer == "inertia" and all(p.vector for p in effect.parameters):
         yield from ((link,) for link in heavy)
         return

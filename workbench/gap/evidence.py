@@ -1,13 +1,14 @@
-"""What the recordings say about a model: residuals over noise, on stretches for fitting, choosing and validating.
+"""What the recordings show, channel by channel, with what noise and numerics alone would make of each.
 
-Takes are simulated whole, from rest. Joint angles enter frame by frame. Of the body, height and tilt enter as they are, path and
-heading as what they gain in a quarter of a second: walking is chaotic over seconds, not over fractions of one.
+Joint angles enter frame by frame, and beside each what its joint's rotation has across the servo's axis. Of the body, height and
+tilt enter as they are, path and heading as what they gain in a quarter of a second: walking is chaotic over seconds, not over
+fractions of one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,8 @@ from workbench.gap.comparison import noise_of
 from workbench.gap.metrics import rms
 from workbench.gap.registered import RegisteredTake
 from workbench.recording.take import Take
+from workbench.recording.yaw import weighted_median
 from workbench.robot import RobotModel
-from workbench.simulation import SimulationConfig
-from workbench.simulation.batch import Job, simulate_batch
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,41 +29,109 @@ GAIN_SPAN = 0.25
 BLOCK = 0.4
 """Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
 USES = ("fit", "choose", "fit", "validate")
-REST = 0.1
-"""Rest before the first command in rollouts [s]."""
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
+ACROSS = "~"
+"""Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
+SMOOTHED = 0.065
+"""Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
+
+
+def joint_of(channel: str) -> str:
+    """The joint that a channel tells of; the channel's own name where it is the body's."""
+    return channel.partition(ACROSS)[0]
 
 
 @dataclass(frozen=True)
 class TakeEvidence:
     """One registered take: recorded channels (N, c), their sigma (c,), and which frames serve for what.
 
-    Channels are the take's joints, then BODY on the ground. sigma: measurement noise, the numerical floor and, on the ground, the
-    spread between contact models together.
+    Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
+    measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what the
+    search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether the first
+    command's time was estimated, so that every model may shift it.
     """
 
     take: RegisteredTake
     channels: tuple[str, ...]
     recorded: Array
     sigma: Array
+    offset: Array
     uses: Mapping[str, Mask]
     weight: Array
+    start_is_free: bool
 
     @property
     def name(self) -> str:
         return self.take.spec.name
 
-    def residual(self, rollout: Take, model: RobotModel) -> Array:
-        """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command."""
-        return (self.recorded - channels_of(self.take.observed(rollout, model), self.take.recorded.joints)) / self.sigma
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.take.recorded.joints
+
+    @property
+    def frame_time(self) -> float:
+        """Between two frames [s]."""
+        return float(np.median(np.diff(self.take.recorded.time)))
+
+    @property
+    def moving(self) -> Mask:
+        """Frames after the first command."""
+        return self.take.recorded.time >= self.take.measurement.starts_at
+
+    def columns(self, joint: str | None = None) -> NDArray[np.int_]:
+        """Of one joint's channels; of all."""
+        return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
+
+    def simulated(self, rollout: Take, model: RobotModel) -> Array:
+        """A rollout's channels (N, c) as this take would have shown them."""
+        return channels_of(self.take.observed(rollout, model), self)
+
+    def residual(self, simulated: Array, corrected: bool = True) -> Array:
+        """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. corrected: for the search's
+        step."""
+        simulated = simulated + self.offset if corrected else simulated
+        if self.start_is_free:
+            simulated = self._shifted(simulated)
+        return (self.recorded - simulated) / self.sigma
+
+    def _shifted(self, simulated: Array) -> Array:
+        """Later by what the median joint asks for: a start that one bad joint cannot move."""
+        time, late, n = self.take.recorded.time, 0.0, len(self.joints)
+        used = ~self.uses["validate"]
+        shifted = simulated
+        for _ in range(2):
+            slope = np.gradient(shifted[:, :n], time, axis=0) / self.sigma[:n]
+            r = (self.recorded[:, :n] - shifted[:, :n]) / self.sigma[:n]
+            good = np.isfinite(r) & np.isfinite(slope) & used[:, None]
+            s, r = np.where(good, slope, 0.0), np.where(good, r, 0.0)
+            sharpness = np.sum(s * s, axis=0)
+            told = sharpness > 1.0
+            if not told.any():
+                return shifted
+            by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
+            late += float(np.clip(weighted_median(by_joint, np.sqrt(sharpness[told])), -0.03, 0.03))
+            shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
+        return np.where(np.isfinite(simulated), shifted, np.nan)
 
 
-def channels_of(take: Take, joints: tuple[str, ...]) -> Array:
-    """Joint angles and, of a free take, body channels (N, n [+ 6]) of an observed take."""
-    q = take.q[:, [take.column(j) for j in joints]]
-    return np.hstack([q, body_channels(take)]) if take.base == "free" else q
+def channels_of(take: Take, e: TakeEvidence | tuple[str, ...]) -> Array:
+    """Channels (N, c) of an observed take; of evidence, or by the joints and axes named."""
+    names = e if isinstance(e, tuple) else e.channels
+    body = body_channels(take) if BODY[0] in names else None
+    out = np.zeros((len(take), len(names)))
+    for i, name in enumerate(names):
+        joint, _, axis = name.partition(ACROSS)
+        if name in BODY:
+            assert body is not None
+            out[:, i] = body[:, BODY.index(name)]
+        elif axis:
+            if take.off_axis is not None:
+                out[:, i] = take.off_axis[:, take.column(joint), "xyz".index(axis)]
+        else:
+            out[:, i] = take.q[:, take.column(joint)]
+    return out
 
 
 def body_channels(take: Take) -> Array:
@@ -91,32 +159,55 @@ def body_channels(take: Take) -> Array:
     return out
 
 
+def channel_names(t: RegisteredTake) -> tuple[str, ...]:
+    """What a take shows: its joints, what lies across them, its body."""
+    joints = t.recorded.joints
+    across = []
+    if t.recorded.off_axis is not None:
+        k = t.model.kinematics
+        neutral = k.forward(np.zeros((1, len(k.joints))))
+        for i, j in enumerate(joints):
+            axis = np.abs(neutral[k.frames[j].parent][1][0] @ k.frames[j].X_PF_R @ k.frames[j].axis)  # in the base's axes
+            if np.isfinite(t.recorded.off_axis[:, i]).any():
+                across += [f"{j}{ACROSS}{'xyz'[k]}" for k in np.sort(np.argsort(axis)[:2])]
+    return (*joints, *across, *(BODY if t.recorded.base == "free" else ()))
+
+
 def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts]) -> list[TakeEvidence]:
-    """The evidence of registered takes; rollouts: of the nominal model, with floors, by take name."""
+    """The evidence of registered takes; rollouts: of the nominal model at the search's step, with floors, by take name."""
     known = noise_of([t.recorded for t in takes])
     alone = not any(t.spec.use == "validate" for t in takes)
-    out = []
-    for t in takes:
-        joints = t.recorded.joints
-        free = t.recorded.base == "free"
-        recorded = channels_of(t.recorded, joints)
-        nominal = channels_of(t.observed(rollouts[t.spec.name].nominal), joints)
-        moving = t.recorded.time >= t.measurement.starts_at
-        floor = _apart(nominal, [channels_of(t.observed(r), joints) for r in rollouts[t.spec.name].finer], moving)
-        spread = _apart(nominal, [channels_of(t.observed(r), joints) for r in rollouts[t.spec.name].other_contact], moving)
-        noise = np.array([known.joints[j] for j in joints])
-        if free:
-            resting = recorded[t.recorded.resting][:, len(joints):]
-            noise = np.concatenate([noise, rms(resting - np.nanmean(resting, axis=0))])
-        sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
-        if free:
-            sigma[len(joints):] = np.maximum(sigma[len(joints):], LEAST_BODY_SIGMA)
-        weight = np.ones(recorded.shape[1])
-        if free:  # neighbouring frames of the body tell nearly the same
-            weight[len(joints):] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
-        out.append(TakeEvidence(t, (*joints, *(BODY if free else ())), np.where(moving[:, None], recorded, np.nan), sigma,
-                                _uses(t, moving, alone), weight))
-    return out
+    return [_evidence(t, rollouts[t.spec.name], known.joints, alone) for t in takes]
+
+
+def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, float], alone: bool) -> TakeEvidence:
+    names = channel_names(t)
+    joints = t.recorded.joints
+    recorded = channels_of(t.recorded, names)
+    moving = t.recorded.time >= t.measurement.starts_at
+    nominal = channels_of(t.observed(r.nominal), names)
+    finer = [channels_of(t.observed(f), names) for f in r.finer]
+    finest = finer[-1] if finer else nominal
+    floor = _apart(finest, finer[:-1] or [nominal], moving)
+    spread = _apart(nominal, [channels_of(t.observed(o), names) for o in r.other_contact], moving)
+    noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
+    resting = recorded[t.recorded.resting]
+    if len(resting) > 5:  # a pose is a mean over rest, so that this is about zero
+        own = rms(resting - np.nanmean(resting, axis=0))
+        noise = np.where(np.isnan(noise), own, noise)
+    across = [i for i, c in enumerate(names) if ACROSS in c]
+    if across:  # one camera system sees all bodies alike
+        noise[across] = np.nanmedian(noise[across])
+    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
+    weight = np.ones(len(names))
+    if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
+        body = [names.index(c) for c in BODY]
+        sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
+        weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
+    sigma = np.maximum(sigma, 1e-6)
+    offset = np.where(np.isfinite(finest - nominal), finest - nominal, 0.0)
+    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
+                        t.recorded.zeroed and t.spec.starts_at is None)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
@@ -135,37 +226,21 @@ def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
     return np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0)
 
 
-class Jury:
-    """Rolls models out on every take, over both cores, and weighs what they leave."""
+def smoothed(residual: Array, frames: int) -> Array:
+    """Running means of residuals (N, c) over `frames`, scaled to stay 1 where they are white noise of 1; NaN stays."""
+    known = np.isfinite(residual)
+    kernel = np.ones(max(1, frames))
+    total = np.column_stack([np.convolve(c, kernel, mode="same") for c in np.where(known, residual, 0.0).T])
+    count = np.column_stack([np.convolve(c, kernel, mode="same") for c in known.astype(float).T])
+    return np.where(known, total / np.sqrt(np.maximum(count, 1.0)), np.nan)
 
-    def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2) -> None:
-        self.evidence = tuple(evidence)
-        self.config = config
-        self.n_jobs = n_jobs
 
-    def residuals(self, models: Sequence[RobotModel], takes: Sequence[int] | None = None, time_step: float | None = None
-                  ) -> list[list[Array]]:
-        """For each model, residuals (N, c) of each take (indices `takes`; default all). Each take's own servo changes apply."""
-        index = list(range(len(self.evidence))) if takes is None else list(takes)
-        jobs = [self._job(model, self.evidence[i], time_step) for model in models for i in index]
-        rollouts = iter(simulate_batch(jobs, self.n_jobs))
-        return [[self.evidence[i].residual(next(rollouts), model) for i in index] for model in models]
-
-    def observed(self, models: Sequence[RobotModel], take: int) -> list[Take]:
-        """One take as each model would show it, observed like the recording."""
-        e = self.evidence[take]
-        rollouts = simulate_batch([self._job(m, e, None) for m in models], self.n_jobs)
-        return [e.take.observed(r, m) for r, m in zip(rollouts, models)]
-
-    def _job(self, model: RobotModel, e: TakeEvidence, time_step: float | None) -> Job:
-        spec = e.take.spec
-        own = replace(model.with_servos(spec.servos), effects=model.effects)
-        config = replace(self.config, base=spec.base, time_step=time_step or self.config.time_step)
-        frames = e.take.recorded.time - e.take.measurement.starts_at
-        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[frames >= 0]])
-        return Job(own, config, e.take.commands, float(frames[-1]) + 2e-3, REST, name=spec.name, times=times)
-
-    def vector(self, residuals: Sequence[Array], use: str, takes: Sequence[int] | None = None) -> Array:
-        """All residuals of one use as one vector, weighted, gaps left out as zeros: comparable between models."""
-        of = [self.evidence[i] for i in (range(len(self.evidence)) if takes is None else takes)]
-        return np.concatenate([np.nan_to_num(r[e.uses[use]] * np.sqrt(e.weight)).ravel() for e, r in zip(of, residuals)])
+def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: bool = False) -> dict[str, float]:
+    """RMS of residual over sigma, by channel; on all frames after the first command, or those of one use. smooth: of running
+    means, which show what is no noise."""
+    if smooth:
+        residual = smoothed(residual, round(SMOOTHED / e.frame_time))
+    rows = residual[e.moving] if use is None else residual[e.uses[use]]
+    count = np.isfinite(rows).sum(axis=0)
+    value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))
+    return {c: float(value[i]) if count[i] else float("nan") for i, c in enumerate(e.channels)}

@@ -1,8 +1,8 @@
-"""Which effects explain what a model leaves: screened by their signatures, fitted by rollouts, chosen on stretches no fit saw."""
+"""Fits of effects by rollouts: one effect at many joints at once, one at the whole robot, several together."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -10,162 +10,261 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.evidence import Jury
+from workbench.gap.fitting import Solved, fit_blocks, together
+from workbench.gap.jury import COARSE, FINE, Jury, Question
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-MOST_SIZE = 20.0
-"""In typical sizes; a signature is not believed beyond that."""
-SCREENING_STEP = 2e-3
-"""Signatures are differences of rollouts at the same step, in which most of its error cancels [s]."""
+Report = Callable[[str, float | None], None]
+SCANNED = (1.0, 4.0)
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted."""
+WORTH = 0.4
+"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
+MOST_FITTED = 3
+"""Effects of the whole robot, of feet or links that are fitted at a time: those of which signatures foretell most."""
+Asking = Generator[list[Question], list[dict[int, Array]], "list[Trial]"]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate fitted beside the effects there were. gain: of chi squared by use; closed: share of what was beyond noise on
+    the choosing stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
+    much less of it than of a rival that no fit was made."""
+
+    candidate: Candidate
+    x: Array
+    gain: Mapping[str, float]
+    joint: str | None
+    foretold: bool = False
+    closed: float = 0.0
 
 
 @dataclass(frozen=True)
 class Fit:
     """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
 
-    cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
+    cost: chi squared by use ("fit", "choose", "validate"); residuals by take. jacobian: of what is fitted on all takes.
     """
 
     effects: tuple[Candidate, ...]
     x: Array
     covariance: Array
     cost: dict[str, float]
-    residuals: list[Array] = field(repr=False)
+    residuals: dict[int, Array] = field(repr=False)
+    jacobian: Array | None = field(default=None, repr=False)
 
     def slices(self) -> list[slice]:
         """Of x, for each effect."""
-        ends = np.cumsum([0, *(len(c.neutral) for c in self.effects)]).tolist()
+        ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
+
+    def sizes(self) -> list[tuple[Candidate, Array]]:
+        """Each effect with its own sizes."""
+        return [(c, self.x[s]) for c, s in zip(self.effects, self.slices())]
 
     def model(self, nominal: RobotModel) -> RobotModel:
         """The nominal robot with these effects."""
-        return with_effects(nominal, self.effects, self.x)
+        return with_effects(nominal, self.sizes())
 
 
-def with_effects(nominal: RobotModel, effects: Sequence[Candidate], x: Array) -> RobotModel:
-    """The nominal robot with effects of sizes x, one after the other."""
-    specs, at = [], 0
-    for c in effects:
-        n = len(c.neutral)
-        specs.append(c.spec(x[at:at + n]))
-        at += n
-    return replace(nominal, effects=(*nominal.effects, *specs))
-
-
-def _at_joint(c: Candidate) -> bool:
-    return "joint" in c.effect.places and len(c.where) == 1
+def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]) -> RobotModel:
+    """The nominal robot with effects of given sizes, one after the other."""
+    return replace(nominal, effects=(*nominal.effects, *(c.spec(x) for c, x in effects)))
 
 
 class Search:
-    """Screening and fitting on one session."""
+    """Fits on one session."""
 
-    def __init__(self, jury: Jury, nominal: RobotModel, pool: Sequence[Candidate]) -> None:
-        self.jury, self.nominal, self.pool = jury, nominal, list(pool)
-        self._signatures: dict[Candidate, list[list[Array]]] = {}
+    def __init__(self, jury: Jury, nominal: RobotModel) -> None:
+        self.jury, self.nominal = jury, nominal
+        self.takes = tuple(range(len(jury.evidence)))
 
-    def screen(self, report: Callable[[str, float], None] = lambda what, share: None) -> None:
-        """Rolls every candidate out at its typical size; joint effects at all joints at once, each read at its own joint."""
-        base = self.jury.residuals([self.nominal], time_step=SCREENING_STEP)[0]
-        groups: dict[tuple[str, ...], list[Candidate]] = {}
-        for c in self.pool:
-            groups.setdefault((c.effect.name, *(() if _at_joint(c) else c.where)), []).append(c)
-        for n, group in enumerate(groups.values()):
-            report(group[0].effect.name, n / len(groups))
-            takes = self.telling(group[0])
-            together = replace(group[0], where=tuple(w for c in group for w in c.where))
-            models = [with_effects(self.nominal, [together], x) for x in together.probes()]
-            for residuals in self.jury.residuals(models, takes, SCREENING_STEP):
-                of = dict(zip(takes, residuals))
-                for c in group:
-                    parts = [self._own(c, b - of[i], i) if i in of else np.zeros_like(b) for i, b in enumerate(base)]
-                    self._signatures.setdefault(c, []).append(parts)
+    def evaluated(self, effects: Sequence[tuple[Candidate, Array]], covariance: Array | None = None) -> Fit:
+        """Effects as they are, on all takes."""
+        residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes)])[0]
+        x = np.concatenate([np.empty(0), *(x for _, x in effects)])
+        cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
+        covariance = np.full((len(x), len(x)), np.inf) if covariance is None else covariance
+        return Fit(tuple(c for c, _ in effects), x, covariance, cost, residuals)
 
-    def telling(self, c: Candidate) -> list[int]:
-        """The takes on which a candidate is screened and fitted: what acts in one joint shows best where nothing else pushes
-        the robot."""
-        held = [i for i, e in enumerate(self.jury.evidence) if e.take.spec.base == "fixed"]
-        return held if held and _at_joint(c) else list(range(len(self.jury.evidence)))
+    def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
+              report: Callable[[float], None], iterations: int = 2) -> list[Trial]:
+        """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
+        each judged by its own joint's channels. takes: on which, by group."""
+        foretold: dict[str | None, float] = {}
+        wide: list[float] = []
+        asking = {n: self._trying(current, group, takes[n], foretold, wide, iterations) for n, group in enumerate(groups)}
+        done = together(asking, lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
+        return [trial for n in range(len(groups)) for trial in done[n]]
 
-    def _own(self, c: Candidate, difference: Array, take: int) -> Array:
-        """A joint effect's signature at its own joint alone, as the others of its rollout are other candidates'."""
-        if not _at_joint(c):
-            return difference
-        channels = self.jury.evidence[take].channels
-        out = np.zeros_like(difference)
-        if c.where[0] in channels:
-            i = channels.index(c.where[0])
-            out[:, i] = difference[:, i]
+    def _trying(self, current: Fit, group: Sequence[Candidate], takes: tuple[int, ...],
+                foretold: dict[str | None, float], wide: list[float], iterations: int) -> Asking:
+        jury, apart = self.jury, len(group) > 1 or group[0].joint is not None
+        joints = [c.joint if apart else None for c in group]
+        base = {i: current.residuals[i] for i in takes}
+        r0 = [jury.vector(base, "fit", j) for j in joints]
+
+        def question(sizes: Sequence[Array | None], step: float = 1.0) -> Question:
+            new = [(c, x) for c, x in zip(group, sizes) if x is not None]
+            return Question(with_effects(self.nominal, [*current.sizes(), *new]), takes, step)
+
+        def left(answer: dict[int, Array]) -> list[Array]:
+            return [jury.vector(answer, "fit", j) for j in joints]
+
+        probes = _scan(group[0])
+        none: list[Array | None] = [None] * len(group)
+        answers = yield [question(none, COARSE), *(question([p] * len(group), COARSE) for p in probes)]
+        without = left(answers[0])
+        seen = [[r + v - w for r, v, w in zip(r0, left(a), without)] for a in answers[1:]]
+        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen]) for b, c in enumerate(group)]
+        starts, gains = [g[0] for g in guesses], [g[1] for g in guesses]
+        wide += [g for j, g in zip(joints, gains) if j is None]
+        for j, gain in zip(joints, gains):
+            foretold[j] = max(foretold.get(j, 0.0), gain)
+        yield []  # until all have said what they foretell
+        best = max(foretold.values(), default=0.0)
+        last = sorted(wide, reverse=True)[:MOST_FITTED][-1] if wide else 0.0
+        least = [max(WORTH * best, last) if j is None else WORTH * foretold[j] for j in joints]
+        worth = [g > 0 and g >= enough for g, enough in zip(gains, least)]
+        alive = [b for b, w in enumerate(worth) if w]
+        out = [Trial(c, x, {"fit": min(g, 0.0), "choose": min(g, 0.0)}, j, foretold=True)
+               for c, x, g, j, w in zip(group, starts, gains, joints, worth) if not w]
+        if not alive:
+            return out
+
+        def spread(point: Sequence[Array]) -> list[Array | None]:
+            sizes: list[Array | None] = [None] * len(group)
+            for b, x in zip(alive, point):
+                sizes[b] = x
+            return sizes
+
+        first = (yield [question(spread([starts[b] for b in alive]))])[0]
+        start_left = left(first)
+        bounds = [group[b].bounds() for b in alive]
+        fit = fit_blocks([starts[b] for b in alive], [start_left[b] for b in alive], bounds, iterations)
+        solved: list[Solved] | None = None
+        try:
+            points = next(fit)
+            while True:
+                answers = yield [question(spread(p)) for p in points]
+                lefts = [left(a) for a in answers]
+                points = fit.send([[v[b] for b in alive] for v in lefts])
+        except StopIteration as end:
+            solved = end.value
+        assert solved is not None
+        final = (yield [question(spread([s.x for s in solved]))])[0]
+        for b, s in zip(alive, solved):
+            off = {use: float(np.sum(jury.vector(base, use, joints[b]) ** 2) - np.sum(jury.vector(final, use, joints[b]) ** 2))
+                   for use in ("fit", "choose")}
+            was = jury.vector(base, "choose", joints[b])
+            beyond = float(was @ was) - np.count_nonzero(was)
+            out.append(Trial(group[b], s.x, off, joints[b], closed=off["choose"] / max(beyond, 1.0)))
         return out
 
-    def rank(self, residuals: Sequence[Array]) -> list[tuple[float, Candidate, Array]]:
-        """Candidates by how much of chi squared their signature could take away: (gain, candidate, sizes), best first.
+    def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
+        """All effects' sizes fitted together (or those of the effects listed in `free`), with their covariance."""
+        chosen = list(range(len(current.effects))) if free is None else list(free)
+        moving = np.concatenate([np.empty(0, dtype=int), *(np.arange(s.start, s.stop) for i, s in enumerate(current.slices())
+                                                           if i in chosen)]).astype(int)
+        if not len(moving):
+            return current
+        ends = [c.bounds() for c in current.effects]
+        low, high = (np.concatenate([e[k] for e in ends])[moving] for k in (0, 1))
 
-        Fitted on the stretches for fitting, gained on those for choosing.
-        """
-        r_fit, r_choose = (self.jury.vector(residuals, use) for use in ("fit", "choose"))
-        out = []
-        for c, parts in self._signatures.items():
-            S_fit = np.stack([self.jury.vector(p, "fit") for p in parts], axis=1)
-            S_choose = np.stack([self.jury.vector(p, "choose") for p in parts], axis=1)
-            x, *_ = np.linalg.lstsq(S_fit, r_fit, rcond=1e-8)
-            sizes = c.start(np.clip(x, -MOST_SIZE, MOST_SIZE))
-            gain = float(r_choose @ r_choose - np.sum((r_choose - S_choose @ c.probed(sizes)) ** 2))
-            out.append((gain, c, sizes))
-        return sorted(out, key=lambda row: -row[0])
+        def question(point: Sequence[Array]) -> Question:
+            x = current.x.copy()
+            x[moving] = point[0]
+            return Question(with_effects(self.nominal, list(zip(current.effects, [x[s] for s in current.slices()]))), takes)
 
-    def fit(self, effects: Sequence[Candidate], x: Array, iterations: int = 4, takes: Sequence[int] | None = None,
-            free: NDArray[np.int_] | None = None) -> Fit:
-        """Levenberg-Marquardt on the stretches for fitting; the Jacobian by batched rollouts. takes: which enter the fit (all
-        are judged at the end). free: indices of the sizes to fit; the others keep theirs."""
-        low, high = self._bounds(effects)
-        x = np.clip(np.asarray(x, dtype=float), low, high)
-        free = np.arange(len(x)) if free is None else free
-        if not len(free):
-            return self._finished(effects, x, np.zeros((0, len(x))), 0)
-        r = self._vectors(effects, [x], takes)[0]
-        damping = 1e-3
-        J = np.zeros((len(r), len(x)))
-        for _ in range(iterations):
-            step = 0.15 * np.maximum(np.abs(x), 0.3)
-            step = np.where(x + step <= high, step, -step)
-            moved = [x + np.eye(len(x))[i] * step[i] for i in free]
-            J[:, free] = np.stack([(v - r) / step[i] for i, v in zip(free, self._vectors(effects, moved, takes))], axis=1)
-            H, g = J[:, free].T @ J[:, free], J[:, free].T @ r
-            trials = []
-            for scale in (damping, damping * 30 + 0.3):
-                trial = x.copy()
-                trial[free] -= np.linalg.lstsq(H + scale * np.diag(np.maximum(np.diag(H), 1e-9)), g, rcond=None)[0]
-                trials.append(np.clip(trial, low, high))
-            tried = self._vectors(effects, trials, takes)
-            costs = [float(v @ v) for v in tried]
-            best, before = int(np.argmin(costs)), float(r @ r)
-            if costs[best] >= before:
-                break
-            settled = before - costs[best] < 2e-3 * before
-            damping = damping / 3 if best == 0 else damping * 10
-            x, r = trials[best], tried[best]
-            if settled:
-                break
-        return self._finished(effects, x, J, len(free))
-
-    def _finished(self, effects: Sequence[Candidate], x: Array, J: Array, fitted: int) -> Fit:
-        residuals = self.jury.residuals([with_effects(self.nominal, effects, x)])[0]
-        cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
-        samples = int(np.count_nonzero(self.jury.vector(residuals, "fit")))
+        r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
+        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations)
+        solved: list[Solved] | None = None
+        try:
+            points = next(fit)
+            while True:
+                answers = self.jury.residuals([question(p) for p in points])
+                points = fit.send([[self.jury.vector(a, "fit")] for a in answers])
+        except StopIteration as end:
+            solved = end.value
+        assert solved is not None
+        x = current.x.copy()
+        x[moving] = solved[0].x
         covariance = np.full((len(x), len(x)), np.inf)
-        H = J.T @ J
-        if fitted and np.any(H):
-            scale = np.sqrt(np.maximum(np.diag(H), 1e-12))
-            values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-            covariance = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale)
-            covariance *= max(1.0, cost["fit"] / max(1, samples))
-        return Fit(tuple(effects), x, covariance, cost, residuals)
+        covariance[np.ix_(moving, moving)] = _covariance(solved[0])
+        fitted = self.evaluated(list(zip(current.effects, [x[s] for s in current.slices()])), covariance)
+        return replace(fitted, jacobian=solved[0].J) if takes == self.takes and len(moving) == len(x) else fitted
 
-    def _vectors(self, effects: Sequence[Candidate], xs: Sequence[Array], takes: Sequence[int] | None) -> list[Array]:
-        done = self.jury.residuals([with_effects(self.nominal, effects, x) for x in xs], takes)
-        return [self.jury.vector(r, "fit", takes) for r in done]
+    def refined(self, fit: Fit) -> Fit:
+        """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
+        cent. One Gauss-Newton step with the search's Jacobian, halved while it makes things worse; a quarter of the way counts
+        as a standard deviation more."""
+        x = fit.x
+        last = self._finely(fit, x)
+        J = fit.jacobian
+        if J is None or not len(x) or not np.isfinite(fit.covariance).any():
+            return last
+        r = self.jury.vector(last.residuals, "fit")
+        move = -np.linalg.lstsq(J.T @ J + 1e-6 * np.diag(np.diag(J.T @ J) + 1e-12), J.T @ r, rcond=None)[0]
+        low, high = (np.concatenate([c.bounds()[k] for c in fit.effects]) for k in (0, 1))
+        for share in (1.0, 0.4):
+            there = self._finely(fit, np.clip(x + share * move, low, high))
+            if there.cost["fit"] < last.cost["fit"]:
+                return replace(there, covariance=fit.covariance + np.diag(((there.x - x) / 4) ** 2))
+        return last
 
-    def _bounds(self, effects: Sequence[Candidate]) -> tuple[Array, Array]:
-        ends = [c.bounds() for c in effects]
-        return np.concatenate([e[0] for e in ends] or [np.empty(0)]), np.concatenate([e[1] for e in ends] or [np.empty(0)])
+    def _finely(self, fit: Fit, x: Array) -> Fit:
+        effects = list(zip(fit.effects, [x[s] for s in fit.slices()]))
+        residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes, FINE)])[0]
+        cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
+        return replace(fit, x=x, cost=cost, residuals=residuals)
+
+
+def _covariance(solved: Solved) -> Array:
+    """Of a block's sizes, inflated where residuals are larger than their sigma says; infinite where nothing depends on them."""
+    H = solved.J.T @ solved.J
+    known = np.diag(H) > 1e-9
+    out = np.full(H.shape, np.inf)
+    if not known.any():
+        return out
+    scale = np.sqrt(np.diag(H)[known])
+    values, vectors = np.linalg.eigh(H[np.ix_(known, known)] / np.outer(scale, scale))
+    samples = max(1, int(np.count_nonzero(solved.r)))
+    inner = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale) * max(1.0, solved.cost / samples)
+    out[np.ix_(known, known)] = inner
+    return out
+
+
+def _scan(c: Candidate) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several; of more, each alone."""
+    if c.read_off:
+        return [np.ones(c.size)]
+    probes = c.probes()
+    if len(probes) > 1 or not c.size or c.joint is None:
+        return probes
+    high = c.bounds()[1]
+    sizes = [np.minimum(s * probes[0], high) for s in SCANNED]
+    return sizes if not np.allclose(sizes[0], sizes[1]) else sizes[:1]
+
+
+def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array]) -> tuple[Array, float]:
+    """Sizes to start from, and how much of the sum of squares signatures say they take away."""
+    whole = float(r0 @ r0)
+    if not c.size:
+        return np.empty(0), whole - float(seen[0] @ seen[0])
+    low, high = c.bounds()
+    if len({int(np.argmax(np.abs(p))) for p in probes}) > 1:  # each number alone
+        S = np.stack([(v - r0) for v in seen], axis=1)
+        each, *_ = np.linalg.lstsq(S, -r0, rcond=1e-8)
+        x = np.clip(np.sum([s * p for s, p in zip(each, probes)], axis=0), low, high)
+        kept = np.array([float(x @ p / max(float(p @ p), 1e-9)) for p in probes])
+        return x, whole - float(np.sum((r0 + S @ kept) ** 2))
+    best = (probes[0], -np.inf)
+    for p, v in zip(probes, seen):
+        S = v - r0
+        power = float(S @ S)
+        size = float(np.clip(-(S @ r0) / power, -5.0, 5.0)) if power > 1e-9 else 0.0
+        x = np.clip(size * p, low, high)
+        gain = whole - float(np.sum((r0 + S * float(x @ p / max(float(p @ p), 1e-9))) ** 2))
+        if gain > best[1]:
+            best = (x, gain)
+    return best

@@ -1,82 +1,206 @@
-"""Forward and backward: which effects stay, judged on stretches that no fit saw."""
+"""Forward and backward: which effects stay, judged on stretches that no fit saw.
+
+First what held takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground adds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from workbench.gap.candidates import Candidate
-from workbench.gap.search import Fit, Search
+from workbench.gap.candidates import Candidate, heavy_links
+from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.ledger import channel_gaps
+from workbench.gap.search import Fit, Report, Search, Trial
 
-Report = Callable[[str, float | None], None]
-MOST_EFFECTS = 4
-SHORTLIST = 5
-LEAST_SHARE = 0.25
-"""Of the best screening gain, below which a candidate is not simulated."""
-LEAST_GAIN, LEAST_RELATIVE_GAIN = 60.0, 0.03
-"""Of chi squared on the choosing stretches that an effect must bring: absolutely (a likelihood ratio of e^30, since neighbouring
-frames share what the model lacks), and as a share of what was there."""
-TEMPER = 4.0
-"""Neighbouring frames err alike: chi squared differences count a quarter when they become probabilities."""
+MOST_EFFECTS = 6
+LEAST_GAIN = 30.0
+"""Of chi squared on the choosing stretches that each number of an effect must bring."""
+LEAST_SHARE = 0.05
+"""Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
+again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
+that."""
+LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
+"""Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
+several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
+CLEARLY = 20.0
+"""Times that gain, from which on an effect is missed whatever the others do in its place."""
+ENOUGH = 0.6
+"""Share of a gap from which on what hangs on links is not asked for."""
+ALIKE = 0.25
+"""Joints whose best gain is this share of the greatest are taken in the same round."""
 
 
 @dataclass(frozen=True)
 class Round:
-    """One step of the selection: rivals fitted beside what had been chosen, the best first."""
+    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken."""
 
     before: Fit
-    trials: tuple[Fit, ...]
-    accepted: bool
+    trials: tuple[Trial, ...]
+    accepted: tuple[Trial, ...]
 
-    def added(self, fit: Fit) -> Candidate:
-        """The effect that a trial adds."""
-        return fit.effects[-1]
-
-    def probabilities(self) -> list[float]:
-        """Of the trials, given that one of them is the effect: likelihoods on the choosing stretches, tempered."""
-        cost = np.array([f.cost["choose"] for f in self.trials])
-        weight = np.exp(-0.5 * (cost - cost.min()) / TEMPER)
-        return [float(w) for w in weight / weight.sum()]
+    def rivals(self, trial: Trial) -> list[Trial]:
+        """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
+        place = trial.joint
+        return [t for t in self.trials if place is None or t.joint in (place, None)]
 
 
-def select(search: Search, report: Report) -> tuple[Fit, list[Round]]:
+@dataclass(frozen=True)
+class Chosen:
     """The effects that stay, fitted together, and how they were found."""
-    current = search.fit([], np.empty(0))
+
+    fit: Fit
+    rounds: tuple[Round, ...]
+
+
+def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
+    """The effects that stay."""
+    evidence = search.jury.evidence
+    held = tuple(i for i, e in enumerate(evidence) if e.take.spec.base == "fixed")
+    current = nominal = search.evaluated([])
     rounds: list[Round] = []
+    for takes in dict.fromkeys(t for t in (held, search.takes) if t):
+        current = _phase(search, pool, nominal, current, takes, held, rounds, report)
+    current = _without_part_answers(search, current, rounds)
+    if len(current.effects):
+        report("fitting together", None)
+        current = search.refitted(without_idle(search, current), search.takes, 3)
+    return Chosen(current, tuple(rounds))
+
+
+def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...]) -> dict[str, float]:
+    """Channels with a gap that is not just what is left of a larger one."""
+    evidence = search.jury.evidence
+    out: dict[str, float] = {}
+    for i in takes:
+        was, now = channel_gaps(evidence[i], nominal.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
+        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > LEAST_SHARE * (was.get(c, 0.0)**2 - 1)}
+    return out
+
+
+def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...], held: tuple[int, ...],
+           rounds: list[Round], report: Report) -> Fit:
     while len(current.effects) < MOST_EFFECTS:
-        chosen = {(c.effect.name, c.where) for c in current.effects}
-        ranked = [row for row in search.rank(current.residuals) if (row[1].effect.name, row[1].where) not in chosen]
-        shortlist = [row for row in ranked[:SHORTLIST] if row[0] > max(LEAST_GAIN / 2, LEAST_SHARE * ranked[0][0])]
-        trials = []
-        for n, (_, candidate, size) in enumerate(shortlist):
-            report(f"fitting {candidate} ({len(rounds) + 1})", n / len(shortlist))
-            trials.append(add(search, current, candidate, size))
-        trials.sort(key=lambda f: f.cost["choose"])
-        accepted = bool(trials) and worthwhile(current, trials[0])
-        rounds.append(Round(current, tuple(trials), accepted))
+        beyond = _remaining(search, current, nominal, takes)
+        if not beyond:
+            break
+        what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
+        say = partial(report, f"explaining {what} ({len(rounds) + 1})")
+        trials: list[Trial] = []
+        for tier in range(3):
+            groups, on = _groups(search, pool, current, beyond, takes, held, tier)
+            trials += search.tried(current, groups, on, say)
+            trials.sort(key=lambda t: -t.gain["choose"])
+            if trials and trials[0].closed > ENOUGH:
+                break
+        accepted = _accepted(trials, rounds)
+        rounds.append(Round(current, tuple(trials), tuple(accepted)))
         if not accepted:
             break
-        current = trials[0]
+        current = search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
         if len(current.effects) > 1:
-            report("fitting together", None)
-            joint = search.fit(current.effects, current.x, iterations=2)
-            current = joint if joint.cost["fit"] < current.cost["fit"] else current
-    return without_idle(search, current), rounds
+            current = search.refitted(current, takes, 1)
+    return current
 
 
-def add(search: Search, current: Fit, candidate: Candidate, size: Sequence[float] | np.ndarray) -> Fit:
-    """`current` and one effect more, whose numbers alone are fitted."""
-    x = np.concatenate([current.x, np.asarray(size, dtype=float)])
-    free = np.arange(len(current.x), len(x))
-    return search.fit([*current.effects, candidate], x, iterations=3, takes=search.telling(candidate), free=free)
+def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
+            held: tuple[int, ...], tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
+    """What to try, and on which takes: effects of joints at the joints with a gap, all joints at once; others one by one.
+    tier: what is likely comes first, as there is so much of the rest."""
+    joints = {joint_of(c) for c in beyond}
+    grounded = tuple(i for i in takes if i not in held)
+    ill = {joint_of(c) for i in held for c in channel_gaps(search.jury.evidence[i], current.residuals[i])}
+
+    def settled(c: Candidate) -> bool:
+        """What the whole robot's servos lack would show with the base held, too."""
+        return bool(held) and not ill and not c.where and c.effect.layer in ("timing", "actuator")
+
+    used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
+    groups: dict[object, list[Candidate]] = {}
+    on: list[tuple[int, ...]] = []
+    for c in pool:
+        if c.key in used or _tier(c, bool(grounded), heavy) != tier:
+            continue
+        if c.effect.layer == "measurement":
+            groups[c.key] = [c]
+        elif c.joint is not None:
+            if c.joint in joints:
+                groups.setdefault(c.key if c.read_off else (c.name, "joint"), []).append(c)
+            elif c.name == "zero_offset" and grounded:
+                groups[c.key] = [c]
+        elif c.effect.layer == "ground" and c.name != "ground_tilt" and not grounded:
+            continue
+        elif (grounded and not settled(c)) or (not grounded and _could_show(search, c, joints)):
+            groups[c.key] = [c]
+    for group in groups.values():
+        c = group[0]
+        alone = grounded and (c.effect.layer in ("ground", "inertia") or c.name in ("zero_offset", "link_length"))
+        on.append(grounded if alone or (c.joint and grounded) else takes)
+    return list(groups.values()), dict(enumerate(on))
 
 
-def worthwhile(before: Fit, after: Fit) -> bool:
-    """Whether an effect lowers chi squared on the choosing stretches by more than chance and shared errors allow."""
-    gain = before.cost["choose"] - after.cost["choose"]
-    return gain > LEAST_GAIN * max(1, len(after.x) - len(before.x)) and gain > LEAST_RELATIVE_GAIN * before.cost["choose"]
+def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
+    """With the base held, joints and the whole robot come first, then links. On the ground, where joints have been seen to,
+    ground and load come first, then joints, then lengths."""
+    if not grounded:
+        return 1 if "link" in c.effect.places else 0
+    if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
+        return 2
+    return 1 if c.joint is not None else 0
+
+
+def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
+    """Whether an effect could make these joints err with the base held: one of the whole robot errs in several, one of a link in
+    the joints that carry it."""
+    if c.effect.layer == "ground" and c.name != "ground_tilt":
+        return False
+    k = search.nominal.kinematics
+    if not c.where:
+        return len(joints) > 1 or len(search.nominal.joints) < 3
+    carrying = {k.joint_of(link) for link in (*k.ancestors(c.where[0]), c.where[0])}
+    return bool(carrying & joints)
+
+
+def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[Trial]:
+    """The best, and the best at other joints where it is about as good; nothing where the best is not worth it."""
+    worth = [t for t in trials if not t.foretold and _worthwhile(t, rounds)]
+    if not worth:
+        return []
+    best = worth[0]
+    if best.joint is None:
+        return [best]
+    out = [best]
+    for t in worth[1:]:
+        if t.joint is not None and t.joint not in {o.joint for o in out} and t.gain["choose"] > ALIKE * best.gain["choose"]:
+            out.append(t)
+    return out
+
+
+def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
+    gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
+    brought = sum(a.gain["choose"] for r in rounds for a in r.accepted if t.joint is None or a.joint in (None, t.joint))
+    if gain <= max(LEAST_GAIN * max(1, t.candidate.size), LEAST_SHARE * brought):
+        return False
+    return t.closed > LEAST_CLOSED
+
+
+def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
+    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
+    was, left = (search.jury.vector(f.residuals, "choose", t.joint) for f in (r.before, now))
+    beyond = float(was @ was) - np.count_nonzero(was)
+    return 1.0 - (float(left @ left) - np.count_nonzero(left)) / max(beyond, 1.0)
+
+
+def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
+    """Without effects, from the last one back, that left half of what was there and that no other completed."""
+    for r in reversed(rounds):
+        for t in r.accepted:
+            if completed(search, r, t, current) < LAST_CLOSED:
+                current = search.evaluated([s for s in current.sizes() if s[0].key != t.candidate.key])
+    return current
 
 
 def without_idle(search: Search, current: Fit) -> Fit:
@@ -84,9 +208,10 @@ def without_idle(search: Search, current: Fit) -> Fit:
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
             break
-        keep = [j for j in range(len(current.effects)) if j != i]
-        x = np.concatenate([current.x[current.slices()[j]] for j in keep])
-        rest = search.fit([current.effects[j] for j in keep], x, iterations=1)
-        if not worthwhile(rest, current):
+        least = LEAST_GAIN * max(1, current.effects[i].size)
+        rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
+        if rest.cost["choose"] - current.cost["choose"] < CLEARLY * least:
+            rest = search.refitted(rest, search.takes, 1)
+        if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
     return current

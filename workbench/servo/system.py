@@ -91,8 +91,8 @@ class ServoBank(LeafSystem):
         context.SetDiscreteState(0, np.asarray(reference, dtype=float))
 
     def ShiftRamp(self, context: Context, seconds: float) -> None:
-        """Moves the ramp on, or back where `seconds` is negative: a command that comes between two periods has gone on for a while
-        when the next begins, and the one before has gone too far. A ramp that has arrived does not go back."""
+        """Moves the ramp on, or back where `seconds` is negative: a command that comes between two periods has gone on for a
+        while when the next begins, and the one before has gone too far. A ramp that has arrived does not go back."""
         goal, down, up, on = self._command(context)
         reference, share = context.get_discrete_state(0).CopyToVector(), abs(seconds) / self._period
         step = np.minimum(np.maximum(goal - reference, down * share), up * share)

@@ -15,7 +15,7 @@ from workbench.robot import RobotModel
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Array, Simulation, Start
 
-KEPT_STATIONS = 8
+KEPT_STATIONS = 3
 
 
 @dataclass(frozen=True)

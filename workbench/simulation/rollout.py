@@ -283,8 +283,8 @@ class Simulation:
 
 
     def _command_at(self, t: float, commands: Commands, k: int) -> None:
-        """Sends command k at time t [s]; one that comes between two steps of a discrete plant ramps from then on, not from the next
-        step on."""
+        """Sends command k at time t [s]; one that comes between two steps of a discrete plant ramps from then on, not from the
+        next step on."""
         step = self.config.time_step
         late = step * np.ceil(t / step - 1e-6) - t if step and self.config.drive == "servo" else 0.0
         bank, context = self._bank()

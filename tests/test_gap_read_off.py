@@ -1,0 +1,81 @@
+"""What no search finds and the recordings show: stops, missed poses, turned marker frames, loose mounts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.gap_sessions import record_arm
+from tests.test_gap_search import CONFIG
+from workbench.gap.compare_session import roll_out, run_of
+from workbench.gap.evidence import gather
+from workbench.gap.jury import Jury, Question
+from workbench.gap.missed import with_missed
+from workbench.gap.registered import read_takes, register_takes
+from workbench.gap.session import load_session
+from workbench.gap.special import special
+from workbench.robot import EffectSpec
+from workbench.simulation.batch import run_job
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("arm")
+    record_arm(folder)
+    session = load_session(folder / "session.yaml")
+    takes, _ = read_takes(session)
+    rollouts = roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1, floors=False)
+    registered, _ = register_takes(session, takes, {t.spec.name: r.nominal for t, r in zip(takes, rollouts)})
+    evidence = gather(registered, {t.spec.name: r for t, r in zip(takes, rollouts)})
+    return session.model, Jury(evidence, CONFIG, n_jobs=1)
+
+
+def recorded_with(quiet, model, commands=None):
+    """The jury's take as another robot, or other commands, would have made it, with the noise that it had."""
+    nominal, jury = quiet
+    e = jury.evidence[0]
+    noise = e.recorded - e.simulated(run_job(jury.job(nominal, 0, CONFIG)), nominal)
+    job = replace(jury.job(model, 0, CONFIG), commands=commands or e.take.commands)
+    return jury.on([replace(e, recorded=e.simulated(run_job(job), model) + noise)])
+
+
+def nominal_residuals(quiet, jury):
+    return jury.residuals([Question(quiet[0], (0,))])[0]
+
+
+def test_a_quiet_arm_suggests_nothing(quiet):
+    residuals = nominal_residuals(quiet, quiet[1])
+    assert special(quiet[0], quiet[1].evidence, residuals) == []
+    assert with_missed(quiet[1], quiet[0], residuals)[1] == ()
+
+
+def test_a_stop_is_read_off_where_the_joint_stands_while_the_model_goes_on(quiet):
+    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 18.0}),))
+    jury = recorded_with(quiet, stopped)
+    (found,) = special(quiet[0], jury.evidence, nominal_residuals(quiet, jury))
+    assert found.key == ("joint_stop", ("two",))
+    assert found.size == 1
+    assert found.values(np.ones(1))[1] == pytest.approx(18.0, abs=0.7)
+
+
+def test_a_loose_mount_is_read_off_with_its_axis(quiet):
+    loose = replace(quiet[0], effects=(EffectSpec("loose_mount", ("two",), {"play": 6.0, "axis": (1.0, 0.0, 0.0)}),))
+    jury = recorded_with(quiet, loose)
+    found = [c for c in special(quiet[0], jury.evidence, nominal_residuals(quiet, jury)) if c.name == "loose_mount"]
+    assert [c.where for c in found] == [("two",)]
+    assert np.abs(found[0].values(np.ones(1))[1:]) == pytest.approx([1, 0, 0], abs=0.2)
+
+
+def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
+    commands = quiet[1].evidence[0].take.commands
+    goals, c = commands.goals.copy(), commands.column("one")
+    goals[1, c] = goals[0, c]
+    jury = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
+    before = nominal_residuals(quiet, jury)
+    jury, (missed,) = with_missed(jury, quiet[0], before)
+    assert (missed.joint, missed.count, missed.of) == ("one", 1, len(commands.times))
+    finding = missed.finding()
+    share = finding.parameters["probability"]
+    assert share.low < share.value < share.high
+    after = nominal_residuals(quiet, jury)
+    assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))

@@ -1,0 +1,180 @@
+"""From a fit to findings: numbers with intervals, rivals, what is left over, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.candidates import Candidate
+from workbench.gap.contest import Standing
+from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_of, ratios
+from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
+from workbench.gap.ledger import GAP_RATIO, in_file_units
+from workbench.gap.missed import Missed
+from workbench.gap.search import Fit
+from workbench.gap.selection import Round
+from workbench.robot.model_file import Posterior, parameter_names
+
+Array = NDArray[np.float64]
+Residuals = Mapping[int, Array]
+Z90 = 1.645
+WIDER = 1.5
+"""Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
+engine, or the world, is not ours."""
+LEAST_RELATIVE = 0.01
+"""Standard deviation that no number's interval goes below, in shares of the number."""
+
+
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
+    """The contract's word."""
+    if not gap:
+        return "no_gap"
+    if not findings:
+        return "unexplained"
+    return "partly_explained" if left else "explained"
+
+
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals
+            ) -> Finding:
+    """Effect i of a fit. before, after: residuals by take of the nominal and the fitted model."""
+    c, x = fit.sizes()[i]
+    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals[:1]
+                         if r.probability >= 0.01)
+    numbers = estimates(c, x, deviations(fit)[fit.slices()[i]])
+    return Finding(
+        effect=c.name, where=c.where, confidence=standing.probability, parameters=numbers,
+        alternatives=alternatives, fit=change(evidence, c.where, before, after, "fit"),
+        validation=change(evidence, c.where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
+
+
+def deviations(fit: Fit) -> Array:
+    """Standard deviations of a fit's sizes, as wide as they are believed."""
+    return np.asarray(WIDER * np.sqrt(np.diag(fit.covariance)))
+
+
+def estimates(c: Candidate, x: Array, sd: Array) -> dict[str, Estimate]:
+    """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
+    half = Z90 * sd
+    with np.errstate(invalid="ignore"):
+        ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
+    values = np.array(c.values(x))
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    least = Z90 * LEAST_RELATIVE * np.abs(values)
+    low, high = np.minimum(low, values - least), np.maximum(high, values + least)
+    unknown = np.array([True] * len(values))
+    unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
+    low[unknown], high[unknown] = -np.inf, np.inf
+    out: dict[str, Estimate] = {}
+    at = 0
+    for p in c.effect.parameters:
+        if p.vector:
+            three = [tuple(float(v) for v in column[at:at + 3]) for column in (values, low, high)]
+            out[p.name] = Estimate(three[0], three[1], three[2], p.unit)  # type: ignore[arg-type]
+        else:
+            out[p.name] = Estimate(float(values[at]), float(low[at]), float(high[at]), p.unit)
+        at += 3 if p.vector else 1
+    return out
+
+
+def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Residuals, after: Residuals, use: str) -> Change:
+    """RMS error [deg] of the joints concerned (all of them for a robot, foot or link), before and after."""
+    all_joints = list(evidence[0].joints)
+    joints = [c for c in all_joints if c in where] or all_joints
+
+    def error(residuals: Residuals) -> float:
+        parts = []
+        for i, e in enumerate(evidence):
+            columns = [e.channels.index(j) for j in joints if j in e.channels]
+            parts.append(np.square((residuals[i] * e.sigma)[e.uses[use]][:, columns]).ravel())
+        return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
+
+    return Change(error(before), error(after), "deg")
+
+
+def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
+             ) -> tuple[Rejected, ...]:
+    """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
+    kept = {c.key for c in fit.effects}
+    out: dict[object, Rejected] = {}
+    for c, standing in zip(fit.effects, standings):
+        for rival in standing.rivals:
+            if rival.candidate.key not in kept and rival.fit is not None:
+                reason = f"in place of {c} it leaves {rival.behind:.0f} more of chi squared on stretches that no fit saw"
+                left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate")
+                out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where, reason, left)
+    for r in rounds:
+        for t in r.trials:
+            key = t.candidate.key
+            if key in kept or key in out:
+                continue
+            best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
+            if t.foretold:
+                reason = "its signature is not that of what is missing"
+            elif best is None:
+                reason = "what it takes away is no more than chance, or too little of what is missing there"
+            else:
+                reason = f"{best.candidate} takes {best.gain['choose']:.0f} off chi squared on the choosing stretches, this " \
+                         f"{t.gain['choose']:.0f}"
+            out[key] = Rejected(t.candidate.name, t.candidate.where, reason)
+    return tuple(out.values())
+
+
+def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals) -> tuple[Unexplained, ...]:
+    """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on."""
+    out = []
+    for i, e in enumerate(evidence):
+        for c, r in ratios(e, residuals[i], "validate").items():
+            if not r > GAP_RATIO:
+                continue
+            column = e.channels.index(c)
+            floor, unit = in_file_units(float(e.sigma[column]), c)
+            out.append(Unexplained(() if c in BODY else (joint_of(c),), r * floor, floor, unit,
+                                   f"{e.name}: {_depends(e, residuals[i][:, column], c)}"))
+    return tuple(out)
+
+
+def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
+    """What a residual goes with: its joint's angle, speed, acceleration (load), direction, or time."""
+    what = f"{channel}, " if channel in BODY else f"across its axis ({channel}), " if ACROSS in channel else ""
+    signals = {"time": e.take.recorded.time}
+    if channel not in BODY:
+        q = e.take.recorded.q[:, e.take.recorded.column(joint_of(channel))]
+        v = np.gradient(q, e.take.recorded.time)
+        signals |= {"angle": q, "size of the angle": np.abs(q), "speed": v, "direction of motion": np.sign(v) * (np.abs(v) > 0.2)}
+    found = {}
+    for name, s in signals.items():
+        good = np.isfinite(residual) & np.isfinite(s)
+        if good.sum() > 20 and np.std(s[good]) > 0 and np.std(residual[good]) > 0:
+            found[name] = abs(float(np.corrcoef(residual[good], s[good])[0, 1]))
+    best = max(found, key=lambda k: found[k]) if found else ""
+    told = best and found[best] > 0.3
+    return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
+
+
+def posterior(fit: Fit, missed: Sequence[Missed] = ()) -> Posterior:
+    """Of all numbers in the contract's units; variances by the local slope between a size and its value."""
+    if not fit.effects and not missed:
+        return Posterior()
+    names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))
+    mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
+    slopes = np.zeros((len(mean), len(fit.x)))
+    for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
+        for k, n in enumerate(range(s.start, s.stop)):
+            step = np.eye(c.size)[k] * 1e-4
+            ends = [np.array(c.values(fit.x[s] + sign * step)) for sign in (1, -1)]
+            slopes[row:row + len(c.neutral), n] = (ends[0] - ends[1]) / 2e-4
+    known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
+    inner = WIDER**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
+    covariance = slopes @ inner @ slopes.T
+    lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
+    covariance[lost] = covariance[:, lost] = np.inf
+    for m in missed:  # a share's variance
+        names += list(parameter_names([m.spec]))
+        mean = np.append(mean, m.probability)
+        wider = np.zeros((len(mean), len(mean)))
+        wider[:-1, :-1] = covariance
+        wider[-1, -1] = m.probability * (1 - m.probability) / m.of
+        covariance = wider
+    return Posterior(tuple(names), mean, covariance)

@@ -1,0 +1,124 @@
+"""Levenberg-Marquardt in lockstep: many small fits whose rollouts share one batch.
+
+A fit is a generator that yields the points it wants evaluated and is sent what they leave. Its numbers fall into blocks that
+do not feel each other (one joint each), so that one rollout moves all blocks at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Point = list[Array]
+"""Sizes, by block."""
+Left = list[Array]
+"""Residual vectors, by block."""
+Asks = Generator[list[Point], list[Left], "list[Solved]"]
+T = TypeVar("T")
+SETTLED = 3e-3
+"""A fit ends where a step takes less than this share off the sum of squares."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One block's end. x: sizes; r: what they leave; J: of r with respect to x, there or a step before."""
+
+    x: Array
+    r: Array
+    J: Array
+
+    @property
+    def cost(self) -> float:
+        return float(self.r @ self.r)
+
+
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int) -> Asks:
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number; a block of one number goes on
+    with secants."""
+    x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
+    r = list(left)
+    J = [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
+    fresh = [False] * len(x)
+    damping = [1e-3] * len(x)
+    open_ = [len(x_b) > 0 for x_b in x]
+    for _ in range(iterations):
+        if not any(open_):
+            break
+        stale = [o and not f for o, f in zip(open_, fresh)]
+        if any(stale):
+            columns = max(len(x_b) for x_b, s in zip(x, stale) if s)
+            steps = [_steps(x_b, *b) for x_b, b in zip(x, bounds)]
+            points = [[x_b + np.eye(len(x_b))[i] * h[i] if s and i < len(x_b) else x_b for x_b, h, s in zip(x, steps, stale)]
+                      for i in range(columns)]
+            for i, answer in enumerate((yield points)):
+                for b, v in enumerate(answer):
+                    if stale[b] and i < len(x[b]):
+                        J[b][:, i] = (v - r[b]) / steps[b][i]
+        trials = [[_step(x_b, r_b, J_b, d * k + extra, *b) if o else x_b
+                   for x_b, r_b, J_b, d, b, o in zip(x, r, J, damping, bounds, open_)] for k, extra in ((1, 0.0), (30, 0.3))]
+        answers = yield trials
+        for b in range(len(x)):
+            if not open_[b]:
+                continue
+            costs = [float(a[b] @ a[b]) for a in answers]
+            best, before = int(np.argmin(costs)), float(r[b] @ r[b])
+            if not costs[best] < before:
+                open_[b] = fresh[b] is True  # a secant may have misled: once more with a difference
+                fresh[b] = False
+                continue
+            moved = trials[best][b] - x[b]
+            if len(moved) == 1 and moved[0]:
+                J[b][:, 0] = (answers[best][b] - r[b]) / moved[0]
+                fresh[b] = True
+            else:
+                fresh[b] = False
+            open_[b] = before - costs[best] > SETTLED * before
+            damping[b] = damping[b] / 3 if best == 0 else damping[b] * 10
+            x[b], r[b] = trials[best][b], answers[best][b]
+    return [Solved(*solved) for solved in zip(x, r, J)]
+
+
+def _steps(x: Array, low: Array, high: Array) -> Array:
+    step = 0.15 * np.maximum(np.abs(x), 0.3)
+    return np.where(x + step <= high, step, -step)
+
+
+def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array) -> Array:
+    """A damped Gauss-Newton step that stays within bounds; numbers at a bound that they would leave wait."""
+    g = J.T @ r
+    free = ~(((x <= low) & (g > 0)) | ((x >= high) & (g < 0)))
+    if not free.any():
+        return x
+    H = J[:, free].T @ J[:, free]
+    move = np.zeros(len(x))
+    move[free] = -np.linalg.lstsq(H + damping * np.diag(np.maximum(np.diag(H), 1e-9)), g[free], rcond=None)[0]
+    return np.asarray(np.clip(x + move, low, high))
+
+
+def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],
+             report: Callable[[float], None] = lambda share: None) -> dict[T, Any]:
+    """Runs generators side by side: what all of them want next is answered in one call. Returns what each returned."""
+    done: dict[T, Any] = {}
+    wants: dict[T, list[Any]] = {}
+
+    def advance(key: T, sent: list[Any] | None) -> None:
+        try:
+            wants[key] = next(asking[key]) if sent is None else asking[key].send(sent)
+        except StopIteration as end:
+            wants.pop(key, None)
+            done[key] = end.value
+
+    for key in asking:
+        advance(key, None)
+    while wants:
+        report(len(done) / max(1, len(asking)))
+        flat = [(key, want) for key, wanted in wants.items() for want in wanted]
+        answers = iter(answer(flat))
+        for key, wanted in list(wants.items()):
+            advance(key, [next(answers) for _ in wanted])
+    return done

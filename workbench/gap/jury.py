@@ -1,0 +1,119 @@
+"""Rolls models out on every take, over both cores, and weighs what they leave."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.evidence import TakeEvidence
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.simulation.batch import Job, simulate_batch
+
+Array = NDArray[np.float64]
+COARSE, FINE = 2.0, 0.25
+"""Steps for a first look, and for last numbers, in search steps."""
+REST = 0.1
+"""Rest before the first command in rollouts [s]."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone."""
+
+    model: RobotModel
+    takes: tuple[int, ...]
+    step: float = 1.0
+
+
+class Jury:
+    """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
+    answers are the same with and without."""
+
+    def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
+                 memory: Path | None = None) -> None:
+        self.evidence = tuple(evidence)
+        self.config = config
+        self.n_jobs = n_jobs
+        self.memory = memory
+        self.rollouts = 0
+        self._known: dict[str, Array] = {}
+
+    def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
+        """For each question, residuals (N, c) by take."""
+        wanted = [(q, i, self._key(q, i)) for q in questions for i in q.takes]
+        self._recall([key for *_, key in wanted])
+        new = {key: (q, i) for q, i, key in wanted if key not in self._known}
+        order = sorted(new, key=lambda key: -self._cost(new[key][1]))  # the longest first, so that no core waits at the end
+        jobs = [self.job(q.model, i, replace(self.config, time_step=self.config.time_step * q.step))
+                for q, i in (new[k] for k in order)]
+        rollouts = simulate_batch(jobs, self.n_jobs)
+        self.rollouts += len(order)
+        for key, rollout in zip(order, rollouts):
+            q, i = new[key]
+            self._keep(key, self.evidence[i].simulated(rollout, q.model))
+        return [{i: self.evidence[i].residual(self._known[self._key(q, i)], corrected=q.step >= 1) for i in q.takes}
+                for q in questions]
+
+    def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
+        """A jury on other takes of the same robot."""
+        other = Jury(evidence, self.config, self.n_jobs, self.memory)
+        other.rollouts = self.rollouts
+        return other
+
+    def observed(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
+        """All takes as a model would show them, in another configuration (a finer step), seen like the recordings."""
+        everywhere = range(len(self.evidence))
+        rollouts = simulate_batch([self.job(model, i, config) for i in everywhere], self.n_jobs)
+        return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
+
+    def job(self, model: RobotModel, take: int, config: SimulationConfig) -> Job:
+        """One rollout; each take's own servo changes apply."""
+        e = self.evidence[take]
+        spec = e.take.spec
+        own = replace(model.with_servos(spec.servos), effects=model.effects)
+        frames = e.take.recorded.time - e.take.measurement.starts_at
+        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[frames >= 0]])
+        return Job(own, replace(config, base=spec.base), e.take.commands, float(frames[-1]) + 2e-3, REST, name=spec.name,
+                   times=times, start=e.take.start_state())
+
+    def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
+        """Residuals of one use as one vector, weighted, gaps as zeros: comparable between models. joint: its channels alone."""
+        parts = [np.empty(0)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
+        return np.concatenate(parts)
+
+    def _cost(self, take: int) -> float:
+        e = self.evidence[take]
+        return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)
+
+    def _key(self, q: Question, take: int) -> str:
+        played = self.evidence[take].take.commands
+        goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
+        return f"{q.model.sha256[:20]}-{take}-{goals}-{q.step:g}"
+
+    def _recall(self, keys: Sequence[str]) -> None:
+        if self.memory is None:
+            return
+        for key in keys:
+            path = self.memory / f"{key}.npy"
+            if key not in self._known and path.exists():
+                self._known[key] = np.load(path)
+
+    def _keep(self, key: str, simulated: Array) -> None:
+        self._known[key] = simulated
+        if self.memory is not None:
+            part = self.memory / f"{key}.part.npy"
+            np.save(part, simulated)
+            part.replace(self.memory / f"{key}.npy")
+
+

@@ -1,0 +1,130 @@
+"""Poses that a servo never got: read off each take, as which ones are missed is chance and no search finds chance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from workbench.effects.registry import known_effects
+from workbench.gap.evidence import TakeEvidence
+from workbench.gap.findings import Change, Estimate, Finding
+from workbench.gap.jury import Jury, Question
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+Array = NDArray[np.float64]
+LEAST_STEP = np.deg2rad(2.0)
+"""A pose that moves a joint by less does not tell whether it came [rad]."""
+STAYED, WENT = 0.3, 0.5
+"""Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
+has gone at least the second."""
+LEAST_CLOSED = 0.5
+"""Share of a joint's gap that the poses taken for missed must explain."""
+
+
+@dataclass(frozen=True)
+class Missed:
+    """One joint's missed poses. of: how many would have moved it, in all takes."""
+
+    joint: str
+    count: int
+    of: int
+    fit: Change
+    validation: Change
+
+    @property
+    def probability(self) -> float:
+        return self.count / self.of
+
+    @property
+    def spec(self) -> EffectSpec:
+        """The effect, for a model."""
+        return EffectSpec("dropped_command", (self.joint,), {"probability": self.probability})
+
+    def finding(self) -> Finding:
+        """With the 90 % interval of a share (Clopper and Pearson 1934)."""
+        low = float(beta.ppf(0.05, self.count, self.of - self.count + 1))
+        high = 1.0 if self.count == self.of else float(beta.ppf(0.95, self.count + 1, self.of - self.count))
+        return Finding("dropped_command", (self.joint,), 0.95, {"probability": Estimate(self.probability, low, high, "1")},
+                       self.fit, self.validation,
+                       evidence=known_effects()["dropped_command"].sentence(self.spec) + f" ({self.count} of {self.of} here.)")
+
+
+def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> tuple[Jury, tuple[Missed, ...]]:
+    """A jury whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
+    if "dropped_command" not in known_effects():
+        return jury, ()
+    found: list[Missed] = []
+    for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
+        read = {i: _read(e, joint, residuals[i]) for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
+        count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
+        if not count or count > 0.6 * of:
+            continue
+        lost = {i: r[0] for i, r in read.items()}
+        tried = replaced(jury, {i: _without(jury.evidence[i], joint, k) for i, k in lost.items() if k})
+        after = tried.residuals([Question(nominal, tuple(range(len(jury.evidence))))])[0]
+        here = tuple(i for i, k in lost.items() if k)
+        was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
+                    for r in (residuals, after))
+        frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
+        if was - now > LEAST_CLOSED * (was - frames) and was - now > 100:
+            found.append(Missed(joint, count, of, _change(jury, joint, residuals, after, "fit"),
+                                _change(jury, joint, residuals, after, "validate")))
+            jury, residuals = tried, after
+    return jury, tuple(found)
+
+
+def replaced(jury: Jury, evidence: Mapping[int, TakeEvidence]) -> Jury:
+    """The same jury on some other takes."""
+    return jury.on([evidence.get(i, e) for i, e in enumerate(jury.evidence)])
+
+
+def _read(e: TakeEvidence, joint: str, residual: Array) -> tuple[list[int], list[int]]:
+    """Commands that a joint missed, and all that would have moved it, by what it did until the next came."""
+    commands = e.take.commands
+    assert commands is not None
+    column, i = commands.column(joint), e.channels.index(joint)
+    rest = float(e.take.measurement.rest_pose.get(joint, 0.0)) if e.take.recorded.zeroed else 0.0
+    time, seen = e.take.recorded.since_start, e.recorded[:, i] + rest
+    said = seen - residual[:, i] * e.sigma[i]
+    ends = np.append(commands.times[1:], commands.end)
+    at, missed, telling = 0.0, list[int](), list[int]()
+    for k, goal in enumerate(commands.goals[:, column]):
+        way = float(goal - at)
+        frames = (time > ends[k] - 0.06) & (time <= ends[k]) & np.isfinite(seen)
+        if abs(way) < LEAST_STEP or not frames.any():
+            at = float(goal)
+            continue
+        went, should = (float(np.median(q[frames]) - at) / way for q in (seen, said))
+        telling.append(k)
+        follows = bool(missed) and missed[-1] == k - 1  # the model, which got the pose before, says nothing about this one
+        if abs(went) < STAYED and (follows or should > WENT):
+            missed.append(k)
+        else:
+            at = float(goal)
+    return missed, telling
+
+
+def _without(e: TakeEvidence, joint: str, missed: Sequence[int]) -> TakeEvidence:
+    """The take as played without some commands to a joint."""
+    commands = e.take.commands
+    assert commands is not None
+    goals, speeds, c = commands.goals.copy(), commands.speeds.copy(), commands.column(joint)
+    for k in missed:
+        goals[k, c] = goals[k - 1, c] if k else 0.0
+        speeds[k, c] = speeds[k - 1, c] if k else 0.0
+    played: Commands = replace(commands, goals=goals, speeds=speeds)
+    return replace(e, take=replace(e.take, commands=played))
+
+
+def _change(jury: Jury, joint: str, before: Mapping[int, Array], after: Mapping[int, Array], use: str) -> Change:
+    def error(residuals: Mapping[int, Array]) -> float:
+        parts = [np.square((residuals[i] * e.sigma)[e.uses[use], e.channels.index(joint)]) for i, e in enumerate(jury.evidence)
+                 if joint in e.channels]
+        return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
+
+    return Change(error(before), error(after), "deg")
