@@ -60,7 +60,7 @@ def answer(r: Result, model: RobotModel) -> Answer:
         f"A screw that is loose by {PLAY:g} deg shows as rotation that the joint's servo does not turn, "
         f"{times(min(off.values()))} to {times(max(off.values()))} sigma in that joint alone, where every rival stays at noise "
         f"(at most {times(max(rivals.values()))}). The drift itself decides nothing: the same play turns the walk by "
-        f"{sign(min(drifts), 0)} to {sign(max(drifts), 0)} deg, to either side, depending on which screw it is.")
+        f"{sign(min(drifts), 0)} to {sign(max(drifts), 0)} deg (positive: left), depending on which screw it is.")
     question = (
         "The thesis (8.1) saw its robot drift to the left where the simulation drifted slightly to the right, found loose "
         "screws in the front left leg, and took them for the cause. What would a recording show of loose screws, and what of "
@@ -73,8 +73,8 @@ def answer(r: Result, model: RobotModel) -> Answer:
         picture(figures, "off_axis", draw_off_axis(r, model),
                 f"What the servo of {SOUGHT[0]} does not turn, in the first three cycles: loose screws, backlash, and tight. "
                 "Noise is the cameras'."),
-        picture(figures, "heading", draw_heading(r), f"Heading in {r.seconds:.0f} s. Band: floor and spread of the tight robot's "
-                                                     f"end."),
+        picture(figures, "heading", draw_heading(r),
+                f"Heading in {r.seconds:.0f} s. Bars at the end: floor and spread of the tight robot's."),
     ]
     return Answer("Riddle: do loose screws make it drift to the left?", headline, question, hypotheses(), shows,
                   [Text(_decides(r)), _small_table(r)], [Text(_excluded(r))], [Text(_open(r))], _numbers(r), figures)
@@ -135,17 +135,18 @@ def _decides(r: Result) -> str:
 def _excluded(r: Result) -> str:
     tight, shown = r.ends[TIGHT]["ry"], r.ends[SHOWN]["ry"]
     sure = [n for n in LOOSE if r.drift_sigma(n) > BOUND]
-    left = [n for n in sure if r.drift(n) > 0]
-    right = [n for n in sure if r.drift(n) < 0]
-    beyond = (f"Of those whose own floor was run, {listed(sure)} turn by more than {BOUND} times the doubt "
-              f"({listed(left) or 'none'} to the left, {listed(right) or 'none'} to the right).") if sure else (
-              "Of those whose own floor was run none turns by more than the doubt.")
+    left, right = ([n for n in sure if side * r.drift(n) > 0] for side in (1, -1))
+    beyond = (
+        f"Beyond {BOUND} times the doubt (the tight robot's where a hypothesis's own was not run) {listed(left) or 'none'} of "
+        f"the loose mounts turn the walk to the left and {listed(right) or 'none'} to the right.")
+    side = ("So which side the robot drifted to does not point at that leg." if right else
+            "So a drift to the left is what loose screws there would do." if left else
+            "So the drift's side is no evidence either way.")
     return (
         "The thesis gives no number for the drift, and after the repair its robot ended 0.1 cm left of straight. So nothing is "
         "excluded by numbers. What is measured here: heading is a poor witness. Numerics and the contact model alone move the "
-        f"end's heading by {tight.doubt:.1f} deg (tight) and {shown.doubt:.1f} deg ({SHOWN}). {beyond} That the drift was gone "
-        "after the screws were tightened is good evidence that they caused it; that the drift was to the left is none, as far "
-        "as this model tells.")
+        f"end's heading by {tight.doubt:.1f} deg (tight) and {shown.doubt:.1f} deg ({SHOWN}). {beyond} {side} That the drift was "
+        "gone after the screws were tightened is good evidence that they caused it.")
 
 
 def _open(r: Result) -> str:
