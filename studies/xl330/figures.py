@@ -1,0 +1,67 @@
+"""Figures of the rig: what its logs show before any model, and models beside the gain that they did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from studies.xl330.bam import Logs
+from studies.xl330.rig import Log
+from workbench.view import style
+
+Array = NDArray[np.float64]
+SLOW = 1.0
+"""[rad/s] below which the arm's weight and the motor's torque nearly balance, but for friction."""
+
+
+@style.styled
+def draw_balance(logs: Sequence[Log], stall_torque: float) -> Figure:
+    """The arm's weight over the motor's duty, wherever the arm is slow and the torque on: going up, down, or held."""
+    figure = style.new_figure(10, 5.5)
+    panel = figure.subplots()
+    groups: dict[str, list[tuple[Array, Array]]] = {"lifting": [], "held": [], "lowering": []}
+    for log in logs:
+        c = {name.partition(".")[0]: values for name, values in log.read().channels.items()}
+        smooth = np.convolve(c["velocity"], np.ones(9) / 9, mode="same")
+        weight = log.mass * 9.81 * log.length * np.sin(c["position"])
+        slow = (c["enabled"] > 0.5) & (np.abs(smooth) < SLOW)
+        up = smooth * np.sign(weight)
+        for name, rows in (("lifting", up > 0.15), ("held", np.abs(up) < 0.02), ("lowering", up < -0.15)):
+            use = slow & rows
+            groups[name].append((c["duty"][use], weight[use]))
+    for (name, parts), colour in zip(groups.items(), (style.RECORDED, style.COMMAND, style.SIMULATED)):
+        x, y = (np.concatenate([p[i] for p in parts]) for i in (0, 1))
+        panel.plot(x, y, ".", ms=2.5, alpha=0.5, color=colour, label=name)
+    ends = np.array([-1.0, 1.0])
+    panel.plot(ends, stall_torque * ends, color=style.ERROR, lw=1.2, ls="--", label="M1 without friction")
+    panel.set_xlabel("duty, as the servo logs it")
+    panel.set_ylabel("torque of the arm's weight [N m]")
+    panel.set_ylim(-0.5, 0.5)
+    style.legend_above(panel)
+    return figure
+
+
+@style.styled
+def draw_logs(logs: Logs, curves: Mapping[str, Array], step: float, title: str) -> Figure:
+    """Recorded angles and models' (T, L) [rad], a panel for each log."""
+    n = len(logs.names)
+    figure = style.new_figure(12, 3.1 * ((n + 1) // 2))
+    time = step * np.arange(len(logs.position))
+    colours = dict(zip(curves, (style.COMMAND, style.OTHERS[2], style.SIMULATED)))
+    panels = np.atleast_1d(figure.subplots((n + 1) // 2, 2, sharex=True)).ravel()
+    for i, (name, panel) in enumerate(zip(logs.names, panels)):
+        panel.plot(time, np.degrees(logs.position[:, i]), color=style.RECORDED, lw=2.4, label="recorded")
+        for label, q in curves.items():
+            shown = np.where(np.isfinite(logs.position[:, i]), q[:, i], np.nan)
+            panel.plot(time, np.degrees(shown), color=colours[label], lw=1.3, label=label)
+        panel.set_title(name.rsplit("_", 1)[0].replace("_", " "))
+        panel.set_ylabel("angle [deg]")
+    for panel in panels[max(0, n - 2):]:
+        panel.set_xlabel("time [s]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.suptitle(title, x=0.01, ha="left", fontweight="bold", fontsize=13)
+    return figure
