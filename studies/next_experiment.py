@@ -2,9 +2,10 @@
 
     python -m studies.next_experiment [--out runs/studies/next_experiment] [--quick]
 
-For each pair a quadruped of the other engine (MuJoCo) gets one of the two, and is filmed in a first, cautious motion. Both names are
-fitted to it; where it leaves them tied, workbench.gap.experiment designs a motion from the two fitted models alone. The concealed
-robot plays it before the same cameras, both names are fitted to both recordings, and the likelihoods are read off. Quick: one pair.
+For each pair a quadruped of the other engine (MuJoCo) gets one of the two, and is filmed in a first, cautious motion. Both names
+are fitted to it; where it leaves them tied, workbench.gap.experiment designs a motion from the two fitted models alone. The
+concealed robot plays it before the same cameras, both names are fitted to both recordings, and the likelihoods are read off.
+Quick: one pair.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from workbench.view.report import Picture, Provenance, Report, Section, Table, T
 from workbench.view.style import ACCENT, COMMAND, OTHERS, RECORDED, legend_above, new_figure, styled
 
 SEED = 5
+N_JOBS = 2
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class Name:
 
 @dataclass(frozen=True)
 class Case:
-    """hidden: what the robot has; rival: what might imitate it. first: (time [s], angle [deg]) of the joint in the first motion."""
+    """hidden: what the robot has; rival: what might imitate it. first: (time [s], angle [deg]) of the joint in the first
+    motion."""
 
     name: str
     joint: str
@@ -89,7 +92,7 @@ def next_experiment(out: Path, quick: bool, progress: Callable[[str, float | Non
     figures = {o.case.hidden.effect: draw(o) for o in outcomes} | {"likelihoods": draw_likelihoods(outcomes)}
     reached = sum(o.ratios[1] >= SEPARATED for o in outcomes)
     report = Report(
-        "The next experiment", f"{reached} of {len(outcomes)} ties resolved: the motion that was designed reaches the hidden name.",
+        "The next experiment", f"{reached} of {len(outcomes)} ties resolved: the designed motion reaches the hidden name.",
         "Robots of another engine (MuJoCo), filmed with noise. What is designed knows the two fitted models, not the truth. "
         "Log-likelihood ratios count frames that err alike, 50 ms, once.",
         provenance=Provenance.of(model, seed=SEED, seconds=time.monotonic() - began))
@@ -114,16 +117,16 @@ def run(case: Case, folder: Path, progress: Callable[[str, float | None], None])
     """First motion, tie, design, second motion, name."""
     progress(f"{case.name}: first recording", None)
     hidden = Hidden(folder, EffectSpec(case.hidden.effect, (case.joint,), {case.hidden.parameter: case.value}), SEED)
-    jury = Jury(hidden.film("first", _first(hidden.model, case), "fixed"))
+    jury = Jury(hidden.film("first", _first(hidden.model, case), "fixed"), N_JOBS)
     progress(f"{case.name}: fitting both names", None)
     before = _both(jury, case)
     began = time.monotonic()
     models = [jury.nominal.with_effect(f.effect) for f in before]
-    experiment = design_experiment(jury.nominal, [(models[0], models[1])], {"fixed": jury.sight},
+    experiment = design_experiment(jury.nominal, [(models[0], models[1])], {"fixed": jury.sight}, N_JOBS,
                                    progress=lambda what, share: progress(f"{case.name}: {what}", share))
     seconds = time.monotonic() - began
     progress(f"{case.name}: second recording", None)
-    jury = Jury(hidden.film("next", experiment.motion, experiment.base))
+    jury = Jury(hidden.film("next", experiment.motion, experiment.base), N_JOBS)
     progress(f"{case.name}: fitting both names to both", None)
     return Outcome(case, before, experiment, _both(jury, case), jury, seconds)
 
@@ -136,7 +139,7 @@ def _first(model: RobotModel, case: Case) -> Motion:
 
 
 def _both(jury: Jury, case: Case) -> tuple[Fitted, Fitted]:
-    first, second = (jury.fit(n.effect, (case.joint,), n.parameter, np.geomspace(n.low, n.high, 7).tolist())
+    first, second = (jury.fit(n.effect, (case.joint,), n.parameter, np.geomspace(n.low, n.high, 6).tolist())
                      for n in (case.hidden, case.rival))
     return first, second
 
@@ -147,13 +150,15 @@ def table(outcomes: Sequence[Outcome]) -> Table:
     for o in outcomes:
         (before, after), expected = o.ratios, o.experiment.separations[0]
         hidden, rival = o.after
-        rows.append([o.case.hidden.effect, o.case.rival.effect, o.case.joint, sign(before), f"{expected.log_likelihood_ratio:.0f}",
-                     sign(after), f"{probability(before):.3f}", f"{probability(after):.3f}",
-                     f"{hidden.value:.3g} ({o.case.value:g} hidden) {o.case.hidden.unit}", f"{rival.value:.3g} {o.case.rival.unit}"])
+        rows.append([o.case.hidden.effect, o.case.rival.effect, o.case.joint, sign(before),
+                     f"{expected.log_likelihood_ratio:.0f}", sign(after),
+                     f"{probability(before):.3f}", f"{probability(after):.3f}",
+                     f"{hidden.value:.3g} {o.case.hidden.unit} ({o.case.value:g} hidden)",
+                     f"{rival.value:.3g} {o.case.rival.unit}"])
     return Table(("hidden", "rival", "joint", "LLR, first take", "LLR, expected", "LLR, both takes", "P, first", "P, both",
                   "fitted", "rival's fit"), rows,
-                 "LLR: log-likelihood ratio of the hidden name over its rival, each fitted; expected: what the design promised of "
-                 "the new take alone. P: of the hidden name, the two being equally likely at the outset.")
+                 "LLR: log-likelihood ratio of the hidden name over its rival, each fitted; expected: what the design promised "
+                 "of the new take alone. P: of the hidden name, the two being equally likely at the outset.")
 
 
 def probability(ratio: float) -> float:
@@ -194,7 +199,8 @@ def draw_likelihoods(outcomes: Sequence[Outcome]) -> Figure:
     figure = new_figure(9, 1.4 + 0.9 * len(outcomes))
     axes = figure.subplots()
     for k, o in enumerate(outcomes):
-        for ratio, colour, dy, label in zip(o.ratios, (COMMAND, ACCENT), (-0.19, 0.19), ("first take", "first and designed take")):
+        labels = ("first take", "first and designed take")
+        for ratio, colour, dy, label in zip(o.ratios, (COMMAND, ACCENT), (-0.19, 0.19), labels):
             axes.barh(k + dy, ratio, 0.34, color=colour, label=label if k == 0 else None)
             axes.annotate(f"{sign(ratio)}", (max(ratio, 0.0), k + dy), xytext=(5, 0), textcoords="offset points", va="center")
     axes.axvline(SEPARATED, color=RECORDED, lw=1.2, ls="--", label=f"separated ({SEPARATED:g})")

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from studies.concealed_effects.robots import quadruped
 from studies.other_engine.excitation import MotionRows
@@ -95,16 +96,21 @@ class Jury:
 
     def fit(self, name: str, where: tuple[str, ...], parameter: str, values: Sequence[float]) -> Fitted:
         """The number, between the first and the last of `values`, at which an effect fits all takes best: on a grid, then between
-        the neighbours of its best point."""
-        known: dict[float, Fitted] = {}
-        grid = np.array(values, dtype=float)
-        for _ in range(3):
-            for f in self._weighed([EffectSpec(name, where, {parameter: float(v)}) for v in grid if float(v) not in known]):
-                known[f.value] = f
-            at = sorted(known)
-            i = at.index(min(known, key=lambda v: known[v].cost))
-            grid = np.array([np.sqrt(at[i] * at[j]) for j in (i - 1, i + 1) if 0 <= j < len(at)])
-        return min(known.values(), key=lambda f: f.cost)
+        the neighbours of its best point (Brent's method, in the logarithm)."""
+        def at(v: float) -> EffectSpec:
+            return EffectSpec(name, where, {parameter: float(v)})
+
+        grid = self._weighed([at(v) for v in values])
+        k = min(range(len(grid)), key=lambda i: grid[i].cost)
+        known = [grid[k]]
+
+        def cost(x: float) -> float:
+            known.extend(self._weighed([at(np.exp(x))]))
+            return known[-1].cost
+
+        minimize_scalar(cost, bounds=(np.log(values[max(k - 1, 0)]), np.log(values[min(k + 1, len(grid) - 1)])), method="bounded",
+                        options={"xatol": 0.01, "maxiter": 8})
+        return min(known, key=lambda f: f.cost)
 
     def _weighed(self, effects: Sequence[EffectSpec]) -> list[Fitted]:
         models = [self.nominal.with_effect(e) for e in effects]
