@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -116,5 +117,7 @@ def _end(group: int) -> None:
 
 
 def _last(log: Path) -> str:
+    """The error that it ended with, else its last line."""
     text = log.read_text(encoding="utf-8", errors="replace").replace("\r", "\n")
-    return next((line.strip() for line in reversed(text.splitlines()) if line.strip()), "no word")
+    lines = [line.strip() for line in reversed(text.splitlines()) if line.strip()]
+    return next((line for line in lines if re.match(r"[\w.]+(Error|Exception): ", line)), next(iter(lines), "no word"))
