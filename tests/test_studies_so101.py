@@ -180,3 +180,11 @@ def test_without_recordings_one_line_and_2(tmp_path: Path, capsys: pytest.Captur
     assert "so101_programmes.npz" in said
     assert "expected the folder of the SO-101's recordings as --data" in said
     assert not (tmp_path / "out").exists()
+
+
+def test_a_clone_without_the_recordings_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str],
+                                               monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("studies.so101.__main__.BESIDE", tmp_path / "none")
+    assert main(["--out", str(tmp_path / "out")]) == 0
+    assert "nothing done" in capsys.readouterr().out
+    assert not (tmp_path / "out").exists()

@@ -39,6 +39,7 @@ from workbench.view.report import Picture, Provenance, Report, Section
 
 Array = NDArray[np.float64]
 Say = Callable[[str, float | None], None]
+BESIDE = ROOT.parent / "shared/data/so101"
 SLOW = "friction_gravity"
 SHOWN, SPAN = "fast_transitions", (5.0, 20.0)
 
@@ -120,16 +121,19 @@ def _numbers(m: Measured, joint: Mapping[str, Array], each: Mapping[str, Array],
 def main(argv: list[str] | None = None) -> int:
     """0, or 2 with one line on stderr where an input is bad."""
     parser = argparse.ArgumentParser(prog="python -m studies.so101", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared/data/so101", metavar="DIR", help="of the recordings")
+    parser.add_argument("--data", type=Path, metavar="DIR", help=f"of the recordings (default: {BESIDE}, if it is there)")
     parser.add_argument("--out", type=Path, default=ROOT / "runs/studies/so101", metavar="DIR", help="default: %(default)s")
     parser.add_argument("--model", type=Path, metavar="FILE", help="a model.yaml diagnosed before, in place of a diagnosis")
     parser.add_argument("--read-off-only", action="store_true", help="without a diagnosis")
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (default: %(default)s)")
     a = parser.parse_args(argv)
+    if a.data is None and not BESIDE.is_dir():
+        print(f"studies.so101: nothing done: the recordings lie beside the project, not in it, and {BESIDE} is missing")
+        return 0
     began = time.monotonic()
     try:
         with Progress("study so101") as progress:
-            said = so101(a.data.resolve(), a.out.resolve(), a.model, not a.read_off_only, a.jobs, progress)
+            said = so101((a.data or BESIDE).resolve(), a.out.resolve(), a.model, not a.read_off_only, a.jobs, progress)
     except InputError as e:
         print(f"studies.so101: {e}", file=sys.stderr)
         return 2
