@@ -32,6 +32,8 @@ USES = ("fit", "choose", "fit", "validate")
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
+LOOP = 2e-3
+"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that."""
 ACROSS = "~"
 """Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
 SMOOTHED = 0.065
@@ -50,7 +52,7 @@ class TakeEvidence:
     Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
     measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what the
     search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether the first
-    command's time was estimated, so that every model may shift it.
+    command's time was estimated, so that every model may shift it; else by no more than LOOP.
     """
 
     take: RegisteredTake
@@ -92,8 +94,7 @@ class TakeEvidence:
         """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. corrected: for the search's
         step."""
         simulated = simulated + self.offset if corrected else simulated
-        if self.start_is_free:
-            simulated = self._shifted(simulated)
+        simulated = self._shifted(simulated)
         return (self.recorded - simulated) / self.sigma
 
     def _shifted(self, simulated: Array) -> Array:
@@ -111,7 +112,8 @@ class TakeEvidence:
             if not told.any():
                 return shifted
             by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
-            late += float(np.clip(weighted_median(by_joint, np.sqrt(sharpness[told])), -0.03, 0.03))
+            most = 0.03 if self.start_is_free else LOOP
+            late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[told])), -most, most))
             shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
         return np.where(np.isfinite(simulated), shifted, np.nan)
 
@@ -192,6 +194,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     spread = _apart(nominal, [channels_of(t.observed(o), names) for o in r.other_contact], moving)
     noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
     resting = recorded[t.recorded.resting]
+    noise = np.where(np.isnan(noise), [t.measurement.noise.get(c, np.nan) for c in names], noise)
     if len(resting) > 5:  # a pose is a mean over rest, so that this is about zero
         own = rms(resting - np.nanmean(resting, axis=0))
         noise = np.where(np.isnan(noise), own, noise)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ SCANNED = (1.0, 4.0)
 """Sizes, in typical ones, at which an effect is looked at before it is fitted."""
 WORTH = 0.4
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
+SEEN_ELSEWHERE = ("zero_offset",)
+"""What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
 MOST_FITTED = 3
 """Effects of the whole robot, of feet or links that are fitted at a time: those of which signatures foretell most."""
 Asking = Generator[list[Question], list[dict[int, Array]], "list[Trial]"]
@@ -88,18 +91,20 @@ class Search:
         return Fit(tuple(c for c, _ in effects), x, covariance, cost, residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], iterations: int = 2) -> list[Trial]:
+              report: Callable[[float], None], iterations: int = 2, starts: Mapping[Any, Array] | None = None) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
-        each judged by its own joint's channels. takes: on which, by group."""
+        each judged by its own joint's channels. takes: on which, by group. starts: sizes by candidate's key, found already; all
+        are then fitted, and judged by all channels."""
         foretold: dict[str | None, float] = {}
         wide: list[float] = []
-        asking = {n: self._trying(current, group, takes[n], foretold, wide, iterations) for n, group in enumerate(groups)}
+        asking = {n: self._trying(current, group, takes[n], foretold, wide, iterations, starts) for n, group in enumerate(groups)}
         done = together(asking, lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
         return [trial for n in range(len(groups)) for trial in done[n]]
 
     def _trying(self, current: Fit, group: Sequence[Candidate], takes: tuple[int, ...],
-                foretold: dict[str | None, float], wide: list[float], iterations: int) -> Asking:
-        jury, apart = self.jury, len(group) > 1 or group[0].joint is not None
+                foretold: dict[str | None, float], wide: list[float], iterations: int,
+                given: Mapping[Any, Array] | None) -> Asking:
+        jury, apart = self.jury, given is None and group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE
         joints = [c.joint if apart else None for c in group]
         base = {i: current.residuals[i] for i in takes}
         r0 = [jury.vector(base, "fit", j) for j in joints]
@@ -111,12 +116,12 @@ class Search:
         def left(answer: dict[int, Array]) -> list[Array]:
             return [jury.vector(answer, "fit", j) for j in joints]
 
-        probes = _scan(group[0])
+        probes = _scan(group[0], brief=any(jury.evidence[i].take.spec.base == "free" for i in takes)) if given is None else []
         none: list[Array | None] = [None] * len(group)
-        answers = yield [question(none, COARSE), *(question([p] * len(group), COARSE) for p in probes)]
-        without = left(answers[0])
-        seen = [[r + v - w for r, v, w in zip(r0, left(a), without)] for a in answers[1:]]
-        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen]) for b, c in enumerate(group)]
+        answers = (yield [question(none, COARSE), *(question([p] * len(group), COARSE) for p in probes)]) if probes else []
+        seen = [[r + v - w for r, v, w in zip(r0, left(a), left(answers[0]))] for a in answers[1:]]
+        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen]) if given is None else (given[c.key], np.inf)
+                   for b, c in enumerate(group)]
         starts, gains = [g[0] for g in guesses], [g[1] for g in guesses]
         wide += [g for j, g in zip(joints, gains) if j is None]
         for j, gain in zip(joints, gains):
@@ -234,12 +239,12 @@ def _covariance(solved: Solved) -> Array:
     return out
 
 
-def _scan(c: Candidate) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several; of more, each alone."""
+def _scan(c: Candidate, brief: bool) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several (one if `brief`); of more, each alone."""
     if c.read_off:
         return [np.ones(c.size)]
     probes = c.probes()
-    if len(probes) > 1 or not c.size or c.joint is None:
+    if len(probes) > 1 or not c.size or c.joint is None or brief:
         return probes
     high = c.bounds()[1]
     sizes = [np.minimum(s * probes[0], high) for s in SCANNED]

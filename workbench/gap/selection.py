@@ -5,7 +5,7 @@ First what held takes show, where nothing but the servos moves the robot; then, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,9 +14,11 @@ import numpy as np
 from workbench.gap.candidates import Candidate, heavy_links
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
-from workbench.gap.search import Fit, Report, Search, Trial
+from workbench.gap.search import SEEN_ELSEWHERE, Fit, Report, Search, Trial
 
 MOST_EFFECTS = 6
+MOST_JOINTS = 3
+"""Effects of joints that are judged by all that they do on the ground: those that their own joints speak for most."""
 LEAST_GAIN = 30.0
 """Of chi squared on the choosing stretches that each number of an effect must bring."""
 LEAST_SHARE = 0.05
@@ -92,7 +94,8 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         trials: list[Trial] = []
         for tier in range(3):
             groups, on = _groups(search, pool, current, beyond, takes, held, tier)
-            trials += search.tried(current, groups, on, say)
+            tried = search.tried(current, groups, on, say)
+            trials += _for_all_it_does(search, current, tried, takes, say) if set(takes) - set(held) else tried
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and trials[0].closed > ENOUGH:
                 break
@@ -106,11 +109,24 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
     return current
 
 
+def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: tuple[int, ...], say: Callable[[float], None]
+                     ) -> list[Trial]:
+    """On the ground one bad joint moves the whole robot: the likeliest effects of joints, judged by all channels."""
+    ahead = sorted((t for t in trials if t.joint is not None and not t.foretold), key=lambda t: -t.gain["choose"])[:MOST_JOINTS]
+    if not ahead:
+        return trials
+    again = search.tried(current, [[t.candidate] for t in ahead], dict.fromkeys(range(len(ahead)), takes), say, 1,
+                         {t.candidate.key: t.x for t in ahead})
+    keys = {t.candidate.key for t in again}
+    return [*again, *(t for t in trials if t.candidate.key not in keys)]
+
+
 def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
             held: tuple[int, ...], tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
     """What to try, and on which takes: effects of joints at the joints with a gap, all joints at once; others one by one.
     tier: what is likely comes first, as there is so much of the rest."""
-    joints = {joint_of(c) for c in beyond}
+    worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
+    joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and (s >= ALIKE * worst)}
     grounded = tuple(i for i in takes if i not in held)
     ill = {joint_of(c) for i in held for c in channel_gaps(search.jury.evidence[i], current.residuals[i])}
 
@@ -127,10 +143,11 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
         elif c.joint is not None:
-            if c.joint in joints:
+            if c.name in SEEN_ELSEWHERE:
+                if grounded:
+                    groups[c.key] = [c]
+            elif c.joint in joints:
                 groups.setdefault(c.key if c.read_off else (c.name, "joint"), []).append(c)
-            elif c.name == "zero_offset" and grounded:
-                groups[c.key] = [c]
         elif c.effect.layer == "ground" and c.name != "ground_tilt" and not grounded:
             continue
         elif (grounded and not settled(c)) or (not grounded and _could_show(search, c, joints)):
@@ -143,13 +160,13 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
 
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
-    """With the base held, joints and the whole robot come first, then links. On the ground, where joints have been seen to,
-    ground and load come first, then joints, then lengths."""
+    """With the base held, joints and the whole robot come first, then links. On the ground,
+    zero offsets and what is in lighter links come later."""
     if not grounded:
         return 1 if "link" in c.effect.places else 0
     if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
         return 2
-    return 1 if c.joint is not None else 0
+    return 1 if c.name in SEEN_ELSEWHERE else 0
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
