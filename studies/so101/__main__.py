@@ -28,6 +28,7 @@ from studies.so101.measured import Measured, measure
 from studies.so101.programmes import DIAGNOSED, VALIDATION, jaw_range, load_programmes
 from studies.so101.read_off import read_off
 from studies.so101.session import write_session
+from workbench.cli.memory import rollout_memory
 from workbench.cli.progress import Progress
 from workbench.gap.diagnosis import diagnose_session
 from workbench.gap.session import Session, load_session
@@ -93,7 +94,8 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
 
 def _diagnosed(session: Session, out: Path, n_jobs: int, progress: Say) -> RobotModel:
     """The workbench's diagnosis of the training session; its files go into OUT/diagnosis."""
-    told = diagnose_session(session, progress, n_jobs)
+    with rollout_memory(out / "diagnosis", session) as memory:
+        told = diagnose_session(session, progress, n_jobs, memory)
     (out / "diagnosis").mkdir(parents=True, exist_ok=True)
     write_diagnosis(told.diagnosis, told.stories, out / "diagnosis", str(session.path), progress)
     return told.diagnosis.model
