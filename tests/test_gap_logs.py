@@ -73,6 +73,7 @@ def test_a_log_is_compared_from_its_measured_start(tmp_path: Path, effect: Effec
     model = session.model if effect is None else session.model.with_effect(effect)
     (compared,) = compare_session(session.with_model(model), n_jobs=1).takes
     assert compared.joints["j"].error < 1e-4
+    assert compared.joints["j"].noise == pytest.approx(np.nanmedian(compared.recorded.q_sigma))  # it has no rest to tell it
     assert compared.simulated.time[0] == pytest.approx(_times()[0], abs=1e-6)
 
 
