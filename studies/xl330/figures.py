@@ -50,7 +50,7 @@ def draw_logs(logs: Logs, curves: Mapping[str, Array], step: float, title: str) 
     n = len(logs.names)
     figure = style.new_figure(12, 3.1 * ((n + 1) // 2))
     time = step * np.arange(len(logs.position))
-    colours = dict(zip(curves, (style.COMMAND, style.OTHERS[2], style.SIMULATED)))
+    colours = dict(zip(curves, (style.COMMAND, style.SIMULATED)))
     panels = np.atleast_1d(figure.subplots((n + 1) // 2, 2, sharex=True)).ravel()
     for i, (name, panel) in enumerate(zip(logs.names, panels)):
         panel.plot(time, np.degrees(logs.position[:, i]), color=style.RECORDED, lw=2.4, label="recorded")
