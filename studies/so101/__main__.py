@@ -30,12 +30,10 @@ from studies.so101.read_off import read_off
 from studies.so101.session import write_session
 from workbench.cli.memory import rollout_memory
 from workbench.cli.progress import Progress
-from workbench.gap.diagnosis import diagnose_session
 from workbench.gap.session import Session, load_session
 from workbench.recording.sage import JOINTS
 from workbench.robot import InputError, RobotModel
 from workbench.robot.model_file import load_model
-from workbench.view.diagnosis_report import write_diagnosis
 from workbench.view.report import Picture, Provenance, Report, Section
 
 Array = NDArray[np.float64]
@@ -94,6 +92,9 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
 
 def _diagnosed(session: Session, out: Path, n_jobs: int, progress: Say) -> RobotModel:
     """The workbench's diagnosis of the training session; its files go into OUT/diagnosis."""
+    from workbench.gap.diagnosis import diagnose_session
+    from workbench.view.diagnosis_report import write_diagnosis
+
     with rollout_memory(out / "diagnosis", session) as memory:
         told = diagnose_session(session, progress, n_jobs, memory)
     (out / "diagnosis").mkdir(parents=True, exist_ok=True)
