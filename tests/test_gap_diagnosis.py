@@ -3,26 +3,64 @@
 import json
 
 import pytest
+import yaml
 
-from tests.gap_sessions import record_arm
+from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli.main import main
+from workbench.cli.memory import rollout_memory
 from workbench.gap.diagnosis import diagnose_session
 from workbench.gap.session import load_session
-from workbench.robot import load_model
+from workbench.robot import InputError, load_model
 
 
-def test_a_quiet_robot_has_no_gap(tmp_path):
+def test_a_quiet_robot_has_no_gap_and_a_damaged_take_is_named_and_left_out(tmp_path):
     record_arm(tmp_path)
-    told = diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1)
+    content = session_content()
+    content["takes"].append(content["takes"][0] | {"name": "torn", "recording": "takes/torn.csv"})
+    (tmp_path / "takes/torn.csv").write_text("Format Version,1.23\nnothing else\n")
+    told = diagnose_session(load_session(write_session(tmp_path, content)), n_jobs=1)
     assert told.diagnosis.verdict == "no_gap"
     assert told.diagnosis.findings == ()
     assert told.diagnosis.model.effects == ()
+    assert [name for name, _ in told.diagnosis.left_out] == ["torn"]
+
+
+def test_a_take_too_short_to_conclude_from_says_so(tmp_path):
+    path = record_arm(tmp_path)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:7 + 150]))  # about a second after the first command
+    with pytest.raises(InputError, match="nothing can be concluded"):
+        diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1)
+
+
+def killed(out, session):
+    """The memory of a run that was killed after its first rollout."""
+    try:
+        with rollout_memory(out, session) as folder:
+            (folder / "known.npy").write_bytes(b"1")
+            raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        return folder
+
+
+def test_what_was_worked_out_stays_while_a_run_is_not_done(tmp_path):
+    write_session(tmp_path)
+    session = load_session(tmp_path / "session.yaml")
+    folder = killed(tmp_path / "out", session)
+    with rollout_memory(tmp_path / "out", session) as again:
+        assert again == folder
+        assert (again / "known.npy").exists()
+    assert not folder.exists()
+    content = yaml.safe_load((tmp_path / "session.yaml").read_text())
+    content["takes"][0]["cycles"] = 1
+    with rollout_memory(tmp_path / "out", load_session(write_session(tmp_path, content))) as other:
+        assert other != folder
 
 
 @pytest.mark.slow
 def test_a_worn_joint_is_named_placed_and_sized_and_its_rivals_told(tmp_path):
     record_arm(tmp_path, friction=0.14)
-    assert main(["diagnose", str(tmp_path / "session.yaml"), "--out", str(tmp_path / "out")]) == 0
+    assert main(["diagnose", str(tmp_path / "session.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
     found = json.loads((tmp_path / "out/findings.json").read_text())
     assert found["verdict"] == "explained"
     assert found["gap"][0]["where"] == ["three"]
@@ -31,6 +69,8 @@ def test_a_worn_joint_is_named_placed_and_sized_and_its_rivals_told(tmp_path):
     assert "coulomb_friction" in named
     assert finding["where"] == ["three"]
     assert finding["validation"]["after"] < 0.5 * finding["validation"]["before"]
+    torque = finding["parameters"]["torque"]
+    assert torque["low"] < 0.08 < torque["high"]
     assert any(r["effect"] in ("viscous_friction", "dead_band", "servo_gain", "stribeck_friction") for r in found["rejected"])
     assert load_model(tmp_path / "out/model.yaml").effects[0].where == ("three",)
     assert (tmp_path / "out/report.html").stat().st_size > 100_000

@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import Rollouts, provenance, roll_out, run_of
 from workbench.gap.conclusions import finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.contest import Standing, contest
-from workbench.gap.evidence import ACROSS, TakeEvidence, gather
+from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis
 from workbench.gap.jury import Jury
@@ -25,6 +27,7 @@ from workbench.gap.special import special
 from workbench.gap.story import TakeStory
 from workbench.motion.motion import Motion
 from workbench.recording.take import Take
+from workbench.robot import InputError
 from workbench.simulation import SimulationConfig
 
 STEP = 2e-3
@@ -56,6 +59,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     registered, unregistered = register_takes(session, takes, {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}, progress)
     by_name = {t.spec.name: r for t, r in zip(takes, rollouts)}
     evidence = gather(registered, by_name)
+    _enough(session, evidence)
     jury = Jury(evidence, config, n_jobs, memory)
     nominal = Search(jury, session.model).evaluated([])
     gap = ledger(evidence, nominal.residuals)
@@ -83,6 +87,15 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         left_out=unreadable + unregistered)
     stories = _stories(search.jury, evidence, registered_rollouts(takes, by_name), nominal, fit, diagnosis)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
+
+
+def _enough(session: Session, evidence: Sequence[TakeEvidence]) -> None:
+    """InputError where no conclusion could be drawn, whatever the recordings show."""
+    least = BLOCK * len(USES)
+    longest = max(float(np.ptp(e.take.recorded.time[e.moving])) if e.moving.any() else 0.0 for e in evidence)
+    if longest < least and not any(e.take.spec.use for e in evidence):
+        raise InputError(session.path, f"nothing can be concluded: no take shows more than {longest:.1f} s after its first "
+                                       f"command, but fitting, choosing and validating take {least:.1f} s")
 
 
 def _experiment(session: Session, evidence: Sequence[TakeEvidence], fit: Fit, standings: Sequence[Standing], n_jobs: int,

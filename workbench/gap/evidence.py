@@ -50,9 +50,9 @@ class TakeEvidence:
     """One registered take: recorded channels (N, c), their sigma (c,), and which frames serve for what.
 
     Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
-    measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what the
-    search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether the first
-    command's time was estimated, so that every model may shift it; else by no more than LOOP.
+    measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
+    the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
+    the first command's time was estimated, so that every model may shift it; else by no more than LOOP.
     """
 
     take: RegisteredTake
@@ -209,8 +209,8 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
         weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
     sigma = np.maximum(sigma, 1e-6)
     offset = np.where(np.isfinite(finest - nominal), finest - nominal, 0.0)
-    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
-                        t.recorded.zeroed and t.spec.starts_at is None)
+    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset,
+                        _uses(t, moving, alone), weight, t.recorded.zeroed and t.spec.starts_at is None)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:

@@ -20,6 +20,7 @@ Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
+WALKING = 0.4
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
 
@@ -37,9 +38,9 @@ class Solved:
         return float(self.r @ self.r)
 
 
-def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int) -> Asks:
-    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number; a block of one number goes on
-    with secants."""
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = 0.15) -> Asks:
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it; a block
+    of one number goes on with secants. Walking answers small changes with noise: there strides are long (WALKING)."""
     x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
     r = list(left)
     J = [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
@@ -52,7 +53,7 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
         stale = [o and not f for o, f in zip(open_, fresh)]
         if any(stale):
             columns = max(len(x_b) for x_b, s in zip(x, stale) if s)
-            steps = [_steps(x_b, *b) for x_b, b in zip(x, bounds)]
+            steps = [_steps(x_b, *b, stride) for x_b, b in zip(x, bounds)]
             points = [[x_b + np.eye(len(x_b))[i] * h[i] if s and i < len(x_b) else x_b for x_b, h, s in zip(x, steps, stale)]
                       for i in range(columns)]
             for i, answer in enumerate((yield points)):
@@ -83,8 +84,8 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     return [Solved(*solved) for solved in zip(x, r, J)]
 
 
-def _steps(x: Array, low: Array, high: Array) -> Array:
-    step = 0.15 * np.maximum(np.abs(x), 0.3)
+def _steps(x: Array, low: Array, high: Array, stride: float) -> Array:
+    step = stride * np.maximum(np.abs(x), 0.3)
     return np.where(x + step <= high, step, -step)
 
 

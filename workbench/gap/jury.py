@@ -92,6 +92,16 @@ class Jury:
             parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
         return np.concatenate(parts)
 
+    def expected(self, takes: Sequence[int], use: str, joint: str | None = None) -> float:
+        """The sum of squares of `vector` that noise, numerics and contact models make."""
+        total = 0.0
+        for i in takes:
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            frames = np.isfinite(e.recorded[e.uses[use]][:, columns]).sum(axis=0)
+            total += float(np.sum(frames * e.weight[columns]))
+        return total
+
     def _cost(self, take: int) -> float:
         e = self.evidence[take]
         return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)

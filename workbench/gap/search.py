@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.fitting import Solved, fit_blocks, together
+from workbench.gap.fitting import WALKING, Solved, fit_blocks, together
 from workbench.gap.jury import COARSE, FINE, Jury, Question
 from workbench.robot import RobotModel
 
@@ -91,7 +91,7 @@ class Search:
         return Fit(tuple(c for c, _ in effects), x, covariance, cost, residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], iterations: int = 2, starts: Mapping[Any, Array] | None = None) -> list[Trial]:
+              report: Callable[[float], None], iterations: int = 3, starts: Mapping[Any, Array] | None = None) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
         each judged by its own joint's channels. takes: on which, by group. starts: sizes by candidate's key, found already; all
         are then fitted, and judged by all channels."""
@@ -132,6 +132,8 @@ class Search:
         least = [max(WORTH * best, last) if j is None else WORTH * foretold[j] for j in joints]
         worth = [g > 0 and g >= enough for g, enough in zip(gains, least)]
         alive = [b for b, w in enumerate(worth) if w]
+        if apart and self._stride(takes) == WALKING:
+            iterations = 1  # those ahead are fitted again, by all that they do
         out = [Trial(c, x, {"fit": min(g, 0.0), "choose": min(g, 0.0)}, j, foretold=True)
                for c, x, g, j, w in zip(group, starts, gains, joints, worth) if not w]
         if not alive:
@@ -146,7 +148,7 @@ class Search:
         first = (yield [question(spread([starts[b] for b in alive]))])[0]
         start_left = left(first)
         bounds = [group[b].bounds() for b in alive]
-        fit = fit_blocks([starts[b] for b in alive], [start_left[b] for b in alive], bounds, iterations)
+        fit = fit_blocks([starts[b] for b in alive], [start_left[b] for b in alive], bounds, iterations, self._stride(takes))
         solved: list[Solved] | None = None
         try:
             points = next(fit)
@@ -162,7 +164,7 @@ class Search:
             off = {use: float(np.sum(jury.vector(base, use, joints[b]) ** 2) - np.sum(jury.vector(final, use, joints[b]) ** 2))
                    for use in ("fit", "choose")}
             was = jury.vector(base, "choose", joints[b])
-            beyond = float(was @ was) - np.count_nonzero(was)
+            beyond = float(was @ was) - jury.expected(takes, "choose", joints[b])
             out.append(Trial(group[b], s.x, off, joints[b], closed=off["choose"] / max(beyond, 1.0)))
         return out
 
@@ -182,7 +184,7 @@ class Search:
             return Question(with_effects(self.nominal, list(zip(current.effects, [x[s] for s in current.slices()]))), takes)
 
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
-        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations)
+        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, self._stride(takes))
         solved: list[Solved] | None = None
         try:
             points = next(fit)
@@ -216,6 +218,9 @@ class Search:
             if there.cost["fit"] < last.cost["fit"]:
                 return replace(there, covariance=fit.covariance + np.diag(((there.x - x) / 4) ** 2))
         return last
+
+    def _stride(self, takes: Sequence[int]) -> float:
+        return WALKING if any(self.jury.evidence[i].take.spec.base == "free" for i in takes) else 0.15
 
     def _finely(self, fit: Fit, x: Array) -> Fit:
         effects = list(zip(fit.effects, [x[s] for s in fit.slices()]))

@@ -104,8 +104,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         if not accepted:
             break
         current = search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
-        if len(current.effects) > 1:
-            current = search.refitted(current, takes, 1)
+        current = search.refitted(current, takes, 2)
     return current
 
 
@@ -115,8 +114,8 @@ def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: t
     ahead = sorted((t for t in trials if t.joint is not None and not t.foretold), key=lambda t: -t.gain["choose"])[:MOST_JOINTS]
     if not ahead:
         return trials
-    again = search.tried(current, [[t.candidate] for t in ahead], dict.fromkeys(range(len(ahead)), takes), say, 1,
-                         {t.candidate.key: t.x for t in ahead})
+    again = search.tried(current, [[t.candidate] for t in ahead], dict.fromkeys(range(len(ahead)), takes), say,
+                         starts={t.candidate.key: t.x for t in ahead})
     keys = {t.candidate.key for t in again}
     return [*again, *(t for t in trials if t.candidate.key not in keys)]
 
@@ -206,9 +205,9 @@ def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
-    was, left = (search.jury.vector(f.residuals, "choose", t.joint) for f in (r.before, now))
-    beyond = float(was @ was) - np.count_nonzero(was)
-    return 1.0 - (float(left @ left) - np.count_nonzero(left)) / max(beyond, 1.0)
+    was, left = (float(np.sum(search.jury.vector(f.residuals, "choose", t.joint) ** 2)) for f in (r.before, now))
+    noise = search.jury.expected(search.takes, "choose", t.joint)
+    return 1.0 - max(left - noise, 0.0) / max(was - noise, 1.0)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
