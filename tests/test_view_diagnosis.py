@@ -25,9 +25,10 @@ from workbench.gap.findings import (
 )
 from workbench.gap.story import TakeStory
 from workbench.robot import EffectSpec, RobotModel
-from workbench.view.diagnosis_report import diagnosis_report, headline, interval, write_diagnosis
+from workbench.view.diagnosis_report import diagnosis_report, write_diagnosis
 from workbench.view.figures import encode
 from workbench.view.gap_figures import before_after, gap_map, robot_map, unseen_errors
+from workbench.view.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of
 
 SIGMA = np.deg2rad(0.1)
 
@@ -141,10 +142,66 @@ def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, dr
     (Estimate(50.0, 20.0, inf, "N m/rad"), "50 N m/rad (at least 20)"),
     (Estimate(0.1, -inf, 0.3, "N m"), "0.1 N m (at most 0.3)"),
     (Estimate(0.1, -inf, inf, "N m"), "0.1 N m (not bounded by the data)"),
-    (Estimate((0.0, 0.1, 0.2), (-0.1, 0.0, 0.1), (0.1, 0.2, 0.3), "m"), "0 (-0.1 to 0.1); 0.1 (0 to 0.2); 0.2 (0.1 to 0.3) m"),
+    (Estimate((0.03, 0.0, 0.04), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3), "m"), "50 mm in all"),
+    (Estimate(0.012, 0.01, 0.015, "s"), "12 ms (10 to 15)"),
 ])
 def test_intervals_are_said_as_a_person_would(estimate: Estimate, said: str) -> None:
     assert interval(estimate) == said
+
+
+def test_a_vector_has_a_row_for_each_component_in_a_unit_that_suits_the_largest() -> None:
+    offset = Estimate((0.0399, -0.00034, -0.0178), (0.0392, -0.00048, -0.0215), (0.0405, -0.0002, inf), "m")
+    assert intervals_of("com_offset", offset) == [
+        ["com offset, x", "39.9 mm (39.2 to 40.5)"], ["com offset, y", "-0.3 mm (-0.5 to -0.2)"],
+        ["com offset, z", "-17.8 mm (at least -21.5)"]]
+    assert intervals_of("force", Estimate((0.0, 0.0, 0.0), (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), "N"))[2] == [
+        "force, z", "0 N (-1 to 1)"]
+    assert intervals_of("gap", Estimate(3.1, 2.7, 3.5, "deg")) == [["gap", "3.1 deg (2.7 to 3.5)"]]
+
+
+@pytest.mark.parametrize(("entry", "row"), [
+    (Unexplained(("brm",), 0.567, 0.206, "deg", "sway: goes with angle (correlation 0.55)"),
+     ["joint brm", "sway", "0.567 deg", "2.8×", "partly with its angle (0.55)"]),
+    (Unexplained((), 0.00546, 0.00178, "m", "walk: forward, goes with nothing tried"),
+     ["how far the body goes", "walk", "5.46 mm", "3.1×", "not with time"]),
+    (Unexplained(("flm",), 1.0, 0.5, "deg", "walk: across its axis (flm~z), goes with time (correlation 0.80)"),
+     ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "closely with time (0.80)"]),
+    (Unexplained(("frb",), 0.6, 0.2, "deg", "grows with the load"), ["frb", "", "0.6 deg", "3.0×", "grows with the load"]),
+])
+def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str]) -> None:
+    assert left_row(entry) == row
+
+
+def test_reasons_name_effects_as_people_do() -> None:
+    assert reason_of("in place of com_shift(body_link) it leaves 686 more") == (
+        "in place of centre of mass shift at body_link it leaves 686 more")
+    assert reason_of("ground_friction() takes 40 off") == "ground friction takes 40 off"
+    assert reason_of("a rise (of 3) in f(x)") == "a rise (of 3) in f(x)"
+
+
+def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
+    told = next_said(NextExperiment("next_experiment.csv", "free", (("backlash", "dead_band"),), (np.log(150.0),)))
+    assert "[next_experiment.csv](next_experiment.csv) with the robot free on the floor" in told
+    assert "backlash from dead band (expected odds of the right name: 150 to 1)" in told
+    assert "more than 1000 to 1" in next_said(NextExperiment("n.csv", "fixed", (("a", "b"),), (800.0,)))
+    assert "odds" not in next_said(NextExperiment("n.csv", "fixed", (("a", "b"),)))
+
+
+def test_a_tie_is_seen_wherever_the_finding_is(model: RobotModel, story: TakeStory) -> None:
+    tied = replace(finding(confidence=0.86), alternatives=(Alternative("joint_compliance", ("flm",), 0.12),))
+    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [story], "Session small").html()
+    assert "<h1>Backlash at flm (or joint compliance at flm) explains all" in page
+    assert "86 % sure; or joint compliance at flm: 12 %" in page
+    assert "<b>Or joint compliance at flm: 12 %.</b>" in page
+
+
+def test_a_sentence_is_said_once_in_its_section(model: RobotModel, story: TakeStory) -> None:
+    told = finding()
+    page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [story], "S").html()
+    assert page.count(sentence_of(told)) == 2  # in the summary and in the section
+    assert "structure, 8 of 8 entries" in page
+    assert '<a href="next_experiment.csv">next_experiment.csv</a>' in page
+    assert "whole robot" not in page
 
 
 def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
@@ -162,7 +219,8 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, story: TakeStory, 
     assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
     page = (tmp_path / "out/report.html").read_text()
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
-             "Where the recordings leave the model", "2 more places and times", "2 deg (1.8 to 2.3)", "joint compliance at flm",
+             "Where the recordings leave the model", "2 more places and times", "Or joint compliance at flm: 2 %",
+             "2 deg (1.8 to 2.3)",
              "Tried in its place", "a placebo at frm does as well", "Before and after, on what nothing saw", "What is left",
              "grows with &lt;load&gt;", "What else was tried", "it does not show", "What to record next", "next_experiment.csv",
              "See it move", "<b>seed</b> 7"]

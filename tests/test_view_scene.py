@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.view_takes import capture, small_robot, swing
 from workbench.robot import InputError, RobotModel, puppy_model
+from workbench.view.keys import kept_keys
 from workbench.view.playback import play
-from workbench.view.scene import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, kept_keys, write_replay
+from workbench.view.scene import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, write_replay
 
 
 @pytest.fixture

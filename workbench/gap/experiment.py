@@ -71,8 +71,9 @@ class Experiment:
 
     def entry(self, file: str = "next_experiment.csv") -> NextExperiment | None:
         """For findings.json; None where nothing would be separated."""
-        pairs = tuple(s.effects for s in self.separations if s.separated)
-        return NextExperiment(file, self.base, pairs) if pairs else None
+        told = [s for s in self.separations if s.separated]
+        return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
+                              ) if told else None
 
 
 def no_progress(what: str, done: float | None = None) -> None:

@@ -148,11 +148,13 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """A motion (file beside findings.json) to record next, on a base free or fixed, and the ties that it separates."""
+    """A motion (file beside findings.json) to record next, on a base free or fixed, and the ties that it separates;
+    log_likelihood_ratios: expected of the right name over the other, for each tie, where they are known."""
 
     motion: str
     base: Literal["free", "fixed"]
     separates: tuple[tuple[str, str], ...]
+    log_likelihood_ratios: tuple[float, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         return {"motion": self.motion, "base": self.base, "separates": [list(pair) for pair in self.separates]}

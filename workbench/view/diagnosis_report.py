@@ -8,15 +8,33 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.effects.registry import effect_named
-from workbench.gap.findings import Change, Diagnosis, Estimate, Finding, GapEntry, Rejected
+from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
 from workbench.gap.story import TakeStory
-from workbench.robot import EffectSpec
 from workbench.view.error_figures import LIMIT
 from workbench.view.figures import body_path, film_strip
 from workbench.view.gap_figures import before_after, gap_map, robot_map, unseen_errors
+from workbench.view.gap_marks import Errors
+from workbench.view.heat import DARKEST
 from workbench.view.report import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene import write_replay
+from workbench.view.words import (
+    capital,
+    change,
+    headline,
+    intervals_of,
+    layers_of,
+    left_row,
+    listed,
+    name_of,
+    next_said,
+    quantity,
+    reason_of,
+    rival_of,
+    sentence_of,
+    title_of,
+    unbroken,
+)
 
 SHOWN = 6
 """Rows of a table that stand open; the rest is folded away."""
@@ -35,87 +53,60 @@ def write_diagnosis(diagnosis: Diagnosis, stories: Sequence[TakeStory], folder: 
     for i, story in enumerate(stories):
         progress(f"drawing {story.name}", i / len(stories))
         paths.append(folder / f"replay-{story.name}.html")
-        write_replay(paths[-1], diagnosis.model, story.fitted, story.recorded, title=story.name)
-        replays.append(Replay(paths[-1], f"{story.name} in 3D: the fitted model solid, the recorded robot as a ghost.",
-                              film_strip(diagnosis.model, story.fitted, story.recorded)))
+        errors = _errors(story)
+        write_replay(paths[-1], diagnosis.model, story.fitted, story.recorded, story.name, errors)
+        poster = film_strip(diagnosis.model, story.fitted, story.recorded)
+        replays.append(Replay(paths[-1], _replay_caption(story, errors), poster))
     if replays:
         report.add(Section("See it move", replays))
     return [report.write(folder / "report.html"), *paths]
+
+
+def _errors(story: TakeStory) -> list[Errors]:
+    """What the replay shows on the robot: the map of the nominal model, and on demand that of the fitted one."""
+    out = [Errors("error against the nominal model", story.time, story.channels, story.before)]
+    if not np.array_equal(story.before, story.after, equal_nan=True):
+        out.append(Errors("error against the fitted model", story.time, story.channels, story.after, shown=False))
+    return out
+
+
+def _replay_caption(story: TakeStory, errors: Sequence[Errors]) -> str:
+    said = (f"{story.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
+            f"above, as it runs: small and pale where a joint is within {LIMIT:g} times noise and numerics of the nominal model, "
+            f"large and dark at {DARKEST:g} times, grey where it was not seen.")
+    if any(c in BODY for c in story.channels):
+        said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
+    return said + (" Tick the fitted model's to see what is left." if len(errors) > 1 else "")
 
 
 def diagnosis_report(diagnosis: Diagnosis, stories: Sequence[TakeStory], title: str) -> Report:
     """The page without its replays."""
     known = dict(diagnosis.provenance)
     seed, seconds = known.pop("seed", None), known.pop("seconds", None)
-    more = [(k, str(v)) for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
+    more = [(k, ", ".join(f"{a} {b}" for a, b in v.items()) if isinstance(v, dict) else str(v))
+            for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
     report = Report(title, headline(diagnosis), _summary(diagnosis, stories), _key_numbers(diagnosis, stories),
                     Provenance(diagnosis.nominal.sha256, seed, seconds, more))
     report.add(_where(diagnosis, stories))
+    drawn: set[tuple[int, str]] = set()
     for finding in diagnosis.findings:
-        report.add(_finding(finding, diagnosis.rejected, stories))
+        report.add(_finding(finding, diagnosis.rejected, stories, drawn))
     if stories:
         report.add(_unseen(stories))
     report.add(_left(diagnosis))
     others = [r for r in diagnosis.rejected if not any(_rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", _folded(_REJECTED, [_rejected_row(r) for r in others], "more that were tried")))
+        report.add(Section("What else was tried", _tried(others, "more that were tried")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """The verdict in one sentence."""
-    names = _listed([title_of(f.effect, f.where) for f in diagnosis.findings])
-    explain = f"{_capital(names)} explain{'s' if len(diagnosis.findings) == 1 else ''}"
-    match diagnosis.verdict:
-        case "no_gap":
-            return "The model explains these recordings as they are: nothing is missing that they could show."
-        case "explained":
-            return f"{explain} all that the model missed."
-        case "partly_explained":
-            return f"{explain} part of what the model missed; the rest has no name yet."
-        case "unexplained":
-            return "The recordings leave the model, and nothing that the workbench knows explains how."
-
-
-def title_of(effect: str, where: Sequence[str]) -> str:
-    """`joint_compliance`, ("flm",) -> "joint compliance at flm"."""
-    return effect.replace("_", " ") + (f" at {_listed(where)}" if where else "")
-
-
-def sentence_of(finding: Finding) -> str:
-    """What is different about this robot, as the effect itself says it."""
-    return effect_named(finding.effect).sentence(
-        EffectSpec(finding.effect, finding.where, {name: e.value for name, e in finding.parameters.items()}))
-
-
-def interval(estimate: Estimate) -> str:
-    """The value and its 90 % interval; "at least" or "at most" where one side is open."""
-    value, low, high = (x if isinstance(x, tuple) else (x,) for x in (estimate.value, estimate.low, estimate.high))
-    if len(value) == 1:
-        return f"{value[0]:.3g}{_unit(estimate)} ({_bounds(low[0], high[0])})"
-    return "; ".join(f"{v:.3g} ({_bounds(a, b)})" for v, a, b in zip(value, low, high)) + _unit(estimate)
-
-
-def _unit(estimate: Estimate) -> str:
-    """Nothing for a ratio."""
-    return "" if estimate.unit in ("", "1") else f" {estimate.unit}"
-
-
-def _bounds(low: float, high: float) -> str:
-    if math.isinf(low) and math.isinf(high):
-        return "not bounded by the data"
-    if math.isinf(high):
-        return f"at least {low:.3g}"
-    return f"at most {high:.3g}" if math.isinf(low) else f"{low:.3g} to {high:.3g}"
 
 
 def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
     what = [sentence_of(f) for f in diagnosis.findings]
     seconds = sum(s.time[-1] for s in stories)
     if stories:
-        what.append(f"Judged on stretches of {_listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
+        what.append(f"Judged on stretches of {listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     return " ".join(what)
@@ -124,15 +115,20 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
 def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tuple[str, str, str]]:
     numbers = []
     for f in diagnosis.findings:
-        sure = f"{100 * f.confidence:.0f} %"
+        rival = rival_of(f)
+        sure = f"{100 * f.confidence:.0f} % sure" + (
+            f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
         first = next(iter(f.parameters.values()), None)
-        value = "is there" if first is None or isinstance(first.value, tuple) else f"{first.value:.3g}{_unit(first)}"
-        numbers.append((title_of(f.effect, f.where), value, f"{sure} sure"))
+        numbers.append((title_of(f.effect, f.where), "is there" if first is None else _size(first), sure))
     for s in stories:
         before, after = s.ratios(s.before), s.ratios(s.after)
         worst = max(before, key=lambda c: _finite(before[c]))
         numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
     return numbers[:8]
+
+
+def _size(e: Estimate) -> str:
+    return quantity(math.hypot(*e.value) if isinstance(e.value, tuple) else e.value, e.unit)
 
 
 def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
@@ -144,13 +140,16 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
         over = list(dict.fromkeys(place for g in ledger for place in g.where))
         over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
         named = over if len(over) < 6 else [*over[:4], f"{len(over) - 4} more places"]
-        said = (f"The recordings leave the nominal model at {_listed(named)}." if over and diagnosis.verdict != "no_gap" else
+        said = (f"The recordings leave the nominal model at {listed(named)}." if over and diagnosis.verdict != "no_gap" else
                 "Nowhere do the recordings leave the nominal model by more than chance.")
-        parts.append(Text(said))
-        parts.append(Picture(robot_map(diagnosis.nominal, worst),
+        parts.append(Text(f"{said} {layers_of(diagnosis)}".strip()))
+        at_joints: dict[str, float] = {}
+        for c, ratio in worst.items():
+            at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
+        parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
                              "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
-        header = ["layer", "where", "take", "when [s]", "phase", "error", "floor"]
+        header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), f"{s.name}: each row a joint or a motion of the body, darker where it is further from the model. "
                                 "Green on top: stretches that no choice saw.") for s in sorted(stories, key=_worst, reverse=True)]
@@ -166,40 +165,47 @@ def _worst(story: TakeStory) -> float:
 
 def _gap_row(g: GapEntry) -> list[str]:
     when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in g.when[:3]) + (" …" if len(g.when) > 3 else "")
-    return [g.layer, _listed(g.where) or "whole robot", g.take, when, g.phase or "–", f"{g.error:.3g} {g.unit}",
-            f"{g.floor:.2g} {g.unit}"]
+    return [g.layer, _place(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
 
 
-def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[TakeStory]) -> Section:
-    parts: list[Part] = [Text(sentence_of(finding))]
-    if finding.evidence:
+def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[TakeStory], drawn: set[tuple[int, str]]
+             ) -> Section:
+    """drawn: takes and joints that the page has a figure of; this section's is added."""
+    said = sentence_of(finding)
+    parts: list[Part] = [Text(said)]
+    if finding.evidence and finding.evidence != said:
         parts.append(Text(finding.evidence))
-    rows = [["confidence", f"{100 * finding.confidence:.0f} %"]]
-    rows += [[name.replace("_", " "), interval(e)] for name, e in finding.parameters.items()]
-    rows += [["error where it was fitted", _change(finding.fit)], ["error on unseen stretches", _change(finding.validation)]]
-    parts.append(Table(["", "value (90 % interval)"], rows))
-    parts += [Text(f"Its rival is **{title_of(a.effect, a.where)}** ({100 * a.confidence:.0f} %): these recordings alone do not "
-                   "rule it out.") for a in finding.alternatives]
-    shown = _best_view(finding, stories)
+    sure = f"{100 * finding.confidence:.0f} %"
+    for a in finding.alternatives:
+        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {100 * a.confidence:.0f} %.** These recordings alone do not rule "
+                          "that out."))
+        sure += f", or {title_of(a.effect, a.where)} {100 * a.confidence:.0f} %"
+    rows = [["how sure", sure], *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
+    rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
+    parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
+    shown = _best_view(finding, stories, drawn)
     if shown is not None:
-        story, joint = shown
-        parts.append(Picture(before_after(story, joint), f"{joint} in {story.name}, where the nominal model misses most: what "
-                                                         "the robot did, and what each model says it does."))
+        i, joint = shown
+        drawn.add(shown)
+        parts.append(Picture(before_after(stories[i], joint), f"{joint} in {stories[i].name}: what the robot did, and what each "
+                                                              "model says it does."))
     rivals = [r for r in rejected if _rivals(r, finding)]
     if rivals:
         parts.append(Text("Tried in its place, and rejected:"))
-        parts += _folded(_REJECTED, [_rejected_row(r) for r in rivals], "more rivals")
-    return Section(_capital(title_of(finding.effect, finding.where)), parts)
+        parts += _tried(rivals, "more rivals")
+    return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
-def _best_view(finding: Finding, stories: Sequence[TakeStory]) -> tuple[TakeStory, str] | None:
-    """The take and joint on which the finding shows most: its own joint, else the one that improved most."""
+def _best_view(finding: Finding, stories: Sequence[TakeStory], drawn: set[tuple[int, str]]) -> tuple[int, str] | None:
+    """The take and joint on which the finding shows most: its own joint, else the one that improved most; one that is not yet
+    drawn, if there is any."""
     found = [(_gain(s, c), i, c) for i, s in enumerate(stories) for c in s.channels if c in s.recorded.joints]
     own = [f for f in found if f[2] in finding.where]
+    new = [f for f in own or found if f[1:] not in drawn]
     if not found:
         return None
-    _, i, joint = max(own or found)
-    return stories[i], joint
+    _, i, joint = max(new or own or found)
+    return i, joint
 
 
 def _gain(story: TakeStory, channel: str) -> float:
@@ -208,7 +214,7 @@ def _gain(story: TakeStory, channel: str) -> float:
 
 def _unseen(stories: Sequence[TakeStory]) -> Section:
     over = {s.name: [c for c, r in s.ratios(s.after).items() if r > LIMIT] for s in stories}
-    said = "; ".join(f"in {name} {_listed(places)}" for name, places in over.items() if places)
+    said = "; ".join(f"in {name} {listed(places)}" for name, places in over.items() if places)
     parts: list[Part] = [Picture(unseen_errors(stories), f"Afterwards still beyond {LIMIT:g} times noise and numerics: {said}."
                                  if said else f"Afterwards all is within {LIMIT:g} times noise and numerics.")]
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
@@ -228,28 +234,37 @@ def _left(diagnosis: Diagnosis) -> Section:
         nothing = diagnosis.verdict in ("no_gap", "explained")
         return Section("What is left", [Text("Nothing beyond what noise, numerics and chance make." if nothing else
                                              "What is still beyond the green band above has no name yet.")])
-    rows = [[_listed(u.where) or "whole robot", f"{u.error:.3g} {u.unit}", f"{u.floor:.2g} {u.unit}", u.description]
-            for u in diagnosis.unexplained]
+    order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
+    header = ["what is still off", "take", "by", "over noise", "and it goes"]
     return Section("What is left", [
-        Text("This is beyond noise and numerics and has no name that survived on unseen stretches."),
-        *_folded(["where", "error", "floor", "what it depends on"], rows, "more")])
+        Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No effect "
+             "that was tried explains it."),
+        *_folded(header, [left_row(u) for u in order], "more")])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
-    n = diagnosis.next_experiment
-    assert n is not None
-    pairs = _listed([f"{a.replace('_', ' ')} from {b.replace('_', ' ')}" for a, b in n.separates])
-    base = "on the stand" if n.base == "fixed" else "walking freely"
-    return Section("What to record next", [
-        Text(f"Play `{n.motion}` with the robot {base}. It tells {pairs}, within the servos' limits.")])
+    assert diagnosis.next_experiment is not None
+    return Section("What to record next", [Text(next_said(diagnosis.next_experiment))])
 
 
-_REJECTED = ["effect", "where", "error on unseen stretches", "why not"]
+def _tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
+    """A table; without a column of errors where none was measured."""
+    measured = any(r.validation is not None for r in rejected)
+    header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
+    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), reason_of(r.reason)]
+            for r in rejected]
+    parts = _folded(header, rows, summary)
+    if any("chi squared" in r.reason for r in rejected):
+        parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
+    return parts
 
 
-def _rejected_row(r: Rejected) -> list[str]:
-    return [r.effect.replace("_", " "), _listed(r.where) or "whole robot",
-            "–" if r.validation is None else _change(r.validation), r.reason]
+def _left_by(r: Rejected) -> str:
+    return "–" if r.validation is None else unbroken(change(r.validation))
+
+
+def _place(where: Sequence[str]) -> str:
+    return unbroken(listed(where) or "whole robot")
 
 
 def _rivals(r: Rejected, finding: Finding) -> bool:
@@ -262,18 +277,6 @@ def _folded(header: list[str], rows: list[list[str]], summary: str) -> list[Part
     if len(rows) > SHOWN:
         parts.append(Details(f"{len(rows) - SHOWN} {summary}", [Table(header, rows[SHOWN:])]))
     return parts
-
-
-def _change(c: Change) -> str:
-    return f"{c.before:.3g} → {c.after:.3g} {c.unit}"
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _finite(x: float) -> float:

@@ -7,25 +7,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from workbench.gap.story import TakeStory
 from workbench.robot import RobotModel
 from workbench.view.error_figures import LIMIT
+from workbench.view.heat import BIN, DARKEST, HEAT, SCALE, cells
 from workbench.view.shapes import robot_shapes
 from workbench.view.stance import intervals
 from workbench.view.style import ACCENT, COMMAND, NOISE, RECORDED, SIMULATED, STANCE, legend_above, new_figure, styled
 
 Array = NDArray[np.float64]
-BIN = 0.1
-"""Width of a cell of the map [s]."""
 SHOWN = 3.0
 """Longest stretch that a before-and-after figure shows [s]."""
-_HEAT = LinearSegmentedColormap.from_list("gap", ["#F4F7F5", "#FCE3C5", "#F2A65A", RECORDED, "#7A2E00"]
-                                           ).with_extremes(bad="#D9D9DD")
-_SCALE = LogNorm(LIMIT, 30.0, clip=True)
 _DEGREES = 180 / np.pi
 
 
@@ -41,8 +36,7 @@ def gap_map(story: TakeStory) -> Figure:
     panels = figure.subplots(1, 1 if same else 2, sharey=True, squeeze=False)[0]
     mesh = None
     for axes, residual, title in zip(panels, (story.before, story.after), ("nominal model", "fitted model")):
-        cells = _cells(time, residual, edges)
-        mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells, cmap=_HEAT, norm=_SCALE, rasterized=True)
+        mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells(time, residual, edges), cmap=HEAT, norm=SCALE, rasterized=True)
         for low, high in intervals(time, story.unseen & (time >= 0)):
             axes.plot([low, high], [-0.35, -0.35], color=ACCENT, linewidth=4, solid_capstyle="butt", clip_on=False)
         axes.set_ylim(rows, -0.6)
@@ -52,22 +46,9 @@ def gap_map(story: TakeStory) -> Figure:
         axes.set_title(f"{story.name}, {title}")
     assert mesh is not None
     bar = figure.colorbar(mesh, ax=panels, pad=0.01, fraction=0.03)
-    bar.set_ticks([LIMIT, 3, 10, 30], labels=[f"≤ {LIMIT:g}×", "3×", "10×", "≥ 30×"])
+    bar.set_ticks([LIMIT, 3, 10, DARKEST], labels=[f"≤ {LIMIT:g}×", "3×", "10×", f"≥ {DARKEST:g}×"])
     bar.ax.minorticks_off()
     return figure
-
-
-def _cells(time: Array, residual: Array, edges: Array) -> Array:
-    """RMS of each channel in each bin: (c, bins), masked where nothing was seen."""
-    at = np.digitize(time, edges) - 1
-    inside = (at >= 0) & (at < len(edges) - 1)
-    out = np.full((residual.shape[1], len(edges) - 1), np.nan)
-    for c, column in enumerate(residual.T):
-        use = inside & np.isfinite(column)
-        count = np.bincount(at[use], minlength=out.shape[1])
-        total = np.bincount(at[use], np.square(column[use]), minlength=out.shape[1])
-        np.divide(total, count, out=out[c], where=count > 0)
-    return np.ma.masked_invalid(np.sqrt(out))  # type: ignore[no-any-return, no-untyped-call]
 
 
 @styled
@@ -91,7 +72,7 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     for joint, (x, y) in points.items():
         ratio = ratios.get(joint, np.nan)
         known = np.isfinite(ratio)
-        size, colour = (60 + 90 * np.log(max(ratio, 1.0)), _HEAT(_SCALE(ratio))) if known else (30, "#D9D9DD")
+        size, colour = (60 + 90 * np.log(max(ratio, 1.0)), HEAT(SCALE(ratio))) if known else (30, "#D9D9DD")
         axes.scatter(x, y, s=size, color=colour, edgecolor="#555555", linewidth=0.8, zorder=3)
         if joint not in loud:
             axes.annotate(joint, (x, y), xytext=(9, 4), textcoords="offset points", fontsize=8, color="#777777", zorder=2)

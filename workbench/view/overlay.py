@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from importlib.resources import files
 
+from workbench.view.error_figures import LIMIT
+from workbench.view.gap_marks import Marks
+from workbench.view.heat import DARKEST, gradient
 from workbench.view.style import ACCENT, RECORDED, SIMULATED
 
 LIBRARY = "library"
@@ -26,7 +29,8 @@ class Copy:
 class Legend:
     """What the page says about itself: names of the robots, the forces' scale [N per m of arrow], the grid's spacing [m],
     the first frame's time since the first command [s], when poses were commanded [s], and the middle [m] and half width [m] of
-    the floor that is walked on, and how far beside the recorded robot is set on demand [m]; meshes to copy."""
+    the floor that is walked on, and how far beside the recorded robot is set on demand [m]; meshes to copy; marks of
+    errors."""
 
     title: str
     simulated: str
@@ -39,6 +43,7 @@ class Legend:
     reach: float
     aside: float
     copies: list[Copy]
+    marks: list[Marks] = field(default_factory=list)
 
 
 def with_overlay(html: str, legend: Legend) -> str:
@@ -58,12 +63,17 @@ def _overlay(legend: Legend) -> str:
         rows.append(_switch("recorded traces/recorded", RECORDED, str(legend.recorded)))
     if legend.newtons_per_metre is not None:
         rows.append(_switch("forces", ACCENT, f"contact force, 10 N is {1000 / legend.newtons_per_metre:.0f} cm"))
+    rows += [_switch(" ".join(p.strip("/") for p in m.paths), gradient(), m.label, m.shown) for m in legend.marks]
+    if legend.marks:
+        rows.append(f'<div class="wb-heat"><span>≤ {LIMIT:g}×</span><b style="background:{gradient()}"></b>'
+                    f"<span>≥ {DARKEST:g}× noise</span></div>")
     template = files("workbench.view").joinpath("assets/replay.html").read_text(encoding="utf-8")
     copies = [[c.path, c.mesh, [[round(x, 3) for x in rgba] for rgba in c.colours]] for c in legend.copies]
     settings = {
         "start": round(legend.start, 6), "poses": [round(t, 4) for t in legend.poses],
         "middle": [round(x, 4) for x in legend.middle], "reach": round(legend.reach, 4), "aside": round(legend.aside, 3),
         "library": LIBRARY, "copies": copies,
+        "marks": [path for m in legend.marks for path in m.paths],
     }
     return (
         template.replace("%TITLE%", escape(legend.title))
@@ -74,6 +84,6 @@ def _overlay(legend: Legend) -> str:
     )
 
 
-def _switch(paths: str, colour: str, text: str) -> str:
-    return (f'<label><input type="checkbox" checked data-paths="{escape(paths)}"><i style="background:{colour}"></i>'
-            f"<span>{escape(text)}</span></label>")
+def _switch(paths: str, colour: str, text: str, on: bool = True) -> str:
+    box = f'<input type="checkbox"{" checked" if on else ""} data-paths="{escape(paths)}">'
+    return f'<label>{box}<i style="background:{colour}"></i><span>{escape(text)}</span></label>'

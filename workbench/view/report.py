@@ -22,7 +22,8 @@ from workbench.view.figures import encode
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph for each blank-line-separated part; `code` and **bold** are understood, nothing else."""
+    """A paragraph for each blank-line-separated part; `code`, **bold** and [words](file.ext), a link to a
+    file beside the page, are understood, nothing else."""
 
     text: str
 
@@ -209,6 +210,7 @@ def _caption(text: str) -> str:
 
 def _inline(text: str) -> str:
     out = re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text, quote=False))
+    out = re.sub(r"\[([^\]]+)\]\(([\w.-]+\.\w+)\)", r'<a href="\2">\1</a>', out)
     return re.sub(r"\*\*([^*]+)\*\*", r"<b>\1</b>", out)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -16,6 +17,9 @@ from scipy.spatial.transform import Rotation
 from workbench.recording.take import Take
 from workbench.robot.files import write_whole
 from workbench.robot.model import RobotModel
+from workbench.view.floor import GRID, add_grid, ribbon
+from workbench.view.gap_marks import Errors, Marker
+from workbench.view.keys import kept_keys
 from workbench.view.overlay import LIBRARY, Copy, Legend, with_overlay
 from workbench.view.playback import Playback, common_span, names_of, play, since_start
 from workbench.view.shapes import RobotShapes, VisualShape, robot_shapes
@@ -26,9 +30,6 @@ Array = NDArray[np.float64]
 FRAME_RATE = 30.0
 MAX_FRAMES = 900
 """Longer takes get fewer frames a second, so that the file stays small."""
-
-GRID = 0.05
-"""Spacing of the lines on the floor [m]; every tenth is darker."""
 
 GHOST_ALPHA = 0.45
 POSITION_TOLERANCE = 5e-4
@@ -48,12 +49,14 @@ class ReplayFile:
 
 def write_replay(
     path: str | PathLike[str], model: RobotModel, simulated: Take, recorded: Take | None = None, title: str = "",
+    errors: Sequence[Errors] = (),
 ) -> ReplayFile:
     """Writes the replay; the same takes give the same bytes.
 
     simulated: solid, with its contact forces as arrows. recorded: translucent, laid over it where both stood before the
     first command. In gaps it holds the last pose seen; joints nobody measured follow the simulation. The forces are
-    averaged over a frame. InputError where `path` cannot be written.
+    averaged over a frame. errors: how far the recording leaves one model or several, shown at the recorded robot's joints and
+    body. InputError where `path` cannot be written.
     """
     takes = [simulated] if recorded is None else [simulated, recorded]
     first, last = common_span(takes)
@@ -62,15 +65,18 @@ def write_replay(
     played = play(simulated, model, time)
     ghost = None if recorded is None else play(recorded, model, time, like=(simulated, played))
     scene = _Scene(model, robot_shapes(model), [played] if ghost is None else [played, ghost], rate)
-    scene.add_robot("simulated", played, SIMULATED, alpha=1.0, own_colours=ghost is None)
+    prefix, seen, at = "simulated", played, scene.add_robot("simulated", played, SIMULATED, 1.0, own_colours=ghost is None)
     newtons_per_metre = scene.add_forces("forces", simulated, played)
     if ghost is not None:
-        scene.add_robot("recorded", ghost, RECORDED, alpha=GHOST_ALPHA, own_colours=False)
+        prefix, seen, at = "recorded", ghost, scene.add_robot("recorded", ghost, RECORDED, GHOST_ALPHA, own_colours=False)
+    marker = Marker(scene.meshcat, scene.animation, model, seen, prefix, at, scene.shapes.height)
+    marks = [marker.add(f"error{i}", e) for i, e in enumerate(errors)]
     names = names_of(simulated, recorded)
     legend = Legend(
         title or simulated.name, simulated=names[0], recorded=None if recorded is None else names[1],
         newtons_per_metre=newtons_per_metre, grid=GRID, start=float(time[0]), poses=_poses(simulated),
-        middle=scene.middle, reach=scene.reach, aside=1.6 * scene.shapes.height, copies=scene.copies)
+        middle=scene.middle, reach=scene.reach, aside=1.6 * scene.shapes.height, copies=scene.copies,
+        marks=marks)
     written = write_whole(Path(path), with_overlay(scene.html(), legend))
     return ReplayFile(written, written.stat().st_size, len(time), rate)
 
@@ -94,8 +100,9 @@ class _Scene:
         self.meshcat.SetProperty(f"/{LIBRARY}", "visible", False)
         self._add_world()
 
-    def add_robot(self, prefix: str, played: Playback, colour: str, alpha: float, own_colours: bool) -> None:
-        """The links as a tree under `prefix`, each moved by its joint alone, and the base's path under `traces/prefix`."""
+    def add_robot(self, prefix: str, played: Playback, colour: str, alpha: float, own_colours: bool) -> dict[str, str]:
+        """The links as a tree under `prefix`, each moved by its joint alone, and the base's path under `traces/prefix`; returns
+        each link's path."""
         kinematics = self.model.kinematics
         at = {kinematics.root: f"/{prefix}/{kinematics.root}"}
         for link in kinematics.links:
@@ -110,9 +117,10 @@ class _Scene:
             self._animate(at[link], p, R)
             for i, shape in enumerate(self.shapes.visuals[link]):
                 self._add_shape(f"{at[link]}/shape{i}", shape, None if own_colours else (colour, alpha))
-        ribbon = _ribbon(played.base_p[:, :2], width=0.004)
-        if ribbon is not None:
-            self.meshcat.SetTriangleMesh(f"/traces/{prefix}", *ribbon, Rgba(*rgb(colour), 0.9))
+        path = ribbon(played.base_p[:, :2], width=0.004)
+        if path is not None:
+            self.meshcat.SetTriangleMesh(f"/traces/{prefix}", *path, Rgba(*rgb(colour), 0.9))
+        return at
 
     def _add_shape(self, path: str, shape: VisualShape, house: tuple[str, float] | None) -> None:
         """In its own colours, or in a house colour and alpha. A mesh is copied by the page, which has each file once."""
@@ -183,61 +191,10 @@ class _Scene:
         lights = {"PointLightNegativeX": 4.0, "PointLightPositiveX": 4.0, "AmbientLight": 0.9, "FillLight": 0.5}
         for name, intensity in lights.items():
             self.meshcat.SetProperty(f"/Lights/{name}/<object>", "intensity", intensity)
-        _add_grid(self.meshcat, self.low - 2.5 * self.shapes.height, self.high + 2.5 * self.shapes.height)
+        add_grid(self.meshcat, self.low - 2.5 * self.shapes.height, self.high + 2.5 * self.shapes.height)
         target = np.array([*self.middle, 0.5 * self.shapes.height])
         self.meshcat.SetCamera(Meshcat.PerspectiveCamera(fov=35.0, aspect=1.6, near=0.02, far=50.0))
         self.meshcat.SetCameraPose(target + 2.3 * self.reach * np.array([0.5, -1.0, 0.5]), target)
-
-
-def kept_keys(values: Array) -> NDArray[np.int64]:
-    """Frames to keep of `values` (F, k) so that linear interpolation between them stays within 1 of the rest
-    (Ramer 1972, Douglas and Peucker 1973). First and last are always kept."""
-    keep = np.zeros(len(values), dtype=bool)
-    keep[[0, -1]] = True
-    open_spans = [(0, len(values) - 1)]
-    while open_spans:
-        a, b = open_spans.pop()
-        if b - a < 2:
-            continue
-        share = np.arange(1, b - a)[:, None] / (b - a)
-        off = np.abs(values[a + 1 : b] - values[a] - share * (values[b] - values[a])).max(axis=1)
-        worst = int(off.argmax())
-        if off[worst] > 1:
-            middle = a + 1 + worst
-            keep[middle] = True
-            open_spans += [(a, middle), (middle, b)]
-    return np.flatnonzero(keep)
-
-
-def _add_grid(meshcat: Meshcat, low: Array, high: Array) -> None:
-    lines: dict[str, list[tuple[Array, Array]]] = {"fine": [], "coarse": []}
-    low, high = np.floor(low / GRID) * GRID, np.ceil(high / GRID) * GRID
-    for axis in (0, 1):
-        for k in range(round(low[axis] / GRID), round(high[axis] / GRID) + 1):
-            a, b = np.array([*low, 0.0]), np.array([*high, 0.0])
-            a[axis] = b[axis] = k * GRID
-            lines["coarse" if k % 10 == 0 else "fine"].append((a, b))
-    for name, grey in (("fine", 0.8), ("coarse", 0.45)):
-        if lines[name]:
-            start, end = (np.array(x, dtype=float).T for x in zip(*lines[name], strict=True))
-            meshcat.SetLineSegments(f"/floor/{name}", np.asfortranarray(start), np.asfortranarray(end), 1.0,
-                                    Rgba(grey, grey, grey, 1.0))
-
-
-def _ribbon(path: Array, width: float) -> tuple[Array, NDArray[np.int32]] | None:
-    """A path (F, 2) [m] as triangles on the floor, as WebGL draws lines one pixel wide; None if it stays in place."""
-    path = path[kept_keys(path / 0.0005)]
-    path = path[np.concatenate([[True], np.linalg.norm(np.diff(path, axis=0), axis=1) > 1e-4])]
-    if len(path) < 2:
-        return None
-    along = np.gradient(path, axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    side = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0]])
-    n = len(path)
-    vertices = np.column_stack([np.vstack([path + side, path - side]), np.full(2 * n, 0.001)])
-    a = np.arange(n - 1)
-    faces = np.hstack([np.vstack([a, a + n, a + 1]), np.vstack([a + 1, a + n, a + n + 1])])
-    return np.asfortranarray(vertices.T), np.asfortranarray(faces.astype(np.int32))
 
 
 def _held_while(known: NDArray[np.bool_], values: Array) -> Array:
