@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 DEGREES = float(np.degrees(1))
 WHAT = (
     "A six-joint SO-101 arm of Feetech STS3215 servos, 28 named programmes (isaac-sim2real/sage). Fourteen are for training, "
-    "fourteen for validation, a split by name that was written down before any validation error was looked at. Everything below "
+    "fourteen for validation, a split by name that was written down before these models were judged on it. Everything below "
     "but the clock and the errors under Validation comes from training programmes. Angles are the servos' degrees.")
 
 

@@ -121,16 +121,19 @@ def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round]
     return tuple(out.values())
 
 
-def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals) -> tuple[Unexplained, ...]:
-    """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on."""
+def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+    """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on.
+
+    floors: by take, numerical floor (c,) over sigma of the fitted model, which may be rougher than the nominal one's."""
     out = []
     for i, e in enumerate(evidence):
         for c, r in ratios(e, residuals[i], "validate").items():
-            if not r > GAP_RATIO:
-                continue
             column = e.channels.index(c)
-            floor, unit = in_file_units(float(e.sigma[column]), c)
-            out.append(Unexplained(() if c in BODY else (joint_of(c),), r * floor, floor, unit,
+            wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0
+            if not r > GAP_RATIO * wider:
+                continue
+            sigma, unit = in_file_units(float(e.sigma[column]), c)
+            out.append(Unexplained(() if c in BODY else (joint_of(c),), r * sigma, wider * sigma, unit,
                                    f"{e.name}: {_depends(e, residuals[i][:, column], c)}"))
     return tuple(out)
 

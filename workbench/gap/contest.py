@@ -89,7 +89,7 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
     there = search.evaluated([*others, (rival.candidate, rival.x)])
     if there.cost["choose"] - fit.cost["choose"] > 2 * NEAR:
         return there
-    return search.refitted(there, search.takes, 1, free=[len(others)])
+    return search.refitted(there, search.fitted, 1, free=[len(others)])
 
 
 def _samples(search: Search, fit: Fit) -> int:

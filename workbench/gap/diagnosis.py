@@ -75,7 +75,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     model = replace(model, effects=(*model.effects, *(m.spec for m in missed)))
     findings = tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, fit.residuals) for i in range(len(fit.effects)))
-    left = unexplained(evidence, fit.residuals) if gap else ()
+    floors = search.floors(fit) if fit.effects else {}
+    left = unexplained(evidence, fit.residuals, floors) if gap else ()
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(

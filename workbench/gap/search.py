@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from workbench.gap.candidates import Candidate
 from workbench.gap.fitting import WALKING, Solved, fit_blocks, together
 from workbench.gap.jury import COARSE, FINE, Jury, Question
+from workbench.gap.metrics import rms
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -81,6 +82,7 @@ class Search:
     def __init__(self, jury: Jury, nominal: RobotModel) -> None:
         self.jury, self.nominal = jury, nominal
         self.takes = tuple(range(len(jury.evidence)))
+        self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
 
     def evaluated(self, effects: Sequence[tuple[Candidate, Array]], covariance: Array | None = None) -> Fit:
         """Effects as they are, on all takes."""
@@ -199,7 +201,7 @@ class Search:
         covariance = np.full((len(x), len(x)), np.inf)
         covariance[np.ix_(moving, moving)] = _covariance(solved[0])
         fitted = self.evaluated(list(zip(current.effects, [x[s] for s in current.slices()])), covariance)
-        return replace(fitted, jacobian=solved[0].J) if takes == self.takes and len(moving) == len(x) else fitted
+        return replace(fitted, jacobian=solved[0].J) if takes == self.fitted and len(moving) == len(x) else fitted
 
     def refined(self, fit: Fit) -> Fit:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
@@ -218,6 +220,12 @@ class Search:
             if there.cost["fit"] < last.cost["fit"]:
                 return replace(there, covariance=fit.covariance + np.diag(((there.x - x) / 4) ** 2))
         return last
+
+    def floors(self, fit: Fit) -> dict[int, Array]:
+        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
+        model = with_effects(self.nominal, fit.sizes())
+        longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
+        return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
 
     def _stride(self, takes: Sequence[int]) -> float:
         return WALKING if any(self.jury.evidence[i].take.spec.base == "free" for i in takes) else 0.15

@@ -61,15 +61,15 @@ class Chosen:
 def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
     """The effects that stay."""
     evidence = search.jury.evidence
-    held = tuple(i for i, e in enumerate(evidence) if e.take.spec.base == "fixed")
+    held = tuple(i for i in search.fitted if evidence[i].take.spec.base == "fixed")
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
-    for takes in dict.fromkeys(t for t in (held, search.takes) if t):
+    for takes in dict.fromkeys(t for t in (held, search.fitted) if t):
         current = _phase(search, pool, nominal, current, takes, held, rounds, report)
     current = _without_part_answers(search, current, rounds)
     if len(current.effects):
         report("fitting together", None)
-        current = search.refitted(without_idle(search, current), search.takes, 3)
+        current = search.refitted(without_idle(search, current), search.fitted, 3)
     return Chosen(current, tuple(rounds))
 
 
@@ -206,7 +206,7 @@ def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
     was, left = (float(np.sum(search.jury.vector(f.residuals, "choose", t.joint) ** 2)) for f in (r.before, now))
-    noise = search.jury.expected(search.takes, "choose", t.joint)
+    noise = search.jury.expected(search.fitted, "choose", t.joint)
     return 1.0 - max(left - noise, 0.0) / max(was - noise, 1.0)
 
 
@@ -227,7 +227,7 @@ def without_idle(search: Search, current: Fit) -> Fit:
         least = LEAST_GAIN * max(1, current.effects[i].size)
         rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
         if rest.cost["choose"] - current.cost["choose"] < CLEARLY * least:
-            rest = search.refitted(rest, search.takes, 1)
+            rest = search.refitted(rest, search.fitted, 1)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
     return current
