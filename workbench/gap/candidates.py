@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 
 HEAVY = 0.15
 """Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows."""
+LEAST_MASS, MOST_MOMENT = 0.05, 100.0
+"""Of a point mass, in typical masses and moments: what positions are divided by at least, and how far moments go."""
+AWAY = 2.5
+"""Typical distances from a link's centre of mass at which a point mass is probed, along each axis."""
 ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
 """What a search from neutral cannot find: a stop shows nothing until the joint meets it, a mount's axis has to be known first;
 `special` reads them off the recordings."""
@@ -75,7 +79,10 @@ class Candidate:
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
-        sizes = iter(np.asarray(x, dtype=float).tolist())
+        x = np.asarray(x, dtype=float)
+        if self._point_mass:
+            x = np.array([x[0], *(x[1:] / max(x[0], LEAST_MASS))])
+        sizes = iter(x.tolist())
         out = []
         for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
             size = 1.0 if held else next(sizes)
@@ -102,15 +109,29 @@ class Candidate:
                 ends = [(end - n) / (t - n) for end in (p.low, p.high)]
             low.append(min(ends))
             high.append(max(ends))
+        if self._point_mass:
+            low[1:], high[1:] = [-MOST_MOMENT] * 3, [MOST_MOMENT] * 3
         return np.array(low), np.array(high)
 
     def probes(self) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
         that says where a scalar acts; one empty for an effect without numbers."""
+        if self._point_mass:
+            return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)
         fitted = [(p, n, t) for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held) if not held]
         shown = [i for i, (p, n, t) in enumerate(fitted) if n != t and not (scalar and p.vector)]
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
+
+    @property
+    def _point_mass(self) -> bool:
+        """Whether the sizes are a mass and where it is, all to be fitted: then as mass and its moments about the link's centre of
+        mass, which show linearly, as mass and distance do not."""
+        return self.effect.name == "payload" and self.size == 4
+
+    def combined(self, shares: NDArray[np.floating]) -> Array:
+        """Sizes at which the effect shows what `shares` of its probes show together."""
+        return np.asarray(np.sum([s * p for s, p in zip(shares, self.probes())], axis=0))
 
     def spec(self, x: Sequence[float] | Array) -> EffectSpec:
         """The effect at these sizes."""

@@ -270,12 +270,10 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
     if not c.size:
         return np.empty(0), whole - float(seen[0] @ seen[0])
     low, high = c.bounds()
-    if len({int(np.argmax(np.abs(p))) for p in probes}) > 1:  # each number alone
+    if np.linalg.matrix_rank(np.array(probes)) > 1:  # several numbers, not one at several sizes
         S = np.stack([(v - r0) for v in seen], axis=1)
-        each, *_ = np.linalg.lstsq(S, -r0, rcond=1e-8)
-        x = np.clip(np.sum([s * p for s, p in zip(each, probes)], axis=0), low, high)
-        kept = np.array([float(x @ p / max(float(p @ p), 1e-9)) for p in probes])
-        return x, whole - float(np.sum((r0 + S @ kept) ** 2))
+        shares, *_ = np.linalg.lstsq(S, -r0, rcond=1e-8)
+        return np.clip(c.combined(shares), low, high), whole - float(np.sum((r0 + S @ shares) ** 2))
     best = (probes[0], -np.inf)
     for p, v in zip(probes, seen):
         S = v - r0
