@@ -103,6 +103,11 @@ def run_study(name: str, doc: str | None, study: Study, argv: list[str] | None =
     arguments = parser.parse_args(argv)
     began = time.monotonic()
     try:
+        arguments.out.mkdir(parents=True, exist_ok=True)  # found out before the long work, not after
+    except OSError as e:
+        print(f"studies.{name}: {arguments.out}: cannot be written ({e.strerror})", file=sys.stderr)
+        return 2
+    try:
         with Progress(f"study {name}") as progress:
             said = study(arguments.out, arguments.quick, progress)
     except InputError as e:
