@@ -11,7 +11,7 @@ from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
-from workbench.gap.ledger import ledger
+from workbench.gap.ledger import layer_of, ledger
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Search
 from workbench.gap.session import load_session
@@ -56,6 +56,14 @@ def test_the_ledger_books_the_worn_joint_alone_before_any_fit(worn):
     assert entries[0].layer == "actuator"
     assert entries[0].error > 2 * entries[0].floor
     assert {e.where for e in entries} == {("three",)}
+
+
+def test_layers_are_told_by_where_a_channel_is_ill():
+    assert layer_of("flm", late=False, only_on_the_ground=False) == "actuator"
+    assert layer_of("flm", late=True, only_on_the_ground=True) == "timing"
+    assert layer_of("flm", late=False, only_on_the_ground=True) == "ground"
+    assert layer_of("flm~z", late=True, only_on_the_ground=False) == "structure"
+    assert [layer_of(c, False, False) for c in ("roll", "forward")] == ["inertia", "ground"]
 
 
 def test_running_means_of_noise_stay_one_and_those_of_an_offset_grow():

@@ -42,8 +42,8 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
     """The entries, the largest first.
 
     A joint is booked in the layer that its residual speaks of: timing where it goes with a lag that grows, or that most joints
-    share; structure where it lies across the servo's axis; else actuator. The body is booked where no joint explains it: as
-    inertia where it leans or sinks, as ground where it goes or turns another way.
+    share; structure where it lies across the servo's axis; ground where it is well with the base held; else actuator. The body is
+    booked where no joint explains it: as inertia where it leans or sinks, as ground where it goes or turns another way.
     """
     ill = {i: channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)}
     held = [i for i, e in enumerate(evidence) if e.take.spec.base == "fixed"]
@@ -61,15 +61,22 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
             column = e.channels.index(c)
             floor, unit = in_file_units(float(e.sigma[column]), c)
             raw = ratios(e, residuals[i])[c]
-            layer: Layer = _body_layer(c) if c in BODY else "structure" if ACROSS in c else "timing" if c in late else "actuator"
+            layer = layer_of(c, c in late, bool(held) and i not in held and joint_of(c) not in ill_when_held)
             rows.append((size, GapEntry(layer=layer, where=() if c in BODY else (joint_of(c),), take=e.name,
                                         when=_when(e, residuals[i][:, column]), error=raw * floor, floor=floor, unit=unit,
                                         phase=_phase(e, residuals[i][:, column], c))))
     return tuple(entry for _, entry in sorted(rows, key=lambda row: -row[0]))
 
 
-def _body_layer(channel: str) -> Layer:
-    return "inertia" if channel in ("height", "roll", "pitch") else "ground"
+def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
+    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is held."""
+    if channel in BODY:
+        return "inertia" if channel in ("height", "roll", "pitch") else "ground"
+    if ACROSS in channel:
+        return "structure"
+    if late:
+        return "timing"
+    return "ground" if only_on_the_ground else "actuator"
 
 
 def _late(e: TakeEvidence, residual: Array, joints: Sequence[str]) -> set[str]:
