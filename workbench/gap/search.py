@@ -134,8 +134,8 @@ class Search:
         least = [max(WORTH * best, last) if j is None else WORTH * foretold[j] for j in joints]
         worth = [g > 0 and g >= enough for g, enough in zip(gains, least)]
         alive = [b for b, w in enumerate(worth) if w]
-        if apart and self._stride(takes) == WALKING:
-            iterations = 1  # those ahead are fitted again, by all that they do
+        if given is None and self._stride(takes) == WALKING:
+            iterations = 1 if apart else 2  # those ahead are fitted again, with all that was chosen or by all that they do
         out = [Trial(c, x, {"fit": min(g, 0.0), "choose": min(g, 0.0)}, j, foretold=True)
                for c, x, g, j, w in zip(group, starts, gains, joints, worth) if not w]
         if not alive:

@@ -25,13 +25,16 @@ LEAST_SHARE = 0.05
 """Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
 that."""
+ROUGH_SHARE = 0.1
+"""The same of a channel's gap on the ground, where engines differ more."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
 several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
 CLEARLY = 20.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
-ENOUGH = 0.6
-"""Share of a gap from which on what hangs on links is not asked for."""
+ENOUGH, NEARLY_ALL = 0.6, 0.9
+"""Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
+like the ground's, before joints are asked."""
 ALIKE = 0.25
 """Joints whose best gain is this share of the greatest are taken in the same round."""
 
@@ -79,7 +82,8 @@ def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], nominal.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > LEAST_SHARE * (was.get(c, 0.0)**2 - 1)}
+        least = ROUGH_SHARE if evidence[i].take.spec.base == "free" else LEAST_SHARE
+        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
     return out
 
 
@@ -97,7 +101,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
             tried = search.tried(current, groups, on, say)
             trials += _for_all_it_does(search, current, tried, takes, say) if set(takes) - set(held) else tried
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and trials[0].closed > ENOUGH:
+            if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
                 break
         accepted = _accepted(trials, rounds)
         rounds.append(Round(current, tuple(trials), tuple(accepted)))
@@ -160,12 +164,14 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
     """With the base held, joints and the whole robot come first, then links. On the ground,
-    zero offsets and what is in lighter links come later."""
+    what moves the robot as a whole, then joints, then zero offsets and what is in lighter links."""
     if not grounded:
         return 1 if "link" in c.effect.places else 0
     if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
         return 2
-    return 1 if c.name in SEEN_ELSEWHERE else 0
+    if c.name in SEEN_ELSEWHERE:
+        return 2
+    return 1 if c.joint is not None else 0
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
