@@ -62,7 +62,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
     for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
         read = {i: _read(e, joint, residuals[i]) for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
         count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
-        if not count or count > 0.6 * of:
+        if not _credible(jury, {i: len(r[0]) for i, r in read.items()}) or count > 0.6 * of:
             continue
         lost = {i: r[0] for i, r in read.items()}
         tried = replaced(jury, {i: _without(jury.evidence[i], joint, k) for i, k in lost.items() if k})
@@ -76,6 +76,13 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
                                 _change(jury, joint, residuals, after, "validate")))
             jury, residuals = tried, after
     return jury, tuple(found)
+
+
+def _credible(jury: Jury, missed: Mapping[int, int]) -> bool:
+    """On the ground a joint may be kept from going, once: believed are poses missed with the base held, or, without such takes, more
+    than one."""
+    held = [n for i, n in missed.items() if jury.evidence[i].take.spec.base == "fixed"]
+    return sum(held) > 0 if held else sum(missed.values()) > 1
 
 
 def replaced(jury: Jury, evidence: Mapping[int, TakeEvidence]) -> Jury:
