@@ -79,8 +79,8 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
 
 
 def _credible(jury: Jury, missed: Mapping[int, int]) -> bool:
-    """On the ground a joint may be kept from going, once: believed are poses missed with the base held, or, without such takes, more
-    than one."""
+    """On the ground a joint may be kept from going, once: believed are poses missed with the base held, or, without such takes,
+    more than one."""
     held = [n for i, n in missed.items() if jury.evidence[i].take.spec.base == "fixed"]
     return sum(held) > 0 if held else sum(missed.values()) > 1
 
