@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
 from workbench.effects.base import Effect, Parameter, scalar
+from workbench.effects.schedules import without_poses
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
 
@@ -28,14 +28,10 @@ class DroppedCommand(Effect):
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
         chance = np.random.default_rng(SEED)
-        goals, speeds = commands.goals.copy(), commands.speeds.copy()
         for joint in where:
-            c = commands.joints.index(joint)
             missed = chance.random(len(commands.times)) < values["probability"]
-            for k in np.flatnonzero(missed):
-                goals[k, c] = goals[k - 1, c] if k else 0.0
-                speeds[k, c] = speeds[k - 1, c] if k else 0.0
-        return replace(commands, goals=goals, speeds=speeds)
+            commands = without_poses(commands, commands.column(joint), np.flatnonzero(missed).tolist())
+        return commands
 
 
 EFFECT = DroppedCommand()

@@ -10,6 +10,15 @@ import numpy as np
 from workbench.motion.commands import Commands
 
 
+def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
+    """The commands without some to one joint, which keeps the goal and speed that it had."""
+    goals, speeds = commands.goals.copy(), commands.speeds.copy()
+    for k in sorted(missed):
+        goals[k, column] = goals[k - 1, column] if k else 0.0
+        speeds[k, column] = speeds[k - 1, column] if k else 0.0
+    return replace(commands, goals=goals, speeds=speeds)
+
+
 def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands:
     """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last."""
     columns = list(columns)

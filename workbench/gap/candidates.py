@@ -158,20 +158,19 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
             continue
         if effect.name == "speed_order" and (set(model.bus_ids) < set(model.joints) or len(model.joints) < 2):
             continue
-        if effect.name == "speed_order" and not any(c is not None and np.any(c.speeds > 0) for c in commands_of(evidence)):
+        if effect.name == "speed_order" and not _speeds_are_set(evidence):
             continue
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
             if effect.name == "command_delay" and not where and not start_known:
                 continue  # a late start and a delay of all joints are the same
-            out.append(Candidate.of(effect, where, _at_rest(effect, model, where, neutral)[0],
-                                    _at_rest(effect, model, where, neutral)[1]))
+            out.append(Candidate.of(effect, where, *_at_rest(effect, model, where, neutral)))
     return out
 
 
-def commands_of(evidence: Sequence[TakeEvidence]) -> list:  # type: ignore[type-arg]
-    """What went out on the bus, take by take."""
-    return [e.take.commands for e in evidence]
+def _speeds_are_set(evidence: Sequence[TakeEvidence]) -> bool:
+    """Whether moving speeds went out on the bus in any take."""
+    return any(e.take.commands is not None and np.any(e.take.commands.speeds > 0) for e in evidence)
 
 
 def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:

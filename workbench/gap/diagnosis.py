@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.gap.candidates import candidates
-from workbench.gap.compare_session import Rollouts, provenance, roll_out, run_of
+from workbench.gap.compare_session import provenance, roll_out, run_of
 from workbench.gap.conclusions import finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.contest import Standing, contest
 from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
@@ -19,7 +19,7 @@ from workbench.gap.findings import Diagnosis
 from workbench.gap.jury import Jury
 from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
-from workbench.gap.registered import Progress, ReadTake, no_progress, read_takes, register_takes
+from workbench.gap.registered import Progress, no_progress, read_takes, register_takes
 from workbench.gap.search import Fit, Search
 from workbench.gap.selection import select
 from workbench.gap.session import Base, Session
@@ -32,8 +32,6 @@ from workbench.simulation import SimulationConfig
 
 STEP = 2e-3
 """Of the search's rollouts [s]; what this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
-
-
 MOTION = "next_experiment.csv"
 TIED = 0.05
 """Probability from which on a rival is worth an experiment."""
@@ -56,8 +54,9 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     takes, unreadable = read_takes(session)
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=STEP)
     rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
-    registered, unregistered = register_takes(session, takes, {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}, progress)
     by_name = {t.spec.name: r for t, r in zip(takes, rollouts)}
+    unfitted = {name: r.nominal for name, r in by_name.items()}
+    registered, unregistered = register_takes(session, takes, unfitted, progress)
     evidence = gather(registered, by_name)
     _enough(session, evidence)
     jury = Jury(evidence, config, n_jobs, memory)
@@ -86,7 +85,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         next_experiment=None if experiment is None else experiment.entry(MOTION),
         provenance=provenance(session.model, config, time.monotonic() - began) | {"seed": 0, "rollouts": search.jury.rollouts},
         left_out=unreadable + unregistered)
-    stories = _stories(search.jury, evidence, registered_rollouts(takes, by_name), nominal, fit, diagnosis)
+    stories = _stories(search.jury, evidence, unfitted, nominal, fit, diagnosis)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
 
 
@@ -112,11 +111,6 @@ def _experiment(session: Session, evidence: Sequence[TakeEvidence], fit: Fit, st
         sights[e.take.spec.base] = Sight(sigma, e.take.recorded.zeroed, 1.0 / e.frame_time)
     experiment = design_experiment(session.model, tied, sights, n_jobs, progress)
     return experiment if experiment.entry(MOTION) is not None else None
-
-
-def registered_rollouts(takes: Sequence[ReadTake], rollouts: dict[str, Rollouts]) -> dict[str, Take]:
-    """The nominal rollout of each take."""
-    return {t.spec.name: rollouts[t.spec.name].nominal for t in takes}
 
 
 def _stories(jury: Jury, evidence: Sequence[TakeEvidence], nominal: dict[str, Take], before: Fit, after: Fit, diagnosis: Diagnosis

@@ -21,6 +21,7 @@ Left = list[Array]
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
 WALKING = 0.4
+"""Share of a number by which it is moved for a difference where the robot walks."""
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
 
@@ -99,6 +100,18 @@ def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array)
     move = np.zeros(len(x))
     move[free] = -np.linalg.lstsq(H + damping * np.diag(np.maximum(np.diag(H), 1e-9)), g[free], rcond=None)[0]
     return np.asarray(np.clip(x + move, low, high))
+
+
+def through(fit: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any], tell: Callable[[Any], Any]
+            ) -> Generator[list[Any], list[Any], T]:
+    """A generator as part of another: what it wants goes out as `ask` puts it, what comes back goes in as `tell` does."""
+    try:
+        wants = next(fit)
+        while True:
+            answers = yield [ask(w) for w in wants]
+            wants = fit.send([tell(a) for a in answers])
+    except StopIteration as end:
+        return end.value  # type: ignore[no-any-return]
 
 
 def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],

@@ -125,5 +125,3 @@ class Jury:
             part = self.memory / f"{key}.part.npy"
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
-
-

@@ -29,15 +29,6 @@ def channel_gaps(e: TakeEvidence, residual: Array) -> dict[str, float]:
     return {c: s for c, s in size.items() if s > GAP_RATIO}
 
 
-def gaps(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array], takes: Sequence[int]) -> dict[str, float]:
-    """Channels beyond noise, by the worst of some takes."""
-    out: dict[str, float] = {}
-    for i in takes:
-        for c, size in channel_gaps(evidence[i], residuals[i]).items():
-            out[c] = max(out.get(c, 0.0), size)
-    return out
-
-
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:
     """The entries, the largest first.
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from workbench.effects.registry import known_effects
+from workbench.effects.schedules import without_poses
 from workbench.gap.evidence import TakeEvidence
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
-from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
@@ -120,12 +120,7 @@ def _without(e: TakeEvidence, joint: str, missed: Sequence[int]) -> TakeEvidence
     """The take as played without some commands to a joint."""
     commands = e.take.commands
     assert commands is not None
-    goals, speeds, c = commands.goals.copy(), commands.speeds.copy(), commands.column(joint)
-    for k in missed:
-        goals[k, c] = goals[k - 1, c] if k else 0.0
-        speeds[k, c] = speeds[k - 1, c] if k else 0.0
-    played: Commands = replace(commands, goals=goals, speeds=speeds)
-    return replace(e, take=replace(e.take, commands=played))
+    return replace(e, take=replace(e.take, commands=without_poses(commands, commands.column(joint), missed)))
 
 
 def _change(jury: Jury, joint: str, before: Mapping[int, Array], after: Mapping[int, Array], use: str) -> Change:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.fitting import WALKING, Solved, fit_blocks, together
+from workbench.gap.fitting import WALKING, Solved, fit_blocks, through, together
 from workbench.gap.jury import COARSE, FINE, Jury, Question
 from workbench.gap.metrics import rms
 from workbench.robot import RobotModel
@@ -88,9 +88,8 @@ class Search:
         """Effects as they are, on all takes."""
         residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes)])[0]
         x = np.concatenate([np.empty(0), *(x for _, x in effects)])
-        cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
         covariance = np.full((len(x), len(x)), np.inf) if covariance is None else covariance
-        return Fit(tuple(c for c, _ in effects), x, covariance, cost, residuals)
+        return Fit(tuple(c for c, _ in effects), x, covariance, self._cost(residuals), residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
               report: Callable[[float], None], iterations: int = 3, starts: Mapping[Any, Array] | None = None) -> list[Trial]:
@@ -151,16 +150,7 @@ class Search:
         start_left = left(first)
         bounds = [group[b].bounds() for b in alive]
         fit = fit_blocks([starts[b] for b in alive], [start_left[b] for b in alive], bounds, iterations, self._stride(takes))
-        solved: list[Solved] | None = None
-        try:
-            points = next(fit)
-            while True:
-                answers = yield [question(spread(p)) for p in points]
-                lefts = [left(a) for a in answers]
-                points = fit.send([[v[b] for b in alive] for v in lefts])
-        except StopIteration as end:
-            solved = end.value
-        assert solved is not None
+        solved = yield from through(fit, lambda point: question(spread(point)), lambda answer: [left(answer)[b] for b in alive])
         final = (yield [question(spread([s.x for s in solved]))])[0]
         for b, s in zip(alive, solved):
             off = {use: float(np.sum(jury.vector(base, use, joints[b]) ** 2) - np.sum(jury.vector(final, use, joints[b]) ** 2))
@@ -187,21 +177,14 @@ class Search:
 
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
         fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, self._stride(takes))
-        solved: list[Solved] | None = None
-        try:
-            points = next(fit)
-            while True:
-                answers = self.jury.residuals([question(p) for p in points])
-                points = fit.send([[self.jury.vector(a, "fit")] for a in answers])
-        except StopIteration as end:
-            solved = end.value
-        assert solved is not None
+        asking = through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
+        (solved,) = together({0: asking}, lambda wanted: self.jury.residuals([q for _, q in wanted]))[0]
         x = current.x.copy()
-        x[moving] = solved[0].x
+        x[moving] = solved.x
         covariance = np.full((len(x), len(x)), np.inf)
-        covariance[np.ix_(moving, moving)] = _covariance(solved[0])
+        covariance[np.ix_(moving, moving)] = _covariance(solved)
         fitted = self.evaluated(list(zip(current.effects, [x[s] for s in current.slices()])), covariance)
-        return replace(fitted, jacobian=solved[0].J) if takes == self.fitted and len(moving) == len(x) else fitted
+        return replace(fitted, jacobian=solved.J) if takes == self.fitted and len(moving) == len(x) else fitted
 
     def refined(self, fit: Fit) -> Fit:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
@@ -233,8 +216,10 @@ class Search:
     def _finely(self, fit: Fit, x: Array) -> Fit:
         effects = list(zip(fit.effects, [x[s] for s in fit.slices()]))
         residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes, FINE)])[0]
-        cost = {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
-        return replace(fit, x=x, cost=cost, residuals=residuals)
+        return replace(fit, x=x, cost=self._cost(residuals), residuals=residuals)
+
+    def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
+        return {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
 
 
 def _covariance(solved: Solved) -> Array:

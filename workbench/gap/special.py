@@ -26,12 +26,13 @@ LEAST_TURN = np.deg2rad(0.3)
 def special(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """Those that these takes suggest; residuals: of the nominal robot, by take."""
     known = known_effects()
+    ill = [channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)]
     out: list[Candidate] = []
     for joint in dict.fromkeys(j for e in evidence for j in e.joints):
         if "joint_stop" in known:
             out += _stop(joint, evidence, residuals)
         if "loose_mount" in known:
-            out += _mount(joint, model, evidence, residuals)
+            out += _mount(joint, model, evidence, residuals, ill)
     return out + (_frames(model, evidence) if "marker_frame" in known else [])
 
 
@@ -66,13 +67,13 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     return [Candidate.of(known_effects()["joint_stop"], (joint,), neutral, typical, held)]
 
 
-def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
-           ) -> list[Candidate]:
+def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
+           ill: Sequence[Mapping[str, float]]) -> list[Candidate]:
     """A loose mount where the link turns across its servo's axis: about the axis along which it does so most, as far as that."""
     rows, sigma = [], 1.0
     for i, e in enumerate(evidence):
         columns = [k for k, c in enumerate(e.channels) if c.startswith(joint + ACROSS)]
-        if len(columns) == 2 and any(e.channels[k] in channel_gaps(e, residuals[i]) for k in columns):
+        if len(columns) == 2 and any(e.channels[k] in ill[i] for k in columns):
             three = np.zeros((len(e.recorded), 3))
             for k in columns:
                 three[:, "xyz".index(e.channels[k][-1])] = residuals[i][:, k] * e.sigma[k]
