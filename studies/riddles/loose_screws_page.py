@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +28,9 @@ from studies.riddles.loose_screws import (
     hypotheses,
     measure,
 )
-from studies.riddles.page import Answer, Progress, listed, picture, publish_answer, shade_stance, times, told
+from studies.riddles.page import Answer, Progress, listed, picture, run_subject, shade_stance, times, told
 from workbench.gap.metrics import heading
-from workbench.robot import RobotModel, puppy_model
+from workbench.robot import RobotModel
 from workbench.view import style
 from workbench.view.report import Part, Table, Text
 
@@ -44,10 +43,7 @@ SHOWN = f"loose {SOUGHT[0]} {SOUGHT[1]}"
 
 def loose_screws(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes its page."""
-    began = time.monotonic()
-    model = puppy_model()
-    result = measure(model, quick, progress)
-    return publish_answer(out, model, answer(result, model), time.monotonic() - began, quick)
+    return run_subject(out, quick, lambda model: measure(model, quick, progress), answer)
 
 
 def answer(r: Result, model: RobotModel) -> Answer:

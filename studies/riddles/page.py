@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +18,7 @@ from studies.riddles.apart import Number
 from studies.riddles.hypotheses import Hypothesis, Progress
 from workbench.gap.footfalls import foot_phases
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, puppy_model
 from workbench.view import style
 from workbench.view.report import Part, Picture, Provenance, Report, Section, Table
 from workbench.view.stance import intervals
@@ -29,6 +31,8 @@ METHOD = (
     "alone gives 1 or less, and below 1.3 nothing is claimed. No number here is a measurement of the robot.")
 
 COLOURS = (style.SIMULATED, style.RECORDED, style.ACCENT, *style.OTHERS[:3], style.COMMAND, style.OTHERS[3], style.FLOOR)
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,13 @@ class Answer:
     open: Sequence[Part]
     numbers: Mapping[str, object]
     figures: Mapping[str, Figure] = field(default_factory=dict)
+
+
+def run_subject(out: Path, quick: bool, measure: Callable[[RobotModel], T], answer: Callable[[T, RobotModel], Answer]) -> str:
+    """Measures on the puppy, and writes the page of what was found."""
+    began = time.monotonic()
+    model = puppy_model()
+    return publish_answer(out, model, answer(measure(model), model), time.monotonic() - began, quick)
 
 
 def publish_answer(out: Path, model: RobotModel, answer: Answer, seconds: float, quick: bool) -> str:

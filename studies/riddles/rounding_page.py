@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from matplotlib.figure import Figure
 from studies.common import sign
 from studies.riddles.apart import Growth
 from studies.riddles.cameras import RATE
-from studies.riddles.page import COLOURS, Answer, Progress, picture, publish_answer, shade_stance, times
+from studies.riddles.page import COLOURS, Answer, Progress, picture, run_subject, shade_stance, times
 from studies.riddles.rounding import (
     CLOCK,
     CYCLES,
@@ -31,7 +30,7 @@ from studies.riddles.rounding import (
     rounding_errors,
 )
 from workbench.motion import interpolate_motion
-from workbench.robot import RobotModel, puppy_model
+from workbench.robot import RobotModel
 from workbench.view import style
 from workbench.view.report import Part, Table, Text
 
@@ -41,10 +40,7 @@ SHOWN = "flb"
 
 def rounding(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes its page."""
-    began = time.monotonic()
-    model = puppy_model()
-    result = measure(model, quick, progress)
-    return publish_answer(out, model, answer(result, model), time.monotonic() - began, quick)
+    return run_subject(out, quick, lambda model: measure(model, quick, progress), answer)
 
 
 def answer(r: Result, model: RobotModel) -> Answer:

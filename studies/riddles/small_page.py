@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,9 @@ from matplotlib.figure import Figure
 
 from studies.common import sign
 from studies.riddles.hypotheses import Hypothesis, walk
-from studies.riddles.page import Answer, Progress, listed, picture, publish_answer, shade_stance, times
+from studies.riddles.page import Answer, Progress, listed, picture, run_subject, shade_stance, times
 from studies.riddles.small import AFTER, ALL, LAST, WALKED, Result, measure
-from workbench.robot import RobotModel, puppy_model
+from workbench.robot import RobotModel
 from workbench.view import style
 from workbench.view.report import Part, Table, Text
 
@@ -23,10 +22,7 @@ LATE = np.radians(1.0)
 
 def small(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes its page."""
-    began = time.monotonic()
-    model = puppy_model()
-    result = measure(model, progress)
-    return publish_answer(out, model, answer(result, model), time.monotonic() - began, quick)
+    return run_subject(out, quick, lambda model: measure(model, progress), answer)
 
 
 def answer(r: Result, model: RobotModel) -> Answer:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.common import REAL, body_track, sign
-from studies.riddles.page import COLOURS, Answer, Progress, listed, picture, publish_answer, shade_stance, times, told
+from studies.riddles.page import COLOURS, Answer, Progress, listed, picture, run_subject, shade_stance, times, told
 from studies.riddles.speed_order import (
     CONTACTS,
     FRICTIONS,
@@ -27,17 +26,14 @@ from studies.riddles.speed_order import (
     hypotheses,
     measure,
 )
-from workbench.robot import RobotModel, puppy_model
+from workbench.robot import RobotModel
 from workbench.view import style
 from workbench.view.report import Part, Table, Text
 
 
 def speed_order(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes its page."""
-    began = time.monotonic()
-    model = puppy_model()
-    result = measure(model, quick, progress)
-    return publish_answer(out, model, answer(result, model), time.monotonic() - began, quick)
+    return run_subject(out, quick, lambda model: measure(model, quick, progress), answer)
 
 
 def answer(r: Result, model: RobotModel) -> Answer:
