@@ -17,6 +17,7 @@ class Backlash(Effect):
     name = "backlash"
     layer = "structure"
     places = ("joint",)
+    under_load = True
     parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -54,6 +54,8 @@ class Effect:
     layer: ClassVar[Layer]
     places: ClassVar[tuple[Place, ...]]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    under_load: ClassVar[bool] = False
+    """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
 
     def sentence(self, spec: EffectSpec) -> str:
         """For a person: what is different about this robot."""

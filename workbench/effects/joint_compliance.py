@@ -19,6 +19,7 @@ class JointCompliance(Effect):
     name = "joint_compliance"
     layer = "structure"
     places = ("joint",)
+    under_load = True
     parameters = (Parameter("stiffness", "N m/rad", 0.2, 1e4, 10.0),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -41,6 +41,7 @@ class LoadFriction(Effect):
     name = "load_friction"
     layer = "actuator"
     places = ("joint",)
+    under_load = True
     parameters = (Parameter("coefficient", "", 0.0, 1.0, 0.15),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -32,6 +32,7 @@ class SupplySag(Effect):
     name = "supply_sag"
     layer = "actuator"
     places = ("robot",)
+    under_load = True
     parameters = (Parameter("drop", "V", 0.0, 5.0, 0.3),)
 
     def sentence(self, spec: EffectSpec) -> str:

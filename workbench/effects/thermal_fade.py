@@ -30,6 +30,7 @@ class ThermalFade(Effect):
     name = "thermal_fade"
     layer = "actuator"
     places = ("robot",)
+    under_load = True
     parameters = (Parameter("rate", "1/s", 0.0, 1.0, 0.01),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -32,6 +32,7 @@ class TorqueCeiling(Effect):
     name = "torque_ceiling"
     layer = "actuator"
     places = ("joint",)
+    under_load = True
     parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
 
     def sentence(self, spec: EffectSpec) -> str:

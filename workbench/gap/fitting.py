@@ -39,13 +39,15 @@ class Solved:
         return float(self.r @ self.r)
 
 
-def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = 0.15) -> Asks:
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = 0.15,
+               slopes: Sequence[Array] | None = None) -> Asks:
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it; a block
-    of one number goes on with secants. Walking answers small changes with noise: there strides are long (WALKING)."""
+    of one number goes on with secants, from its slope if `slopes` are known. Walking answers small changes with noise: there
+    strides are long (WALKING)."""
     x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
     r = list(left)
-    J = [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
-    fresh = [False] * len(x)
+    J = list(slopes) if slopes else [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
+    fresh = [slopes is not None and len(x_b) == 1 for x_b in x]
     damping = [1e-3] * len(x)
     open_ = [len(x_b) > 0 for x_b in x]
     for _ in range(iterations):

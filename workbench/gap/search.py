@@ -18,12 +18,16 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 Report = Callable[[str, float | None], None]
-SCANNED = (1.0, 4.0)
+SCANNED, SCANNED_WALKING = (1.0, 4.0), (0.7, 2.0)
 """Sizes, in typical ones, at which an effect is looked at before it is fitted."""
+FAR, FAR_WALKING = 5.0, 1.6
+"""Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 WORTH = 0.4
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 SEEN_ELSEWHERE = ("zero_offset",)
 """What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
+BEHIND = 0.6
+"""Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 MOST_FITTED = 3
 """Effects of the whole robot, of feet or links that are fitted at a time: those of which signatures foretell most."""
 Asking = Generator[list[Question], list[dict[int, Array]], "list[Trial]"]
@@ -76,6 +80,26 @@ def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]
     return replace(nominal, effects=(*nominal.effects, *(c.spec(x) for c, x in effects)))
 
 
+@dataclass(frozen=True)
+class Race:
+    """What rivals that are fitted side by side know of each other: the best gain that signatures foretell and that a first step
+    reached, by joint; wide: what is foretold of each that concerns all joints."""
+
+    foretold: dict[str | None, float] = field(default_factory=dict)
+    reached: dict[str | None, float] = field(default_factory=dict)
+    wide: list[float] = field(default_factory=list)
+
+
+def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    for j, gain in zip(joints, gains):
+        best[j] = max(best.get(j, 0.0), gain)
+
+
+def _best(best: dict[str | None, float], joint: str | None) -> float:
+    """At a joint; of all, for what concerns all."""
+    return max(best.values()) if joint is None else best[joint]
+
+
 class Search:
     """Fits on one session."""
 
@@ -96,15 +120,13 @@ class Search:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
         each judged by its own joint's channels. takes: on which, by group. starts: sizes by candidate's key, found already; all
         are then fitted, and judged by all channels."""
-        foretold: dict[str | None, float] = {}
-        wide: list[float] = []
-        asking = {n: self._trying(current, group, takes[n], foretold, wide, iterations, starts) for n, group in enumerate(groups)}
+        race = Race()
+        asking = {n: self._trying(current, group, takes[n], race, iterations, starts) for n, group in enumerate(groups)}
         done = together(asking, lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
         return [trial for n in range(len(groups)) for trial in done[n]]
 
     def _trying(self, current: Fit, group: Sequence[Candidate], takes: tuple[int, ...],
-                foretold: dict[str | None, float], wide: list[float], iterations: int,
-                given: Mapping[Any, Array] | None) -> Asking:
+                race: Race, iterations: int, given: Mapping[Any, Array] | None) -> Asking:
         jury, apart = self.jury, given is None and group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE
         joints = [c.joint if apart else None for c in group]
         base = {i: current.residuals[i] for i in takes}
@@ -117,23 +139,22 @@ class Search:
         def left(answer: dict[int, Array]) -> list[Array]:
             return [jury.vector(answer, "fit", j) for j in joints]
 
-        probes = _scan(group[0], brief=any(jury.evidence[i].take.spec.base == "free" for i in takes)) if given is None else []
+        walking = self._stride(takes) == WALKING
+        probes = _scan(group[0], SCANNED_WALKING if walking else SCANNED) if given is None else []
         none: list[Array | None] = [None] * len(group)
         answers = (yield [question(none, COARSE), *(question([p] * len(group), COARSE) for p in probes)]) if probes else []
         seen = [[r + v - w for r, v, w in zip(r0, left(a), left(answers[0]))] for a in answers[1:]]
-        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen]) if given is None else (given[c.key], np.inf)
+        far = FAR_WALKING if walking else FAR
+        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) if given is None else (given[c.key], np.inf)
                    for b, c in enumerate(group)]
         starts, gains = [g[0] for g in guesses], [g[1] for g in guesses]
-        wide += [g for j, g in zip(joints, gains) if j is None]
-        for j, gain in zip(joints, gains):
-            foretold[j] = max(foretold.get(j, 0.0), gain)
+        race.wide.extend(g for j, g in zip(joints, gains) if j is None)
+        _tell(race.foretold, joints, gains)
         yield []  # until all have said what they foretell
-        best = max(foretold.values(), default=0.0)
-        last = sorted(wide, reverse=True)[:MOST_FITTED][-1] if wide else 0.0
-        least = [max(WORTH * best, last) if j is None else WORTH * foretold[j] for j in joints]
-        worth = [g > 0 and g >= enough for g, enough in zip(gains, least)]
+        last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
+        worth = [g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last) for j, g in zip(joints, gains)]
         alive = [b for b, w in enumerate(worth) if w]
-        if given is None and self._stride(takes) == WALKING:
+        if given is None and walking:
             iterations = 1 if apart else 2  # those ahead are fitted again, with all that was chosen or by all that they do
         out = [Trial(c, x, {"fit": min(g, 0.0), "choose": min(g, 0.0)}, j, foretold=True)
                for c, x, g, j, w in zip(group, starts, gains, joints, worth) if not w]
@@ -146,11 +167,24 @@ class Search:
                 sizes[b] = x
             return sizes
 
-        first = (yield [question(spread([starts[b] for b in alive]))])[0]
-        start_left = left(first)
         bounds = [group[b].bounds() for b in alive]
-        fit = fit_blocks([starts[b] for b in alive], [start_left[b] for b in alive], bounds, iterations, self._stride(takes))
-        solved = yield from through(fit, lambda point: question(spread(point)), lambda answer: [left(answer)[b] for b in alive])
+        points = [[share * starts[b] for b in alive] for share in ((1.0, 0.5) if walking else (1.0,))]
+        firsts = [left(a) for a in (yield [question(spread(p)) for p in points])]
+        nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
+        begin = [points[n][k] for k, n in enumerate(nearest)]
+        begin_left = [firsts[n][b] for b, n in zip(alive, nearest)]
+
+        def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
+                     ) -> Generator[list[Question], list[dict[int, Array]], list[Solved]]:
+            fit = fit_blocks(start, leaves, bounds, n, self._stride(takes), slopes)
+            return (yield from through(fit, lambda p: question(spread(p)), lambda answer: [left(answer)[b] for b in alive]))
+
+        solved = yield from improved(begin, begin_left, 1)
+        off_fit = [float(r0[b] @ r0[b]) - s.cost for b, s in zip(alive, solved)]
+        _tell(race.reached, [joints[b] for b in alive], off_fit)
+        yield []  # until all have come as far
+        if iterations > 1 and any(gain > BEHIND * _best(race.reached, joints[b]) for b, gain in zip(alive, off_fit)):
+            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, [s.J for s in solved])
         final = (yield [question(spread([s.x for s in solved]))])[0]
         for b, s in zip(alive, solved):
             off = {use: float(np.sum(jury.vector(base, use, joints[b]) ** 2) - np.sum(jury.vector(final, use, joints[b]) ** 2))
@@ -237,19 +271,19 @@ def _covariance(solved: Solved) -> Array:
     return out
 
 
-def _scan(c: Candidate, brief: bool) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several (one if `brief`); of more, each alone."""
+def _scan(c: Candidate, sizes: Sequence[float]) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several; of more, each alone."""
     if c.read_off:
         return [np.ones(c.size)]
     probes = c.probes()
-    if len(probes) > 1 or not c.size or c.joint is None or brief:
+    if len(probes) > 1 or not c.size:
         return probes
-    high = c.bounds()[1]
-    sizes = [np.minimum(s * probes[0], high) for s in SCANNED]
-    return sizes if not np.allclose(sizes[0], sizes[1]) else sizes[:1]
+    low, high = c.bounds()
+    points = [np.clip(s * probes[0], low, high) for s in sizes]
+    return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
-def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array]) -> tuple[Array, float]:
+def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
     """Sizes to start from, and how much of the sum of squares signatures say they take away."""
     whole = float(r0 @ r0)
     if not c.size:
@@ -263,7 +297,7 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
     for p, v in zip(probes, seen):
         S = v - r0
         power = float(S @ S)
-        size = float(np.clip(-(S @ r0) / power, -5.0, 5.0)) if power > 1e-9 else 0.0
+        size = float(np.clip(-(S @ r0) / power, -far, far)) if power > 1e-9 else 0.0
         x = np.clip(size * p, low, high)
         gain = whole - float(np.sum((r0 + S * float(x @ p / max(float(p @ p), 1e-9))) ** 2))
         if gain > best[1]:

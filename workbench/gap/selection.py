@@ -35,6 +35,8 @@ CLEARLY = 20.0
 ENOUGH, NEARLY_ALL = 0.6, 0.9
 """Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
 like the ground's, before joints are asked."""
+MOVED = 0.1
+"""Angle [rad] beyond which a joint has moved enough to show what it lacks."""
 ALIKE = 0.25
 """Joints whose best gain is this share of the greatest are taken in the same round."""
 
@@ -91,7 +93,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
            rounds: list[Round], report: Report) -> Fit:
     while len(current.effects) < MOST_EFFECTS:
         beyond = _remaining(search, current, nominal, takes)
-        if not beyond:
+        if not beyond or _too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
@@ -110,6 +112,13 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         current = search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
         current = search.refitted(current, takes, 2)
     return current
+
+
+def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
+    """Whether all that is beyond noise would not be enough for one more effect, beside those of the whole robot."""
+    vector = search.jury.vector({i: current.residuals[i] for i in takes}, "choose")
+    brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
+    return float(vector @ vector) - search.jury.expected(takes, "choose") < max(LEAST_GAIN, LEAST_SHARE * brought)
 
 
 def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: tuple[int, ...], say: Callable[[float], None]
@@ -131,11 +140,13 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and (s >= ALIKE * worst)}
     grounded = tuple(i for i in takes if i not in held)
-    ill = {joint_of(c) for i in held for c in channel_gaps(search.jury.evidence[i], current.residuals[i])}
+    well, ill = _when_held(search, current, held)
 
     def settled(c: Candidate) -> bool:
-        """What the whole robot's servos lack would show with the base held, too."""
-        return bool(held) and not ill and not c.where and c.effect.layer in ("timing", "actuator")
+        """What servos lack at any load would show with the base held, too."""
+        if c.effect.under_load or c.name in SEEN_ELSEWHERE or (c.where and c.joint is None) or c.effect.layer == "ground":
+            return False
+        return c.joint in well if c.joint else bool(well) and not ill
 
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
     groups: dict[object, list[Candidate]] = {}
@@ -149,7 +160,7 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
             if c.name in SEEN_ELSEWHERE:
                 if grounded:
                     groups[c.key] = [c]
-            elif c.joint in joints:
+            elif c.joint in joints and not (grounded and settled(c)):
                 groups.setdefault(c.key if c.read_off else (c.name, "joint"), []).append(c)
         elif c.effect.layer == "ground" and c.name != "ground_tilt" and not grounded:
             continue
@@ -160,6 +171,15 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
         alone = grounded and (c.effect.layer in ("ground", "inertia") or c.name in ("zero_offset", "link_length"))
         on.append(grounded if alone or (c.joint and grounded) else takes)
     return list(groups.values()), dict(enumerate(on))
+
+
+def _when_held(search: Search, current: Fit, held: tuple[int, ...]) -> tuple[set[str], set[str]]:
+    """Joints that moved while the base was held and went as the model has it; those that did not go so."""
+    evidence = search.jury.evidence
+    ill = {joint_of(c) for i in held for c in channel_gaps(evidence[i], current.residuals[i])}
+    moved = {j for i in held for j in evidence[i].joints
+             if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > MOVED}
+    return moved - ill, ill
 
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
