@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -206,3 +206,8 @@ def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[
     names = {"joint": seen, "foot": feet, "link": links, "rigid_body": list(model.rigid_bodies)}
     for place in effect.places:
         yield from [()] if place == "robot" else [(name,) for name in names[place]]
+
+
+def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]) -> RobotModel:
+    """The nominal robot with effects of given sizes, one after the other."""
+    return replace(nominal, effects=(*nominal.effects, *(c.spec(x) for c, x in effects)))

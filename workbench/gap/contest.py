@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.search import Fit, Report, Search, Trial
+from workbench.gap.race import Trial
+from workbench.gap.search import Fit, Report, Search
 from workbench.gap.selection import Chosen, Round, completed
 
 Array = NDArray[np.float64]

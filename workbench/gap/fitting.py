@@ -20,8 +20,8 @@ Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
-WALKING = 0.4
-"""Share of a number by which it is moved for a difference where the robot walks."""
+HELD, WALKING = 0.15, 0.4
+"""Share of a number by which it is moved for a difference, where the base is held and where the robot walks."""
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
 
@@ -39,21 +39,21 @@ class Solved:
         return float(self.r @ self.r)
 
 
-def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = 0.15,
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = HELD,
                slopes: Sequence[Array] | None = None) -> Asks:
-    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it; a block
-    of one number goes on with secants, from its slope if `slopes` are known. Walking answers small changes with noise: there
-    strides are long (WALKING)."""
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it, or
+    `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
+    Walking answers small changes with noise: there strides are long (WALKING)."""
     x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
     r = list(left)
     J = list(slopes) if slopes else [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
-    fresh = [slopes is not None and len(x_b) == 1 for x_b in x]
+    updated = [slopes is not None] * len(x)
     damping = [1e-3] * len(x)
     open_ = [len(x_b) > 0 for x_b in x]
     for _ in range(iterations):
         if not any(open_):
             break
-        stale = [o and not f for o, f in zip(open_, fresh)]
+        stale = [o and not u for o, u in zip(open_, updated)]
         if any(stale):
             columns = max(len(x_b) for x_b, s in zip(x, stale) if s)
             steps = [_steps(x_b, *b, stride) for x_b, b in zip(x, bounds)]
@@ -72,15 +72,13 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
             costs = [float(a[b] @ a[b]) for a in answers]
             best, before = int(np.argmin(costs)), float(r[b] @ r[b])
             if not costs[best] < before:
-                open_[b] = fresh[b] is True  # a secant may have misled: once more with a difference
-                fresh[b] = False
+                open_[b] = updated[b]  # an updated slope may have misled: once more with differences
+                updated[b] = False
                 continue
             moved = trials[best][b] - x[b]
-            if len(moved) == 1 and moved[0]:
-                J[b][:, 0] = (answers[best][b] - r[b]) / moved[0]
-                fresh[b] = True
-            else:
-                fresh[b] = False
+            updated[b] = bool(moved.any())
+            if updated[b]:
+                J[b] = J[b] + np.outer(answers[best][b] - r[b] - J[b] @ moved, moved) / (moved @ moved)
             open_[b] = before - costs[best] > SETTLED * before
             damping[b] = damping[b] / 3 if best == 0 else damping[b] * 10
             x[b], r[b] = trials[best][b], answers[best][b]

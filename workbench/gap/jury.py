@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.evidence import TakeEvidence
+from workbench.effects.registry import known_effects
+from workbench.gap.evidence import BLOCK, TakeEvidence
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
 
@@ -51,7 +52,7 @@ class Jury:
         self._recall([key for *_, key in wanted])
         new = {key: (q, i) for q, i, key in wanted if key not in self._known}
         order = sorted(new, key=lambda key: -self._cost(new[key][1]))  # the longest first, so that no core waits at the end
-        jobs = [self.job(q.model, i, replace(self.config, time_step=self.config.time_step * q.step))
+        jobs = [self.job(self._felt(q.model, i), i, replace(self.config, time_step=self.config.time_step * q.step))
                 for q, i in (new[k] for k in order)]
         rollouts = simulate_batch(jobs, self.n_jobs)
         self.rollouts += len(order)
@@ -66,6 +67,10 @@ class Jury:
         other = Jury(evidence, self.config, self.n_jobs, self.memory)
         other.rollouts = self.rollouts
         return other
+
+    def walks(self, takes: Sequence[int]) -> bool:
+        """Whether the base is free in any of these takes."""
+        return any(self.evidence[i].take.spec.base == "free" for i in takes)
 
     def observed(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
         """All takes as a model would show them, in another configuration (a finer step), seen like the recordings."""
@@ -92,6 +97,16 @@ class Jury:
             parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
         return np.concatenate(parts)
 
+    def stretches(self, takes: Sequence[int], use: str) -> NDArray[np.int_]:
+        """For each number of `vector`, which stretch of which take it is of."""
+        parts = [np.empty(0, dtype=int)]
+        for i in sorted(takes):
+            e = self.evidence[i]
+            since = e.take.recorded.time[e.uses[use]] - e.take.measurement.starts_at
+            stretch = i * 1000 + np.floor(since / BLOCK).astype(int)
+            parts.append(np.repeat(stretch, len(e.channels)))
+        return np.concatenate(parts)
+
     def expected(self, takes: Sequence[int], use: str, joint: str | None = None) -> float:
         """The sum of squares of `vector` that noise, numerics and contact models make."""
         total = 0.0
@@ -106,10 +121,16 @@ class Jury:
         e = self.evidence[take]
         return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)
 
+    def _felt(self, model: RobotModel, take: int) -> RobotModel:
+        """The model as this take can tell it: where the base is held, no floor and no mass of the base is felt."""
+        if self.evidence[take].take.spec.base != "fixed":
+            return model
+        return replace(model, effects=tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,)))
+
     def _key(self, q: Question, take: int) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
-        return f"{q.model.sha256[:20]}-{take}-{goals}-{q.step:g}"
+        return f"{self._felt(q.model, take).sha256[:20]}-{take}-{goals}-{q.step:g}"
 
     def _recall(self, keys: Sequence[str]) -> None:
         if self.memory is None:
@@ -125,3 +146,8 @@ class Jury:
             part = self.memory / f"{key}.part.npy"
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
+
+
+def _of_the_floor(e: EffectSpec) -> bool:
+    effect = known_effects().get(e.effect)
+    return effect is not None and effect.layer == "ground" and effect.name != "ground_tilt"

@@ -14,11 +14,13 @@ import numpy as np
 from workbench.gap.candidates import Candidate, heavy_links
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
-from workbench.gap.search import SEEN_ELSEWHERE, Fit, Report, Search, Trial
+from workbench.gap.race import Trial
+from workbench.gap.search import SEEN_ELSEWHERE, Fit, Report, Search
 
 MOST_EFFECTS = 6
-MOST_JOINTS = 3
-"""Effects of joints that are judged by all that they do on the ground: those that their own joints speak for most."""
+MOST_JOINTS, OWN_CLOSED, OWN_SHARE = 3, 0.4, 0.08
+"""Effects of joints that are judged by all that they do on the ground: those that their own joints speak for most, at least by
+this share of what is beyond noise there, and of what the best effect of the whole robot takes away everywhere."""
 LEAST_GAIN = 30.0
 """Of chi squared on the choosing stretches that each number of an effect must bring."""
 LEAST_SHARE = 0.05
@@ -35,6 +37,8 @@ CLEARLY = 20.0
 ENOUGH, NEARLY_ALL = 0.6, 0.9
 """Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
 like the ground's, before joints are asked."""
+MOST_STEPS = 5
+"""Of a fit of all effects, when one was added; it ends where little changes."""
 MOVED = 0.1
 """Angle [rad] beyond which a joint has moved enough to show what it lacks."""
 ALIKE = 0.25
@@ -110,21 +114,28 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         if not accepted:
             break
         current = search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
-        current = search.refitted(current, takes, 2)
+        current = search.refitted(current, takes, MOST_STEPS)
     return current
 
 
 def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect, beside those of the whole robot."""
-    vector = search.jury.vector({i: current.residuals[i] for i in takes}, "choose")
+    jury, left = search.jury, 0.0
+    for i in takes:
+        if channel_gaps(jury.evidence[i], current.residuals[i]):
+            vector = jury.vector({i: current.residuals[i]}, "choose")
+            left += max(0.0, float(vector @ vector) - jury.expected([i], "choose"))
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
-    return float(vector @ vector) - search.jury.expected(takes, "choose") < max(LEAST_GAIN, LEAST_SHARE * brought)
+    return left < max(LEAST_GAIN, LEAST_SHARE * brought)
 
 
 def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: tuple[int, ...], say: Callable[[float], None]
                      ) -> list[Trial]:
     """On the ground one bad joint moves the whole robot: the likeliest effects of joints, judged by all channels."""
-    ahead = sorted((t for t in trials if t.joint is not None and not t.foretold), key=lambda t: -t.gain["choose"])[:MOST_JOINTS]
+    widest = max((t.gain["choose"] for t in trials if t.joint is None), default=0.0)
+    told = [t for t in trials if t.joint is not None and not t.foretold and t.closed > OWN_CLOSED
+            and t.gain["choose"] > OWN_SHARE * widest]
+    ahead = sorted(told, key=lambda t: -t.gain["choose"])[:MOST_JOINTS]
     if not ahead:
         return trials
     again = search.tried(current, [[t.candidate] for t in ahead], dict.fromkeys(range(len(ahead)), takes), say,
@@ -152,6 +163,8 @@ def _groups(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dic
     groups: dict[object, list[Candidate]] = {}
     on: list[tuple[int, ...]] = []
     for c in pool:
+        if c.name == "com_shift" and ("payload", c.where) in used:
+            continue  # a point mass has that freedom
         if c.key in used or _tier(c, bool(grounded), heavy) != tier:
             continue
         if c.effect.layer == "measurement":

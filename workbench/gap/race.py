@@ -1,0 +1,196 @@
+"""A race between effects for what is missing: one group's way through it, as a generator that wants rollouts."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.candidates import Candidate, with_effects
+from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through
+from workbench.gap.jury import COARSE, Jury, Question
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+SCANNED, SCANNED_WALKING = (1.0, 4.0), (0.7, 2.0)
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted."""
+FAR, FAR_WALKING = 5.0, 1.6
+"""Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
+WORTH = 0.4
+"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
+BEHIND = 0.6
+"""Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
+MOST_FITTED = 3
+"""Effects of the whole robot, of feet or links that are fitted at a time: those of which signatures foretell most."""
+Steps = Generator[list[Question], list[dict[int, Array]], T]
+"""What a part of a race asks, is answered, and returns."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate fitted beside the effects there were. gain: of chi squared by use; closed: share of what was beyond noise on
+    the choosing stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
+    much less of it than of a rival that no fit was made."""
+
+    candidate: Candidate
+    x: Array
+    gain: Mapping[str, float]
+    joint: str | None
+    foretold: bool = False
+    closed: float = 0.0
+
+
+Asking = Steps[list[Trial]]
+
+
+@dataclass(frozen=True)
+class Race:
+    """What rivals that are fitted side by side know of each other: the best gain that signatures foretell and that a first step
+    reached, by joint; wide: what is foretold of each that concerns all joints."""
+
+    foretold: dict[str | None, float] = field(default_factory=dict)
+    reached: dict[str | None, float] = field(default_factory=dict)
+    wide: list[float] = field(default_factory=list)
+
+
+class Trying:
+    """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
+
+    A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels where `apart`.
+    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take.
+    """
+
+    def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
+                 group: Sequence[Candidate], race: Race, apart: bool) -> None:
+        self.jury, self.group, self.race, self.apart = jury, group, race, apart
+        self.with_these, self.base, self.takes = with_effects(nominal, beside), base, tuple(base)
+        self.joints = [c.joint if apart else None for c in group]
+        self.walking = jury.walks(self.takes)
+        self.r0 = self._left(base)
+
+    def run(self, iterations: int, starts: Mapping[Any, Array] | None = None) -> Asking:
+        """Trials of all in the group. starts: sizes by candidate's key, found already; all are then fitted."""
+        if starts is None:
+            starts_now, gains = yield from self._looked_at()
+            alive = yield from self._worth_fitting(gains)
+            if self.walking:
+                iterations = 1 if self.apart else 2  # those ahead are fitted again, with all that was chosen or by all they do
+        else:
+            starts_now, gains = [starts[c.key] for c in self.group], [np.inf] * len(self.group)
+            alive = list(range(len(self.group)))
+        out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
+               for b, (c, x, g, j) in enumerate(zip(self.group, starts_now, gains, self.joints)) if b not in alive]
+        if not alive:
+            return out
+        sizes = yield from self._fitted([starts_now[b] for b in alive], alive, iterations)
+        final = (yield [self._question(alive, sizes)])[0]
+        return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
+
+    def _looked_at(self) -> Steps[tuple[list[Array], list[float]]]:
+        """Sizes to start from and what signatures say they gain, from coarse rollouts."""
+        everyone = list(range(len(self.group)))
+        probes = _scan(self.group[0], SCANNED_WALKING if self.walking else SCANNED)
+        without, *answers = yield [self._question([], [], COARSE),
+                                   *(self._question(everyone, [p] * len(everyone), COARSE) for p in probes)]
+        plain = self._left(without)
+        seen = [[r + v - w for r, v, w in zip(self.r0, self._left(a), plain)] for a in answers]
+        far = FAR_WALKING if self.walking else FAR
+        guesses = [_guess(c, self.r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
+        return [g[0] for g in guesses], [g[1] for g in guesses]
+
+    def _worth_fitting(self, gains: Sequence[float]) -> Steps[list[int]]:
+        """Of the group, those that are not told to be far behind a rival."""
+        race = self.race
+        race.wide.extend(g for j, g in zip(self.joints, gains) if j is None)
+        _tell(race.foretold, self.joints, gains)
+        yield []  # until all have said what they foretell
+        last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
+        return [b for b, (j, g) in enumerate(zip(self.joints, gains))
+                if g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
+
+    def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Steps[list[Array]]:
+        """Sizes after one step, and after all steps where the group is not behind by then."""
+        bounds = [self.group[b].bounds() for b in alive]
+        points = [[share * x for x in starts] for share in ((1.0, 0.5) if self.walking else (1.0,))]
+        firsts = [self._left(a) for a in (yield [self._question(alive, p) for p in points])]
+        nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
+
+        def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
+                     ) -> Steps[list[Solved]]:
+            fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, slopes)
+            return (yield from through(fit, lambda p: self._question(alive, p),
+                                       lambda answer: [self._left(answer)[b] for b in alive]))
+
+        solved = yield from improved([points[n][k] for k, n in enumerate(nearest)],
+                                     [firsts[n][b] for b, n in zip(alive, nearest)], 1)
+        gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
+        _tell(self.race.reached, [self.joints[b] for b in alive], gains)
+        yield []  # until all have come as far
+        if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
+            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, [s.J for s in solved])
+        return [s.x for s in solved]
+
+    def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
+        joint = self.joints[b]
+
+        def vector(residuals: dict[int, Array], use: str) -> Array:
+            return self.jury.vector(residuals, use, joint)
+
+        off = {use: float(np.sum(vector(self.base, use) ** 2) - np.sum(vector(answer, use) ** 2)) for use in ("fit", "choose")}
+        beyond = float(np.sum(vector(self.base, "choose") ** 2)) - self.jury.expected(self.takes, "choose", joint)
+        return Trial(self.group[b], x, off, joint, closed=off["choose"] / max(beyond, 1.0))
+
+    def _question(self, which: Sequence[int], sizes: Sequence[Array], step: float = 1.0) -> Question:
+        """The robot with those of the group at these sizes, beside what there is already."""
+        return Question(with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)]), self.takes, step)
+
+    def _left(self, answer: dict[int, Array]) -> list[Array]:
+        return [self.jury.vector(answer, "fit", j) for j in self.joints]
+
+
+def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    for j, gain in zip(joints, gains):
+        best[j] = max(best.get(j, 0.0), gain)
+
+
+def _best(best: dict[str | None, float], joint: str | None) -> float:
+    """At a joint; of all, for what concerns all."""
+    return max(best.values()) if joint is None else best[joint]
+
+
+def _scan(c: Candidate, sizes: Sequence[float]) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several; of more, each alone."""
+    if c.read_off:
+        return [np.ones(c.size)]
+    probes = c.probes()
+    if len(probes) > 1 or not c.size:
+        return probes
+    low, high = c.bounds()
+    points = [np.clip(s * probes[0], low, high) for s in sizes]
+    return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
+
+
+def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
+    """Sizes to start from, and how much of the sum of squares signatures say they take away."""
+    whole = float(r0 @ r0)
+    if not c.size:
+        return np.empty(0), whole - float(seen[0] @ seen[0])
+    low, high = c.bounds()
+    if np.linalg.matrix_rank(np.array(probes)) > 1:  # several numbers, not one at several sizes
+        S = np.stack([(v - r0) for v in seen], axis=1)
+        shares, *_ = np.linalg.lstsq(S, -r0, rcond=1e-8)
+        return np.clip(c.combined(shares), low, high), whole - float(np.sum((r0 + S @ shares) ** 2))
+    best = (probes[0], -np.inf)
+    for p, v in zip(probes, seen):
+        S = v - r0
+        power = float(S @ S)
+        size = float(np.clip(-(S @ r0) / power, -far, far)) if power > 1e-9 else 0.0
+        x = np.clip(size * p, low, high)
+        gain = whole - float(np.sum((r0 + S * float(x @ p / max(float(p @ p), 1e-9))) ** 2))
+        if gain > best[1]:
+            best = (x, gain)
+    return best
