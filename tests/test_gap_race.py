@@ -1,0 +1,105 @@
+"""What keeps a search short: guesses near what was looked at, rules instead of differences, nothing rolled out in vain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.test_gap_search import CONFIG, gathered
+from workbench.effects.registry import known_effects
+from workbench.gap.candidates import Candidate
+from workbench.gap.fitting import Solved, fit_blocks, together
+from workbench.gap.jury import Jury, Question
+from workbench.gap.race import FAR_WALKING, Race, _best, _guess, _scan, _tell
+from workbench.gap.search import Search, _covariance
+from workbench.gap.selection import _when_held
+from workbench.robot import EffectSpec
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    return gathered(tmp_path_factory.mktemp("quiet"), 0.06)
+
+
+def friction():
+    return Candidate.of(known_effects()["ground_friction"], (), (0.6,))
+
+
+def test_an_effect_of_one_number_is_looked_at_at_several_sizes_within_its_bounds():
+    c = friction()
+    assert [c.values(p)[0] for p in _scan(c, (0.7, 2.0))] == pytest.approx([0.46, 0.2])
+    assert len(_scan(c, (90.0, 99.0))) == 1  # both at the bound
+
+
+def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
+    c = Candidate.of(known_effects()["command_delay"], (), (0.0,))
+    r0 = np.ones(20)
+    probes = _scan(c, (0.7, 2.0))
+    weak = [r0 - 0.01 * p[0] for p in probes]  # a line would say: a hundred times that
+    x, gain = _guess(c, r0, probes, weak, FAR_WALKING)
+    assert x[0] == pytest.approx(FAR_WALKING * 2.0)
+    assert 0 < gain < 20
+    slips = [r0, r0 - 1.0]  # nothing at the first size, all at the second
+    assert _guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
+
+
+def test_rivals_know_the_best_at_their_joint_and_of_all():
+    race = Race()
+    _tell(race.reached, ["flm", None], [3.0, 8.0])
+    _tell(race.reached, ["flm", "frm"], [5.0, -1.0])
+    assert (_best(race.reached, "flm"), _best(race.reached, "frm"), _best(race.reached, None)) == (5.0, 0.0, 8.0)
+
+
+def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_again():
+    t = np.linspace(0, 1, 60)
+    true, asked = np.array([0.7, 2.0, -0.5]), []
+
+    def left(x):
+        asked.append(x)
+        return true[0] * np.exp(-true[1] * t) + true[2] * t - x[0] * np.exp(-x[1] * t) - x[2] * t
+
+    start = np.array([0.5, 1.5, -0.2])
+    bounds = [(np.full(3, -5.0), np.full(3, 5.0))]
+    fit = fit_blocks([start], [left(start)], bounds, 8)
+    solved = together({0: fit}, lambda wanted: [[left(point[0])] for _, point in wanted])[0][0]
+    assert solved.x == pytest.approx(true, rel=0.02)
+    assert len(asked) <= 1 + 3 + 2 * 8
+
+
+def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_together():
+    rng = np.random.default_rng(3)
+    stretches = np.repeat(np.arange(40), 50)
+    J = -np.ones((2000, 1))
+    means = [np.mean(np.repeat(rng.normal(size=40), 50)) for _ in range(200)]  # of what is the same over a stretch
+    r = np.repeat(rng.normal(size=40), 50)
+    told = np.sqrt(_covariance(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
+    assert told == pytest.approx(np.std(means), rel=0.3)
+    white = rng.normal(size=2000)
+    assert np.sqrt(_covariance(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
+    assert np.isinf(_covariance(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
+
+
+def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):
+    session, evidence = quiet
+    jury = Jury(evidence, CONFIG, n_jobs=1)
+    plain = jury.residuals([Question(session.model, (0,))])[0][0]
+    floor = replace(session.model, effects=(EffectSpec("ground_friction", (), {"friction": 0.2}),))
+    np.testing.assert_array_equal(jury.residuals([Question(floor, (0,))])[0][0], plain)
+    assert jury.rollouts == 1
+    worn = replace(session.model, effects=(EffectSpec("coulomb_friction", ("three",), {"torque": 0.1}),))
+    assert np.nanmax(np.abs(jury.residuals([Question(worn, (0,))])[0][0] - plain)) > 1
+    assert jury.rollouts == 2
+
+
+def test_every_number_of_a_vector_has_its_stretch(quiet):
+    _, evidence = quiet
+    jury = Jury(evidence, CONFIG, n_jobs=1)
+    shape = {0: np.zeros_like(evidence[0].recorded)}
+    assert len(jury.stretches((0,), "fit")) == len(jury.vector(shape, "fit"))
+
+
+def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
+    session, evidence = quiet
+    search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
+    well, ill = _when_held(search, search.evaluated([]), (0,))
+    assert (well, ill) == (set(session.model.joints), set())
