@@ -7,12 +7,12 @@ import pytest
 
 from tests.test_gap_search import CONFIG, gathered
 from workbench.effects.registry import known_effects
+from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
 from workbench.gap.fitting import Solved, fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.race import FAR_WALKING, Race, _best, _guess, _scan, _tell
 from workbench.gap.search import Search, _covariance
-from workbench.gap.selection import _when_held
 from workbench.robot import EffectSpec
 
 

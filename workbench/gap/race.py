@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -50,8 +50,10 @@ Asking = Steps[list[Trial]]
 @dataclass(frozen=True)
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that signatures foretell and that a first step
-    reached, by joint; wide: what is foretold of each that concerns all joints."""
+    reached, by joint; wide: what is foretold of each that concerns all joints. least: share of all that is left in which the
+    effect of one joint must show at that joint to be fitted."""
 
+    least: float = 0.0
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: list[float] = field(default_factory=list)
@@ -71,6 +73,10 @@ class Trying:
         self.joints = [c.joint if apart else None for c in group]
         self.walking = jury.walks(self.takes)
         self.r0 = self._left(base)
+        # a walk is expensive: it is looked at in the take that leaves most
+        power = {i: float(np.sum(jury.vector({i: r}, "fit") ** 2)) for i, r in base.items()}
+        self.looked_at = (max(power, key=lambda i: power[i]),) if self.walking else self.takes
+        self.enough = race.least * sum(power[i] for i in self.looked_at)
 
     def run(self, iterations: int, starts: Mapping[Any, Array] | None = None) -> Asking:
         """Trials of all in the group. starts: sizes by candidate's key, found already; all are then fitted."""
@@ -94,12 +100,12 @@ class Trying:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         probes = _scan(self.group[0], SCANNED_WALKING if self.walking else SCANNED)
-        without, *answers = yield [self._question([], [], COARSE),
-                                   *(self._question(everyone, [p] * len(everyone), COARSE) for p in probes)]
-        plain = self._left(without)
-        seen = [[r + v - w for r, v, w in zip(self.r0, self._left(a), plain)] for a in answers]
+        asked = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
+        without, *answers = yield [replace(q, takes=self.looked_at, step=COARSE) for q in asked]
+        r0, plain = self._left({i: self.base[i] for i in self.looked_at}), self._left(without)
+        seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
         far = FAR_WALKING if self.walking else FAR
-        guesses = [_guess(c, self.r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
+        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
         return [g[0] for g in guesses], [g[1] for g in guesses]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Steps[list[int]]:
@@ -110,7 +116,7 @@ class Trying:
         yield []  # until all have said what they foretell
         last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
+                if g > 0 and g >= WORTH * _best(race.foretold, j) and g >= (last if j is None else self.enough)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Steps[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
@@ -144,9 +150,9 @@ class Trying:
         beyond = float(np.sum(vector(self.base, "choose") ** 2)) - self.jury.expected(self.takes, "choose", joint)
         return Trial(self.group[b], x, off, joint, closed=off["choose"] / max(beyond, 1.0))
 
-    def _question(self, which: Sequence[int], sizes: Sequence[Array], step: float = 1.0) -> Question:
+    def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
         """The robot with those of the group at these sizes, beside what there is already."""
-        return Question(with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)]), self.takes, step)
+        return Question(with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)]), self.takes)
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
         return [self.jury.vector(answer, "fit", j) for j in self.joints]

@@ -67,11 +67,12 @@ class Search:
         return Fit(tuple(c for c, _ in effects), x, covariance, self._cost(residuals), residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], iterations: int = 3, starts: Mapping[Any, Array] | None = None) -> list[Trial]:
+              report: Callable[[float], None], iterations: int = 3, starts: Mapping[Any, Array] | None = None, least: float = 0.0
+              ) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
         each judged by its own joint's channels. takes: on which, by group. starts: sizes by candidate's key, found already; all
-        are then fitted, and judged by all channels."""
-        race = Race()
+        are then fitted, and judged by all channels. least: see Race."""
+        race = Race(least)
         asking = {}
         for n, group in enumerate(groups):
             apart = starts is None and group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE
