@@ -69,13 +69,16 @@ class Trying:
     def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
                  group: Sequence[Candidate], race: Race, apart: bool) -> None:
         self.jury, self.group, self.race, self.apart = jury, group, race, apart
-        self.with_these, self.base, self.takes = with_effects(nominal, beside), base, tuple(base)
+        self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
-        self.walking = jury.walks(self.takes)
-        self.r0 = self._left(base)
-        # a walk is expensive: it is looked at in the take that leaves most
+        self.walking = jury.walks(tuple(base))
+        # walks are expensive: they are looked at in the take that leaves most; joints apart are fitted there alone, as those
+        # ahead are judged by all that they do
         power = {i: float(np.sum(jury.vector({i: r}, "fit") ** 2)) for i, r in base.items()}
-        self.looked_at = (max(power, key=lambda i: power[i]),) if self.walking else self.takes
+        self.looked_at = (max(power, key=lambda i: power[i]),) if self.walking else tuple(base)
+        self.takes = self.looked_at if apart else tuple(base)
+        self.base = {i: base[i] for i in self.takes}
+        self.r0 = self._left(self.base)
         self.enough = race.least * sum(power[i] for i in self.looked_at)
 
     def run(self, iterations: int, starts: Mapping[Any, Array] | None = None) -> Asking:
