@@ -14,6 +14,8 @@ from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 TIERS = 3
 ALIKE = 0.25
 """Joints that are this share as ill as the worst are asked about."""
+FEW = 2
+"""Joints that may be ill on the ground, with the body as the model has it, without anything but these being asked about."""
 MOVED = 0.1
 """Angle [rad] beyond which a joint has moved enough to show what it lacks."""
 
@@ -25,6 +27,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and (s >= ALIKE * worst)}
     grounded = tuple(i for i in takes if i not in held)
+    moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current, held)
 
     def settled(c: Candidate) -> bool:
@@ -48,7 +51,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             groups[c.key] = [c]
         elif c.joint is not None:
             if c.name in SEEN_ELSEWHERE:
-                if grounded:
+                if moves_all or (grounded and c.joint in joints):
                     groups[c.key] = [c]
             elif c.joint in joints and not (grounded and settled(c)):
                 groups.setdefault(c.key if c.read_off else (c.name, "joint"), []).append(c)
@@ -85,8 +88,8 @@ def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
-    """Whether an effect could make these joints err with the base held: one of the whole robot errs in several, one of a link in
-    the joints that carry it."""
+    """Whether an effect could make these joints err and no others, or with the base held: one of the whole robot errs in several,
+    one of a link in the joints that carry it, the floor in none."""
     if c.effect.layer == "ground" and c.name != "ground_tilt":
         return False
     k = search.nominal.kinematics

@@ -79,10 +79,13 @@ class Trying:
         self.takes = self.looked_at if apart else tuple(base)
         self.base = {i: base[i] for i in self.takes}
         self.r0 = self._left(self.base)
+        self.without: dict[int, Array] = {}
         self.enough = race.least * sum(power[i] for i in self.looked_at)
 
     def run(self, iterations: int, starts: Mapping[Any, Array] | None = None) -> Asking:
         """Trials of all in the group. starts: sizes by candidate's key, found already; all are then fitted."""
+        if self.walking:
+            (self.without,) = yield [self._question([], [])]
         if starts is None:
             starts_now, gains = yield from self._looked_at()
             alive = yield from self._worth_fitting(gains)
@@ -96,8 +99,8 @@ class Trying:
         if not alive:
             return out
         sizes = yield from self._fitted([starts_now[b] for b in alive], alive, iterations)
-        final = (yield [self._question(alive, sizes)])[0]
-        return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
+        (final,) = yield [self._question(alive, sizes)]
+        return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
 
     def _looked_at(self) -> Steps[tuple[list[Array], list[float]]]:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
@@ -125,14 +128,14 @@ class Trying:
         """Sizes after one step, and after all steps where the group is not behind by then."""
         bounds = [self.group[b].bounds() for b in alive]
         points = [[share * x for x in starts] for share in ((1.0, 0.5) if self.walking else (1.0,))]
-        firsts = [self._left(a) for a in (yield [self._question(alive, p) for p in points])]
+        firsts = [self._left(self._told(a)) for a in (yield [self._question(alive, p) for p in points])]
         nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
 
         def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
                      ) -> Steps[list[Solved]]:
             fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, slopes)
             return (yield from through(fit, lambda p: self._question(alive, p),
-                                       lambda answer: [self._left(answer)[b] for b in alive]))
+                                       lambda answer: [self._left(self._told(answer))[b] for b in alive]))
 
         solved = yield from improved([points[n][k] for k, n in enumerate(nearest)],
                                      [firsts[n][b] for b, n in zip(alive, nearest)], 1)
@@ -155,7 +158,12 @@ class Trying:
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
         """The robot with those of the group at these sizes, beside what there is already."""
-        return Question(with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)]), self.takes)
+        model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
+        return Question(model, self.takes, COARSE if self.walking else 1.0)
+
+    def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
+        """What an answer leaves; of a walk, the difference that coarse steps tell, beside what the search's step leaves."""
+        return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.walking else answer
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
         return [self.jury.vector(answer, "fit", j) for j in self.joints]

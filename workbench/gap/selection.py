@@ -29,7 +29,7 @@ LEAST_SHARE = 0.05
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
 that."""
 ROUGH_SHARE = 0.1
-"""The same of a channel's gap on the ground, where engines differ more."""
+"""The same of a channel's gap on the ground, where engines differ more, and of what is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
 several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
@@ -127,7 +127,7 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
             vector = jury.vector({i: current.residuals[i]}, "choose")
             left += max(0.0, float(vector @ vector) - jury.expected([i], "choose"))
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
-    return left < max(LEAST_GAIN, LEAST_SHARE * brought)
+    return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
 
 
 def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: tuple[int, ...], say: Callable[[float], None]
