@@ -22,8 +22,8 @@ MOVED = 0.1
 
 def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
             held: tuple[int, ...], tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
-    """Groups to try, and on which takes each: effects of joints at the joints with a gap, all joints at once; others one by one.
-    tier: what is likely comes first, as there is so much of the rest."""
+    """Groups to try, and on which takes each: effects of joints at the joints with a gap, with the base held all joints at once,
+    as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and (s >= ALIKE * worst)}
     grounded = tuple(i for i in takes if i not in held)
@@ -54,7 +54,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
                 if moves_all or (grounded and c.joint in joints):
                     groups[c.key] = [c]
             elif c.joint in joints and not (grounded and settled(c)):
-                groups.setdefault(c.key if c.read_off else (c.name, "joint"), []).append(c)
+                groups.setdefault(c.key if c.read_off or grounded else (c.name, "joint"), []).append(c)
         elif c.effect.layer == "ground" and c.name != "ground_tilt" and not grounded:
             continue
         elif (grounded and not settled(c)) or (not grounded and _could_show(search, c, joints)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-SCANNED, SCANNED_WALKING = (1.0, 4.0), (0.7, 2.0)
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted."""
+SCANNED, SCANNED_GROUND = (1.0, 4.0), (0.7, 2.0)
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 WORTH = 0.4
@@ -25,7 +25,9 @@ WORTH = 0.4
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 MOST_FITTED = 3
-"""Effects of the whole robot, of feet or links that are fitted at a time: those of which signatures foretell most."""
+"""Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
+STEPS, STEPS_WALKING = 3, 2
+"""Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Steps = Generator[list[Question], list[dict[int, Array]], T]
 """What a part of a race asks, is answered, and returns."""
 
@@ -50,10 +52,8 @@ Asking = Steps[list[Trial]]
 @dataclass(frozen=True)
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that signatures foretell and that a first step
-    reached, by joint; wide: what is foretold of each that concerns all joints. least: share of all that is left in which the
-    effect of one joint must show at that joint to be fitted."""
+    reached, by joint; wide: what is foretold of each that is judged by all channels."""
 
-    least: float = 0.0
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: list[float] = field(default_factory=list)
@@ -62,53 +62,44 @@ class Race:
 class Trying:
     """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
 
-    A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels where `apart`.
+    A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
     beside, base: effects there are already with their sizes, and what they leave on `takes`, by take.
     """
 
     def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
                  group: Sequence[Candidate], race: Race, apart: bool) -> None:
-        self.jury, self.group, self.race, self.apart = jury, group, race, apart
+        self.jury, self.group, self.race = jury, group, race
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
         self.walking = jury.walks(tuple(base))
-        # walks are expensive: they are looked at in the take that leaves most; joints apart are fitted there alone, as those
-        # ahead are judged by all that they do
-        power = {i: float(np.sum(jury.vector({i: r}, "fit") ** 2)) for i, r in base.items()}
-        self.looked_at = (max(power, key=lambda i: power[i]),) if self.walking else tuple(base)
-        self.takes = self.looked_at if apart else tuple(base)
-        self.base = {i: base[i] for i in self.takes}
-        self.r0 = self._left(self.base)
+        self.base, self.takes = base, tuple(base)
+        self.r0 = self._left(base)
         self.without: dict[int, Array] = {}
-        self.enough = race.least * sum(power[i] for i in self.looked_at)
 
-    def run(self, iterations: int, starts: Mapping[Any, Array] | None = None) -> Asking:
-        """Trials of all in the group. starts: sizes by candidate's key, found already; all are then fitted."""
+    def run(self) -> Asking:
+        """Trials of all in the group."""
         if self.walking:
             (self.without,) = yield [self._question([], [])]
-        if starts is None:
-            starts_now, gains = yield from self._looked_at()
-            alive = yield from self._worth_fitting(gains)
-            if self.walking:
-                iterations = 1 if self.apart else 2  # those ahead are fitted again, with all that was chosen or by all they do
-        else:
-            starts_now, gains = [starts[c.key] for c in self.group], [np.inf] * len(self.group)
-            alive = list(range(len(self.group)))
+        starts, gains = yield from self._looked_at()
+        alive = yield from self._worth_fitting(gains)
         out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
-               for b, (c, x, g, j) in enumerate(zip(self.group, starts_now, gains, self.joints)) if b not in alive]
+               for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
             return out
-        sizes = yield from self._fitted([starts_now[b] for b in alive], alive, iterations)
+        sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
         (final,) = yield [self._question(alive, sizes)]
         return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
 
     def _looked_at(self) -> Steps[tuple[list[Array], list[float]]]:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
-        probes = _scan(self.group[0], SCANNED_WALKING if self.walking else SCANNED)
+        c = self.group[0]
+        probes = _scan(c, SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1])
+        power = {i: float(np.sum(self.jury.vector({i: r}, "fit") ** 2)) for i, r in self.base.items()}
+        looked_at = (max(power, key=lambda i: power[i]),) if self.walking else self.takes  # as walks are expensive
         asked = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
-        without, *answers = yield [replace(q, takes=self.looked_at, step=COARSE) for q in asked]
-        r0, plain = self._left({i: self.base[i] for i in self.looked_at}), self._left(without)
+        without, *answers = yield [replace(q, takes=looked_at, step=COARSE) for q in asked]
+        r0, plain = self._left({i: self.base[i] for i in looked_at}), self._left(without)
         seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
         far = FAR_WALKING if self.walking else FAR
         guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
@@ -122,7 +113,7 @@ class Trying:
         yield []  # until all have said what they foretell
         last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > 0 and g >= WORTH * _best(race.foretold, j) and g >= (last if j is None else self.enough)]
+                if g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Steps[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,18 +66,14 @@ class Search:
         return Fit(tuple(c for c, _ in effects), x, covariance, self._cost(residuals), residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], iterations: int = 3, starts: Mapping[Any, Array] | None = None, least: float = 0.0
-              ) -> list[Trial]:
-        """Every group fitted beside `current`, all in lockstep. A group is one candidate, or one effect at several joints,
-        each judged by its own joint's channels. takes: on which, by group. starts: sizes by candidate's key, found already; all
-        are then fitted, and judged by all channels. least: see Race."""
-        race = Race(least)
-        asking = {}
+              report: Callable[[float], None]) -> list[Trial]:
+        """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
+        at several joints, each judged by its own joint's channels. takes: on which, by group."""
+        race, asking = Race(), {}
         for n, group in enumerate(groups):
-            apart = starts is None and group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE
+            apart = group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE and not self.jury.walks(takes[n])
             base = {i: current.residuals[i] for i in takes[n]}
-            runner = Trying(self.jury, self.nominal, current.sizes(), base, group, race, apart)
-            asking[n] = runner.run(iterations, starts)
+            asking[n] = Trying(self.jury, self.nominal, current.sizes(), base, group, race, apart).run()
         done = together(asking, lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
         return [trial for n in range(len(groups)) for trial in done[n]]
 

@@ -5,7 +5,7 @@ First what held takes show, where nothing but the servos moves the robot; then, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -19,9 +19,6 @@ from workbench.gap.race import Trial
 from workbench.gap.search import Fit, Report, Search
 
 MOST_EFFECTS = 6
-MOST_JOINTS, OWN_CLOSED, OWN_SHARE = 3, 0.4, 0.08
-"""Effects of joints that are judged by all that they do on the ground: those that their own joints speak for most, at least by
-this share of what is beyond noise there, and of what the best effect of the whole robot takes away everywhere."""
 LEAST_GAIN = 30.0
 """Of chi squared on the choosing stretches that each number of an effect must bring."""
 LEAST_SHARE = 0.05
@@ -103,10 +100,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         trials: list[Trial] = []
         for tier in range(TIERS):
             groups, on = asked(search, pool, current, beyond, takes, held, tier)
-            least = OWN_SHARE * max((t.gain["fit"] for t in trials), default=0.0) / current.cost["fit"]
-            trials += search.tried(current, groups, on, say, least=least)
-            if set(takes) - set(held):
-                trials = _for_all_it_does(search, current, trials, takes, say)
+            trials += search.tried(current, groups, on, say)
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
                 break
@@ -128,21 +122,6 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
             left += max(0.0, float(vector @ vector) - jury.expected([i], "choose"))
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
     return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
-
-
-def _for_all_it_does(search: Search, current: Fit, trials: list[Trial], takes: tuple[int, ...], say: Callable[[float], None]
-                     ) -> list[Trial]:
-    """On the ground one bad joint moves the whole robot: the likeliest effects of joints, judged by all channels."""
-    widest = max((t.gain["choose"] for t in trials if t.joint is None), default=0.0)
-    told = [t for t in trials if t.joint is not None and not t.foretold and t.closed > OWN_CLOSED
-            and t.gain["choose"] > OWN_SHARE * widest]
-    ahead = sorted(told, key=lambda t: -t.gain["choose"])[:MOST_JOINTS]
-    if not ahead:
-        return trials
-    again = search.tried(current, [[t.candidate] for t in ahead], dict.fromkeys(range(len(ahead)), takes), say,
-                         starts={t.candidate.key: t.x for t in ahead})
-    keys = {t.candidate.key for t in again}
-    return [*again, *(t for t in trials if t.candidate.key not in keys)]
 
 
 def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[Trial]:
