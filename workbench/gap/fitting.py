@@ -20,8 +20,8 @@ Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
-HELD, WALKING = 0.15, 0.4
-"""Share of a number by which it is moved for a difference, where the base is held and where the robot walks."""
+HELD, WALKING, NEAR = 0.15, 0.4, 0.25
+"""Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
 
@@ -50,10 +50,12 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     updated = [slopes is not None] * len(x)
     damping = [1e-3] * len(x)
     open_ = [len(x_b) > 0 for x_b in x]
+    missed = [False] * len(x)
     for _ in range(iterations):
         if not any(open_):
             break
         stale = [o and not u for o, u in zip(open_, updated)]
+        found: list[list[tuple[Array, Array]]] = [[] for _ in x]
         if any(stale):
             columns = max(len(x_b) for x_b, s in zip(x, stale) if s)
             steps = [_steps(x_b, *b, stride) for x_b, b in zip(x, bounds)]
@@ -63,25 +65,28 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
                 for b, v in enumerate(answer):
                     if stale[b] and i < len(x[b]):
                         J[b][:, i] = (v - r[b]) / steps[b][i]
+                        found[b].append((points[i][b], v))
         trials = [[_step(x_b, r_b, J_b, d * k + extra, *b) if o else x_b
                    for x_b, r_b, J_b, d, b, o in zip(x, r, J, damping, bounds, open_)] for k, extra in ((1, 0.0), (30, 0.3))]
         answers = yield trials
         for b in range(len(x)):
             if not open_[b]:
                 continue
-            costs = [float(a[b] @ a[b]) for a in answers]
+            tried = [(t[b], a[b]) for t, a in zip(trials, answers)] + found[b]
+            costs = [float(v @ v) for _, v in tried]
             best, before = int(np.argmin(costs)), float(r[b] @ r[b])
-            if not costs[best] < before:
-                open_[b] = updated[b]  # an updated slope may have misled: once more with differences
-                updated[b] = False
+            if not costs[best] < before:  # once more: from new differences where slopes were updated, else in a short step
+                open_[b], missed[b] = updated[b] or not missed[b], missed[b] or not updated[b]
+                updated[b] = not updated[b]
+                damping[b] *= 1e3 if updated[b] else 1.0
                 continue
-            moved = trials[best][b] - x[b]
-            updated[b] = bool(moved.any())
-            if updated[b]:
-                J[b] = J[b] + np.outer(answers[best][b] - r[b] - J[b] @ moved, moved) / (moved @ moved)
+            there, left_there = tried[best]
+            moved = there - x[b]
+            J[b] = J[b] + np.outer(left_there - r[b] - J[b] @ moved, moved) / (moved @ moved)
+            updated[b], missed[b] = True, False
             open_[b] = before - costs[best] > SETTLED * before
-            damping[b] = damping[b] / 3 if best == 0 else damping[b] * 10
-            x[b], r[b] = trials[best][b], answers[best][b]
+            damping[b] = damping[b] / 3 if best == 0 else min(damping[b] * 10, 1.0)
+            x[b], r[b] = there, left_there
     return [Solved(*solved) for solved in zip(x, r, J)]
 
 

@@ -20,6 +20,8 @@ from workbench.simulation.batch import Job, simulate_batch
 Array = NDArray[np.float64]
 COARSE, FINE = 2.0, 0.25
 """Steps for a first look, and for last numbers, in search steps."""
+STRETCHES = 10_000
+"""More than a take has."""
 REST = 0.1
 """Rest before the first command in rollouts [s]."""
 
@@ -103,7 +105,7 @@ class Jury:
         for i in sorted(takes):
             e = self.evidence[i]
             since = e.take.recorded.time[e.uses[use]] - e.take.measurement.starts_at
-            stretch = i * 1000 + np.floor(since / BLOCK).astype(int)
+            stretch = i * STRETCHES + np.floor(since / BLOCK).astype(int)
             parts.append(np.repeat(stretch, len(e.channels)))
         return np.concatenate(parts)
 
@@ -146,6 +148,11 @@ class Jury:
             part = self.memory / f"{key}.part.npy"
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
+
+
+def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
+    """Of `Jury.stretches`."""
+    return stretches // STRETCHES
 
 
 def _of_the_floor(e: EffectSpec) -> bool:

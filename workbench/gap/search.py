@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate, with_effects
-from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through, together
-from workbench.gap.jury import FINE, Jury, Question
+from workbench.gap.fitting import HELD, NEAR, Solved, fit_blocks, through, together
+from workbench.gap.jury import FINE, Jury, Question, take_of
 from workbench.gap.metrics import rms
 from workbench.gap.race import Race, Trial, Trying
 from workbench.robot import RobotModel
@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 Report = Callable[[str, float | None], None]
 SEEN_ELSEWHERE = ("zero_offset",)
 """What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
+
+ENGINES = 0.06
+"""Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
 
 @dataclass(frozen=True)
@@ -93,13 +96,15 @@ class Search:
             return Question(with_effects(self.nominal, list(zip(current.effects, [x[s] for s in current.slices()]))), takes)
 
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
-        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, WALKING if self.jury.walks(takes) else HELD)
+        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, NEAR if self.jury.walks(takes) else HELD)
         asking = through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
         (solved,) = together({0: asking}, lambda wanted: self.jury.residuals([q for _, q in wanted]))[0]
         x = current.x.copy()
         x[moving] = solved.x
         covariance = np.full((len(x), len(x)), np.inf)
-        covariance[np.ix_(moving, moving)] = _covariance(solved, self.jury.stretches(takes, "fit"))
+        stretches = self.jury.stretches(takes, "fit")
+        spread = ENGINES * np.abs(solved.x) * self._walked(solved, stretches)
+        covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
         fitted = self.evaluated(list(zip(current.effects, [x[s] for s in current.slices()])), covariance)
         return replace(fitted, jacobian=solved.J) if takes == self.fitted and len(moving) == len(x) else fitted
 
@@ -126,6 +131,13 @@ class Search:
         model = with_effects(self.nominal, fit.sizes())
         longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
+
+    def _walked(self, solved: Solved, stretches: NDArray[np.int_]) -> Array:
+        """Share of what is known of each number that walks tell."""
+        free = [i for i in self.takes if self.jury.walks((i,))]
+        told = np.sum(solved.J**2, axis=0)
+        walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
+        return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
 
     def _finely(self, fit: Fit, x: Array) -> Fit:
         effects = list(zip(fit.effects, [x[s] for s in fit.slices()]))
