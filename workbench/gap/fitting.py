@@ -51,6 +51,7 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     damping = [1e-3] * len(x)
     open_ = [len(x_b) > 0 for x_b in x]
     missed = [False] * len(x)
+    seen = [[(x_b, float(r_b @ r_b))] for x_b, r_b in zip(x, r)]
     for _ in range(iterations):
         if not any(open_):
             break
@@ -68,12 +69,17 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
                         found[b].append((points[i][b], v))
         trials = [[_step(x_b, r_b, J_b, d * k + extra, *b) if o else x_b
                    for x_b, r_b, J_b, d, b, o in zip(x, r, J, damping, bounds, open_)] for k, extra in ((1, 0.0), (30, 0.3))]
+        for b, known in enumerate(seen):
+            lowest = _lowest(known, *bounds[b]) if missed[b] else None
+            if lowest is not None:
+                trials[1][b] = lowest
         answers = yield trials
         for b in range(len(x)):
             if not open_[b]:
                 continue
             tried = [(t[b], a[b]) for t, a in zip(trials, answers)] + found[b]
             costs = [float(v @ v) for _, v in tried]
+            seen[b] += [(at, cost) for (at, _), cost in zip(tried, costs)]
             best, before = int(np.argmin(costs)), float(r[b] @ r[b])
             if not costs[best] < before:  # once more: from new differences where slopes were updated, else in a short step
                 open_[b], missed[b] = updated[b] or not missed[b], missed[b] or not updated[b]
@@ -93,6 +99,20 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
 def _steps(x: Array, low: Array, high: Array, stride: float) -> Array:
     step = stride * np.maximum(np.abs(x), 0.3)
     return np.where(x + step <= high, step, -step)
+
+
+def _lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:
+    """Of one number, where the parabola through the three best sizes seen is lowest; None where it is not, or not known."""
+    if len(low) != 1:
+        return None
+    best = sorted({float(at[0]): cost for at, cost in seen}.items(), key=lambda p: p[1])[:3]
+    if len(best) < 3:
+        return None
+    at = np.array([p[0] for p in best])
+    bend, slope, _ = np.polyfit(at, [p[1] for p in best], 2)
+    if not bend > 0:
+        return None
+    return np.clip([np.clip(-slope / (2 * bend), at.min(), at.max())], low, high)
 
 
 def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array) -> Array:
