@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from workbench.gap.candidates import Candidate
 from workbench.gap.race import Trial
 from workbench.gap.search import Fit, Report, Search
-from workbench.gap.selection import Chosen, Round, completed
+from workbench.gap.selection import LEAST_GAIN, Chosen, Round, completed
 
 Array = NDArray[np.float64]
+Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
+"""By effect, when it was taken and on what."""
 TEMPER = 4.0
 """Neighbouring frames err alike, and engines differ: chi squared differences count a quarter when they become probabilities."""
-NEAR = 400.0
-"""Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place."""
+NEAR, NEAR_HELD, NEAR_WALKING = 400.0, 0.05, 0.15
+"""Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
+this share of the effect's gain behind, which is larger where a race in coarse steps said it."""
 MOST_RIVALS = 2
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
@@ -46,61 +49,50 @@ class Standing:
     rivals: tuple[Rival, ...]
 
 
-def contest(search: Search, chosen: Chosen, report: Report) -> list[Standing]:
-    """The standing of each effect that stays."""
+def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[Standing]]:
+    """The effects that stay, and the standing of each: a rival that does better in an effect's place takes it."""
     fit = chosen.fit
-    temper = TEMPER * max(1.0, fit.cost["choose"] / max(1, _samples(search, fit)))
-    out = []
-    for i, c in enumerate(fit.effects):
-        report(f"rivals of {c}", i / len(fit.effects))
-        rivals = [_put(search, fit, i, t) for t in _near(chosen.rounds, c)]
-        cost = np.array([fit.cost["choose"], *(r.cost["choose"] for r in rivals)])
-        weight = np.exp(-0.5 * (cost - cost.min()) / temper)
-        p = weight / weight.sum()
-        sure = SUREST * _completeness(search, chosen, c)
-        told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
-                for r, q in zip(rivals, p[1:])]
-        out.append(Standing(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability))))
-    return out
+    seats: Seats = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
+    for turn in range(len(fit.effects) + 1):
+        rivals: list[list[Fit]] = []
+        for i, c in enumerate(fit.effects):
+            report(f"rivals of {c}", i / len(fit.effects))
+            rivals.append([_put(search, fit, i, t) for t in _near(seats, fit.effects, c)])
+        best = min((r for there in rivals for r in there), key=lambda r: r.cost["choose"], default=fit)
+        if turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < LEAST_GAIN:
+            break
+        replaced = next(c for c, there in zip(fit.effects, rivals) if best in there)
+        r, _ = seats[replaced.key]
+        seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
+        fit = search.refitted(best, search.fitted, 3)
+    return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)] if fit.effects else []
 
 
-def round_of(rounds: Sequence[Round], c: Candidate) -> tuple[Round, Trial] | None:
-    """When a candidate was taken."""
-    for r in reversed(rounds):
-        for t in r.accepted:
-            if t.candidate.key == c.key:
-                return r, t
-    return None
+def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
+    temper = TEMPER * max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
+    cost = np.array([fit.cost["choose"], *(r.cost["choose"] for r in rivals)])
+    weight = np.exp(-0.5 * (cost - cost.min()) / temper)
+    p = weight / weight.sum()
+    closed = completed(search, *seats[fit.effects[i].key], fit)
+    sure = SUREST * next((factor for share, factor in CLOSED if closed >= share), LEAST)
+    told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
+            for r, q in zip(rivals, p[1:])]
+    return Standing(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
 
 
-def _near(rounds: Sequence[Round], c: Candidate) -> list[Trial]:
-    found = round_of(rounds, c)
-    if found is None:
-        return []
-    r, trial = found
-    taken = {t.candidate.key for t in r.accepted}
-    near = [t for t in r.rivals(trial) if not t.foretold and t.candidate.key not in taken
-            and trial.gain["choose"] - t.gain["choose"] < max(NEAR, 0.05 * trial.gain["choose"])]
-    return near[:MOST_RIVALS]
+def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate) -> list[Trial]:
+    """Who came near an effect when it was taken, and is not among those that stay."""
+    r, trial = seats[c.key]
+    taken = {e.key for e in effects}
+    reach = max(NEAR, (NEAR_WALKING if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
+    return [t for t in r.rivals(trial) if not t.foretold and t.candidate.key not in taken
+            and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
-    """The fit with a rival in effect i's place, its numbers and those of the others fitted anew."""
+    """The fit with a rival in effect i's place and its numbers fitted there."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     there = search.evaluated([*others, (rival.candidate, rival.x)])
-    if there.cost["choose"] - fit.cost["choose"] > 2 * NEAR:
+    if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * NEAR_WALKING * rival.gain["choose"]):
         return there
-    return search.refitted(there, search.fitted, 1, free=[len(others)])
-
-
-def _samples(search: Search, fit: Fit) -> int:
-    return int(np.count_nonzero(search.jury.vector(fit.residuals, "choose")))
-
-
-def _completeness(search: Search, chosen: Chosen, c: Candidate) -> float:
-    """Factor for how much of what was at its place is explained: when it was taken, or by all effects together."""
-    found = round_of(chosen.rounds, c)
-    if found is None:
-        return LEAST
-    closed = completed(search, *found, chosen.fit)
-    return next((factor for share, factor in CLOSED if closed >= share), LEAST)
+    return search.refitted(there, search.fitted, 3, free=[len(others)])

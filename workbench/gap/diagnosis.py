@@ -66,8 +66,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     search = Search(jury, session.model)
     pool = candidates(session.model, evidence) + special(session.model, evidence, nominal.residuals)
     chosen = select(search, pool, progress)
-    fit = chosen.fit
-    standings = contest(search, chosen, progress)
+    fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit
     model = fit.model(session.model)

@@ -26,7 +26,7 @@ BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 MOST_FITTED = 3
 """Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
-STEPS, STEPS_WALKING = 3, 2
+STEPS, STEPS_WALKING = 3, 3
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Steps = Generator[list[Question], list[dict[int, Array]], T]
 """What a part of a race asks, is answered, and returns."""
@@ -96,14 +96,16 @@ class Trying:
         c = self.group[0]
         probes = _scan(c, SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1])
         power = {i: float(np.sum(self.jury.vector({i: r}, "fit") ** 2)) for i, r in self.base.items()}
-        looked_at = (max(power, key=lambda i: power[i]),) if self.walking else self.takes  # as walks are expensive
+        brief = self.walking and c.size < 2  # walks are expensive, but one does not tell several numbers apart
+        looked_at = (max(power, key=lambda i: power[i]),) if brief else self.takes
         asked = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         without, *answers = yield [replace(q, takes=looked_at, step=COARSE) for q in asked]
         r0, plain = self._left({i: self.base[i] for i in looked_at}), self._left(without)
         seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
         far = FAR_WALKING if self.walking else FAR
         guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
-        return [g[0] for g in guesses], [g[1] for g in guesses]
+        share = sum(power[i] for i in looked_at) / max(sum(power.values()), 1e-9)
+        return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Steps[list[int]]:
         """Of the group, those that are not told to be far behind a rival."""
