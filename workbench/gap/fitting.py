@@ -20,7 +20,7 @@ Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
-HELD, WALKING, NEAR = 0.15, 0.4, 0.25
+HELD, WALKING, NEAR = 0.15, 0.4, 0.08
 """Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
