@@ -11,17 +11,16 @@ from numpy.typing import NDArray
 from workbench.gap.candidates import Candidate
 from workbench.gap.race import Trial
 from workbench.gap.search import Fit, Report, Search
-from workbench.gap.selection import LEAST_GAIN, Chosen, Round, completed
+from workbench.gap.selection import CLOSE, LEAST_GAIN, MOST_RIVALS, Chosen, Round, completed
 
 Array = NDArray[np.float64]
 Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
 """By effect, when it was taken and on what."""
 TEMPER = 4.0
 """Neighbouring frames err alike, and engines differ: chi squared differences count a quarter when they become probabilities."""
-NEAR, NEAR_HELD, NEAR_WALKING = 400.0, 0.05, 0.15
+NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
-this share of the effect's gain behind, which is larger where a race in coarse steps said it."""
-MOST_RIVALS = 2
+this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
@@ -84,7 +83,7 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate) -> list[Tria
     """Who came near an effect when it was taken, and is not among those that stay."""
     r, trial = seats[c.key]
     taken = {e.key for e in effects}
-    reach = max(NEAR, (NEAR_WALKING if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
+    reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
     return [t for t in r.rivals(trial) if not t.foretold and t.candidate.key not in taken
             and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
 
@@ -93,6 +92,6 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
     """The fit with a rival in effect i's place and its numbers fitted there."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     there = search.evaluated([*others, (rival.candidate, rival.x)])
-    if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * NEAR_WALKING * rival.gain["choose"]):
+    if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
     return search.refitted(there, search.fitted, 3, free=[len(others)])

@@ -37,6 +37,8 @@ ENOUGH, NEARLY_ALL = 0.6, 0.9
 like the ground's, before joints are asked."""
 MOST_STEPS = 5
 """Of a fit of all effects, when one was added; it ends where little changes."""
+MOST_RIVALS, CLOSE = 2, 0.15
+"""Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge."""
 ALIKE = 0.25
 """Joints whose best gain is this share of the greatest are taken in the same round."""
 
@@ -104,13 +106,18 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
                 break
-        accepted = _accepted(trials, rounds)
+        fits = [(_with(search, current, accepted, takes), accepted) for accepted in _accepted(trials, rounds)]
+        after, accepted = min(fits, key=lambda f: f[0].cost["choose"], default=(current, []))
         rounds.append(Round(current, tuple(trials), tuple(accepted)))
         if not accepted:
             break
-        current = search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
-        current = search.refitted(current, takes, MOST_STEPS)
+        current = after
     return current
+
+
+def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Fit:
+    """All effects fitted together, when some were added."""
+    return search.refitted(search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)]), takes, MOST_STEPS)
 
 
 def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
@@ -124,19 +131,20 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
 
 
-def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[Trial]:
-    """The best, and the best at other joints where it is about as good; nothing where the best is not worth it."""
+def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[list[Trial]]:
+    """Which to take: the best and the best at other joints where it is about as good; of the whole robot's the best or one that
+    is close behind, as a race in coarse steps does not tell these; nothing where the best is not worth it."""
     worth = [t for t in trials if not t.foretold and _worthwhile(t, rounds)]
     if not worth:
         return []
     best = worth[0]
     if best.joint is None:
-        return [best]
+        return [[t] for t in worth[:MOST_RIVALS + 1] if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
     out = [best]
     for t in worth[1:]:
         if t.joint is not None and t.joint not in {o.joint for o in out} and t.gain["choose"] > ALIKE * best.gain["choose"]:
             out.append(t)
-    return out
+    return [out]
 
 
 def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
