@@ -66,6 +66,17 @@ def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_aga
     assert len(asked) <= 1 + 3 + 2 * 8
 
 
+def test_a_move_too_small_to_tell_a_slope_leaves_it_as_it_is():
+    low = np.array([1.0 - 1e-170])
+
+    def left(x):
+        return np.array([2.0, x[0] - 1.0 + 1e-3])
+
+    fit = fit_blocks([np.array([1.0])], [left([1.0])], [(low, np.array([3.0]))], 6)
+    solved = together({0: fit}, lambda wanted: [[left(point[0])] for _, point in wanted])[0][0]
+    assert np.isfinite(solved.J).all()
+
+
 def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_together():
     rng = np.random.default_rng(3)
     stretches = np.repeat(np.arange(40), 50)

@@ -22,6 +22,8 @@ Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
 HELD, WALKING, NEAR = 0.15, 0.4, 0.08
 """Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
+TINY = 1e-6
+"""Of a number, below which a move tells nothing of slopes."""
 SETTLED = 3e-3
 """A fit ends where a step takes less than this share off the sum of squares."""
 
@@ -88,7 +90,8 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
                 continue
             there, left_there = tried[best]
             moved = there - x[b]
-            J[b] = J[b] + np.outer(left_there - r[b] - J[b] @ moved, moved) / (moved @ moved)
+            if moved @ moved > TINY**2:
+                J[b] = J[b] + np.outer(left_there - r[b] - J[b] @ moved, moved) / (moved @ moved)
             updated[b], missed[b] = True, False
             open_[b] = before - costs[best] > SETTLED * before
             damping[b] = damping[b] / 3 if best == 0 else min(damping[b] * 10, 1.0)
