@@ -69,10 +69,11 @@ class Search:
         return Fit(tuple(c for c, _ in effects), x, covariance, self._cost(residuals), residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None]) -> list[Trial]:
+              report: Callable[[float], None], ahead: float = 0.0) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
-        at several joints, each judged by its own joint's channels. takes: on which, by group."""
-        race, asking = Race(), {}
+        at several joints, each judged by its own joint's channels. takes: on which, by group.
+        ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels."""
+        race, asking = Race({None: ahead}, {None: ahead}), {}
         for n, group in enumerate(groups):
             apart = group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE and not self.jury.walks(takes[n])
             base = {i: current.residuals[i] for i in takes[n]}

@@ -102,7 +102,8 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         trials: list[Trial] = []
         for tier in range(TIERS):
             groups, on = asked(search, pool, current, beyond, takes, held, tier)
-            trials += search.tried(current, groups, on, say)
+            ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
+            trials += search.tried(current, groups, on, say, ahead)
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
                 break
