@@ -1,0 +1,43 @@
+"""Rivals in each other's place: the better one takes it, whoever was taken first."""
+
+import pytest
+
+from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
+from workbench.gap.candidates import candidates
+from workbench.gap.contest import contest
+from workbench.gap.jury import Jury
+from workbench.gap.search import Search
+from workbench.gap.selection import Chosen, Round
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory):
+    session, evidence = gathered(tmp_path_factory.mktemp("worn"), HIDDEN)
+    return session, Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
+
+
+def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
+    session, search = worn
+    nominal = search.evaluated([])
+    pool = [c for c in candidates(session.model, search.jury.evidence)
+            if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
+    trials = [t for c in pool for t in search.tried(nominal, [[c]], {0: (0,)}, lambda share: None)]  # apart: none is given up
+    trials.sort(key=lambda t: -t.gain["choose"])
+    assert [t.candidate.name for t in trials] == ["coulomb_friction", "viscous_friction"]
+    wrong = trials[1]
+    first = search.refitted(search.evaluated([(wrong.candidate, wrong.x)]), (0,), 1)
+    chosen = Chosen(first, (Round(nominal, tuple(trials), (wrong,)),))
+    fit, standings = contest(search, chosen, lambda what, share: None)
+    assert [str(c) for c in fit.effects] == ["coulomb_friction(three)"]
+    assert NOMINAL + fit.model(session.model).effects[0].parameters["torque"] == pytest.approx(HIDDEN, rel=0.06)
+    assert fit.cost["choose"] < first.cost["choose"]
+    assert standings[0].probability > 0.5
+    assert [r.candidate.name for r in standings[0].rivals] in ([], ["viscous_friction"])
+
+
+def test_where_nothing_stays_nothing_is_contested(worn):
+    _, search = worn
+    nominal = search.evaluated([])
+    fit, standings = contest(search, Chosen(nominal, ()), lambda what, share: None)
+    assert fit is nominal
+    assert standings == []
