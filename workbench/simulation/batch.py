@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -52,7 +53,13 @@ def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int
 def _stream(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
-    return Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
+    return _in_processes(jobs, n_jobs)
+
+
+def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
+    with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
+        yield from Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
 
 
 _stations: OrderedDict[Any, Simulation] = OrderedDict()
