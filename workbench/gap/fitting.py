@@ -41,10 +41,10 @@ class Solved:
         return float(self.r @ self.r)
 
 
-def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float = HELD,
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
                slopes: Sequence[Array] | None = None) -> Asks:
-    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it, or
-    `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a
+    lone block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
     Walking answers small changes with noise: there strides are long (WALKING)."""
     x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
     r = list(left)
@@ -99,9 +99,9 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     return [Solved(*solved) for solved in zip(x, r, J)]
 
 
-def _steps(x: Array, low: Array, high: Array, stride: float) -> Array:
+def _steps(x: Array, low: Array, high: Array, stride: float | Array) -> Array:
     step = stride * np.maximum(np.abs(x), 0.3)
-    return np.where(x + step <= high, step, -step)
+    return np.asarray(np.where(x + step <= high, step, -step))
 
 
 def _lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:

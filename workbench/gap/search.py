@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate, with_effects
-from workbench.gap.fitting import HELD, NEAR, Solved, fit_blocks, through, together
+from workbench.gap.fitting import HELD, NEAR, WALKING, Solved, fit_blocks, through, together
 from workbench.gap.jury import FINE, Jury, Question, take_of
 from workbench.gap.metrics import rms
 from workbench.gap.race import Race, Trial, Trying
@@ -96,8 +96,11 @@ class Search:
             x[moving] = point[0]
             return Question(with_effects(self.nominal, list(zip(current.effects, [x[s] for s in current.slices()]))), takes)
 
+        # several numbers share what a walk shows: a short move of one drowns
+        near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
+        stride = near if self.jury.walks(takes) else HELD
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
-        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, NEAR if self.jury.walks(takes) else HELD)
+        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, stride)
         asking = through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
         (solved,) = together({0: asking}, lambda wanted: self.jury.residuals([q for _, q in wanted]))[0]
         x = current.x.copy()
