@@ -43,9 +43,9 @@ class Solved:
 
 def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
                slopes: Sequence[Array] | None = None) -> Asks:
-    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a
-    lone block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
-    Walking answers small changes with noise: there strides are long (WALKING)."""
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
+    block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants
+    where there is one number). Walking answers small changes with noise: there strides are long (WALKING)."""
     x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
     r = list(left)
     J = list(slopes) if slopes else [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
