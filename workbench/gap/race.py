@@ -26,7 +26,7 @@ BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 MOST_FITTED = 3
 """Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
-STEPS, STEPS_WALKING = 3, 3
+STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Steps = Generator[list[Question], list[dict[int, Array]], T]
 """What a part of a race asks, is answered, and returns."""
@@ -73,12 +73,13 @@ class Trying:
         self.joints = [c.joint if apart else None for c in group]
         self.walking = jury.walks(tuple(base))
         self.base, self.takes = base, tuple(base)
+        self.coarse = self.walking and all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
         self.without: dict[int, Array] = {}
 
     def run(self) -> Asking:
         """Trials of all in the group."""
-        if self.walking:
+        if self.coarse:
             (self.without,) = yield [self._question([], [])]
         starts, gains = yield from self._looked_at()
         alive = yield from self._worth_fitting(gains)
@@ -96,8 +97,7 @@ class Trying:
         c = self.group[0]
         probes = _scan(c, SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1])
         power = {i: float(np.sum(self.jury.vector({i: r}, "fit") ** 2)) for i, r in self.base.items()}
-        brief = self.walking and c.size < 2  # walks are expensive, but one does not tell several numbers apart
-        looked_at = (max(power, key=lambda i: power[i]),) if brief else self.takes
+        looked_at = (max(power, key=lambda i: power[i]),) if self.coarse else self.takes  # walks are expensive
         asked = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         without, *answers = yield [replace(q, takes=looked_at, step=COARSE) for q in asked]
         r0, plain = self._left({i: self.base[i] for i in looked_at}), self._left(without)
@@ -152,11 +152,11 @@ class Trying:
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
         """The robot with those of the group at these sizes, beside what there is already."""
         model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
-        return Question(model, self.takes, COARSE if self.walking else 1.0)
+        return Question(model, self.takes, COARSE if self.coarse else 1.0)
 
     def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
         """What an answer leaves; of a walk, the difference that coarse steps tell, beside what the search's step leaves."""
-        return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.walking else answer
+        return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
         return [self.jury.vector(answer, "fit", j) for j in self.joints]
