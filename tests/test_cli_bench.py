@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
+from workbench.gap.bench.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
+from workbench.gap.bench.diagnose_time import RACE, READING, SCAN, Stages, diagnose_time
+from workbench.gap.bench.sysid import fit_against_mujoco_sysid
+from workbench.gap.registered import read_takes
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
@@ -38,13 +42,13 @@ def test_quick_bench_prints_and_writes_every_figure(tmp_path: Path, capsys: pyte
     plausible = {"station_against_bare_plant": (0.2, 3), "station_with_contact_forces_against_bare_plant": (0.2, 3),
                  "station_against_mujoco_fixed_base": (0.01, 2), "station_against_mujoco_free_base": (0.01, 2),
                  "fast_servo_and_larger_steps": (1, 20), "motive_reader_against_pandas": (0.1, 20),
-                 "batch_on_two_processes": (0.1, 4)}
+                 "batch_on_two_processes": (0.1, 4), "fit_against_mujoco_sysid": (1, 1000), "diagnose_time": (0, 0)}
     assert set(said["figures"]) == set(plausible)
     required = set()
     for name, figure in said["figures"].items():
         assert figure["meaning"]
         if "skipped" in figure:
-            assert "mujoco" in name
+            assert "mujoco" in name or name == "diagnose_time"
             continue
         low, high = plausible[name]
         assert low < figure["value"] < high, (name, figure)
@@ -52,7 +56,7 @@ def test_quick_bench_prints_and_writes_every_figure(tmp_path: Path, capsys: pyte
             required.add(name)
             within = figure["value"] >= figure["requirement"].get("at_least", 0)
             assert figure["met"] == (within and figure["value"] < figure["requirement"].get("below", np.inf))
-    assert required == {n for n in plausible if "mujoco" not in n and "fast" not in n}
+    assert required == {n for n in plausible if "mujoco" not in n and "fast" not in n and "diagnose" not in n}
 
 
 def test_a_file_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -103,3 +107,46 @@ def test_without_the_other_engine_its_figure_says_why(puppy, walk, monkeypatch: 
     figure = engine.station_against_mujoco(puppy, walk, 0.05, exact, 5e-4, 1e-3, 1)
     assert figure.value is None
     assert "source tree" in (figure.skipped or "")
+
+
+def test_without_the_toolbox_the_fit_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "studies.other_engine.sysid", None)
+    figure = fit_against_mujoco_sysid(0.3, 1, 0)
+    assert figure.value is None
+    assert "mujoco[sysid]" in (figure.skipped or "")
+
+
+def test_both_engines_play_the_same_arm(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco.sysid").__dict__.get("optimize") or pytest.skip("mujoco[sysid] is not installed")
+    from studies.other_engine.sysid import Identification
+
+    model, log = arm(tmp_path), goals(0.5)
+    truth = SERVO["coulomb_friction"] + EXTRA[0], SERVO["viscous_friction"] + EXTRA[1]
+    other = Identification(model, ODD, log.commands, 5e-4)
+    assert np.degrees(np.abs(other.played(truth, log.time) - played(model, log, frictions())).max()) < 0.2
+    assert np.degrees(np.abs(other.played(truth, log.time) - other.played(other.nominal, log.time)).max()) > 0.5
+    found = other.fitted(log.time, other.played(truth, log.time))
+    assert found.friction == pytest.approx(truth, rel=1e-3)
+    assert np.degrees(found.residual) < 1e-3
+
+
+def test_the_arms_log_begins_at_rest_and_tells_its_goals(tmp_path: Path) -> None:
+    arm(tmp_path)
+    log = measured(goals(0.5), np.zeros((51, 3)), 0)
+    (take,), _ = read_takes(session(tmp_path, log))
+    assert take.start_state() is None
+    assert take.commands is not None
+    np.testing.assert_allclose(take.commands.goals[-1], log.goals[-1], atol=1e-8)
+
+
+def test_stages_sum_up_what_is_said() -> None:
+    ticks = iter([0.0, 1.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0])
+    stages = Stages(lambda: next(ticks))
+    for what, done in (("reading recordings", None), ("explaining two (1)", 0.0), ("explaining two (1)", 0.0),
+                       ("explaining two (1)", 0.5), ("explaining two (1)", 0.0), ("rivals of a", 0.0), ("coulomb or load", 0.1)):
+        stages(what, done)
+    assert stages.ended() == {READING: 3.0, SCAN: 3.0 + 6.0, RACE: 4.0 + 5.0, "rivals": 7.0, "next experiment": 8.0}
+
+
+def test_a_diagnosis_is_not_for_the_quick_form() -> None:
+    assert "quick" in (diagnose_time(None, 0).skipped or "")

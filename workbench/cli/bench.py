@@ -15,8 +15,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="measure the speeds stated in the README",
         description="Prints as JSON, measured in turns in one run, with what is required of each: the station with the full "
         "servo law against a bare Drake plant with PD at the same step, and against MuJoCo at the same joint error; the fast "
-        "servo and larger steps; the Motive reader against pandas; 64 rollouts on two processes against one. Takes minutes, "
-        "and a quiet machine.",
+        "servo and larger steps; the Motive reader against pandas; 64 rollouts on two processes against one; a fit against "
+        "MuJoCo's system identification; where a diagnosis spends its time. Takes minutes, and a quiet machine.",
     )
     parser.add_argument("--quick", action="store_true", help="only see that all of it runs, in seconds; the figures mean nothing")
     parser.add_argument("--out", metavar="FILE", type=Path, help="write the JSON there too")
@@ -27,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """Measures, prints and writes."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
+    from workbench.gap.bench import fit_figures
     from workbench.robot import InputError
     from workbench.simulation.bench import run_bench
 
@@ -34,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(args.out, "expected a file to write, found a directory")
     with ExitStack() as stack:
         folder = None if args.out is None else stack.enter_context(output_directory(args.out.parent))
-        text = json.dumps(run_bench(args.quick, stack.enter_context(Progress("bench"))), indent=2)
+        text = json.dumps(run_bench(args.quick, stack.enter_context(Progress("bench")), fit_figures), indent=2)
         if folder is not None:
             (folder / args.out.name).write_text(text + "\n", encoding="utf-8")
     print(text)

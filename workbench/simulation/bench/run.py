@@ -40,10 +40,15 @@ QUICK = Size(duration=0.1, walk=0.1, turns=1, finest=5e-4, frames=2000, readings
 """To see that everything runs; the figures mean nothing."""
 
 
-def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
-    """Measures every figure on the puppy's walk and returns the JSON of `workbench bench`."""
+More = Callable[[bool, Callable[[str], None]], list[Figure]]
+"""Figures of rooms above this one: (quick, progress) -> figures."""
+
+
+def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what: None,
+              more: More = lambda quick, progress: []) -> dict[str, Any]:
+    """Measures every figure on the puppy's walk, then `more`, and returns the JSON of `workbench bench`."""
     began, load = time.perf_counter(), os.getloadavg()[0]
-    figures = _measure(QUICK if quick else Size(), progress)
+    figures = _measure(QUICK if quick else Size(), progress) + more(quick, progress)
     warnings = ["quick: too little was measured for the figures to mean anything"] if quick else []
     if load > 1:
         warnings.append(f"load average {load:.1f} at the start: other work falsifies what is measured in wall time, the batch "
