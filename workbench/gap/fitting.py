@@ -7,7 +7,7 @@ do not feel each other (one joint each), so that one rollout moves all blocks at
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
@@ -46,57 +46,94 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
     block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants
     where there is one number). Walking answers small changes with noise: there strides are long (WALKING)."""
-    x = [np.clip(np.asarray(s, dtype=float), *b) for s, b in zip(start, bounds)]
-    r = list(left)
-    J = list(slopes) if slopes else [np.zeros((len(r_b), len(x_b))) for r_b, x_b in zip(r, x)]
-    updated = [slopes is not None] * len(x)
-    damping = [1e-3] * len(x)
-    open_ = [len(x_b) > 0 for x_b in x]
-    missed = [False] * len(x)
-    seen = [[(x_b, float(r_b @ r_b))] for x_b, r_b in zip(x, r)]
+    blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends) for s, r, ends in zip(start, left, bounds)]
+    for b, J in zip(blocks, slopes or ()):
+        b.J, b.updated = J, True
     for _ in range(iterations):
-        if not any(open_):
+        if not any(b.open for b in blocks):
             break
-        stale = [o and not u for o, u in zip(open_, updated)]
-        found: list[list[tuple[Array, Array]]] = [[] for _ in x]
-        if any(stale):
-            columns = max(len(x_b) for x_b, s in zip(x, stale) if s)
-            steps = [_steps(x_b, *b, stride) for x_b, b in zip(x, bounds)]
-            points = [[x_b + np.eye(len(x_b))[i] * h[i] if s and i < len(x_b) else x_b for x_b, h, s in zip(x, steps, stale)]
-                      for i in range(columns)]
+        stale = [b for b in blocks if b.open and not b.updated]
+        if stale:
+            for b in stale:
+                b.steps = _steps(b.x, b.low, b.high, stride)
+            points = [[b.moved(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
             for i, answer in enumerate((yield points)):
-                for b, v in enumerate(answer):
-                    if stale[b] and i < len(x[b]):
-                        J[b][:, i] = (v - r[b]) / steps[b][i]
-                        found[b].append((points[i][b], v))
-        trials = [[_step(x_b, r_b, J_b, d * k + extra, *b) if o else x_b
-                   for x_b, r_b, J_b, d, b, o in zip(x, r, J, damping, bounds, open_)] for k, extra in ((1, 0.0), (30, 0.3))]
-        for b, known in enumerate(seen):
-            lowest = _lowest(known, *bounds[b]) if missed[b] else None
-            if lowest is not None:
-                trials[1][b] = lowest
+                for b, r in zip(blocks, answer):
+                    if b in stale:
+                        b.differ(i, r)
+        trials = [list(pair) for pair in zip(*(b.trials() for b in blocks))]
         answers = yield trials
-        for b in range(len(x)):
-            if not open_[b]:
-                continue
-            tried = [(t[b], a[b]) for t, a in zip(trials, answers)] + found[b]
-            costs = [float(v @ v) for _, v in tried]
-            seen[b] += [(at, cost) for (at, _), cost in zip(tried, costs)]
-            best, before = int(np.argmin(costs)), float(r[b] @ r[b])
-            if not costs[best] < before:  # once more: from new differences where slopes were updated, else in a short step
-                open_[b], missed[b] = updated[b] or not missed[b], missed[b] or not updated[b]
-                updated[b] = not updated[b]
-                damping[b] *= 1e3 if updated[b] else 1.0
-                continue
-            there, left_there = tried[best]
-            moved = there - x[b]
-            if moved @ moved > TINY**2:
-                J[b] = J[b] + np.outer(left_there - r[b] - J[b] @ moved, moved) / (moved @ moved)
-            updated[b], missed[b] = True, False
-            open_[b] = before - costs[best] > SETTLED * before
-            damping[b] = damping[b] / 3 if best == 0 else min(damping[b] * 10, 1.0)
-            x[b], r[b] = there, left_there
-    return [Solved(*solved) for solved in zip(x, r, J)]
+        for k, b in enumerate(blocks):
+            if b.open:
+                b.take([(t[k], a[k]) for t, a in zip(trials, answers)])
+    return [Solved(b.x, b.r, b.J) for b in blocks]
+
+
+@dataclass(eq=False)
+class _Block:
+    """One block on its way: x, what it leaves and the slopes J there; updated: by Broyden's rule, since they were measured.
+    missed: a step from measured slopes led nowhere. steps: by which numbers move for slopes, and differences, what was seen
+    there. known: sizes tried so far and their cost."""
+
+    x: Array
+    r: Array
+    low: Array
+    high: Array
+    J: Array = field(init=False)
+    updated: bool = False
+    damping: float = 1e-3
+    missed: bool = False
+    open: bool = field(init=False)
+    known: list[tuple[Array, float]] = field(init=False)
+    steps: Array = field(init=False)
+    differences: list[tuple[Array, Array]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.J = np.zeros((len(self.r), len(self.x)))
+        self.open = len(self.x) > 0
+        self.steps = np.zeros(len(self.x))
+        self.known = [(self.x, float(self.r @ self.r))]
+
+    def moved(self, i: int) -> Array:
+        """Sizes with number i moved for a difference; as they are where there is no such number."""
+        return self.x + np.eye(len(self.x))[i] * self.steps[i] if i < len(self.x) else self.x
+
+    def differ(self, i: int, r: Array) -> None:
+        """Slope i, from what was left where number i had moved."""
+        if i < len(self.x):
+            self.J[:, i] = (r - self.r) / self.steps[i]
+            self.differences.append((self.moved(i), r))
+
+    def trials(self) -> tuple[Array, Array]:
+        """Where to go: a damped step and a short one, in whose place comes the bottom of a parabola where steps led nowhere."""
+        if not self.open:
+            return self.x, self.x
+        first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
+                         for k, extra in ((1, 0.0), (30, 0.3)))
+        lowest = _lowest(self.known, self.low, self.high) if self.missed else None
+        return first, second if lowest is None else lowest
+
+    def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
+        """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
+        short step."""
+        tried = [*answers, *self.differences]
+        self.differences = []
+        costs = [float(r @ r) for _, r in tried]
+        self.known += [(at, cost) for (at, _), cost in zip(tried, costs)]
+        best, before = int(np.argmin(costs)), float(self.r @ self.r)
+        if not costs[best] < before:
+            self.open, self.missed = self.updated or not self.missed, self.missed or not self.updated
+            self.updated = not self.updated
+            self.damping *= 1e3 if self.updated else 1.0
+            return
+        there, left_there = tried[best]
+        way = there - self.x
+        if way @ way > TINY**2:
+            self.J = self.J + np.outer(left_there - self.r - self.J @ way, way) / (way @ way)
+        self.updated, self.missed = True, False
+        self.open = before - costs[best] > SETTLED * before
+        self.damping = self.damping / 3 if best == 0 else min(self.damping * 10, 1.0)
+        self.x, self.r = there, left_there
 
 
 def _steps(x: Array, low: Array, high: Array, stride: float | Array) -> Array:
