@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
+from workbench.gap.bench.arm import arm_sdf
 from workbench.gap.session import load_session
 from workbench.recording import BodyTrack, Measurement, observe, write_motive
 from workbench.simulation import Simulation, SimulationConfig
@@ -27,23 +28,6 @@ viscous_friction: 1e-2
 reflected_inertia: 6.5e-3
 """
 MOTION = "time,one,three,two\n0,0,0,0\n0.3,25,-15,30\n0.6,-20,12,-25\n0.9,0,0,0\n"
-
-
-def _link(name: str, z: float) -> str:
-    return (f'<link name="{name}"><pose>0 0 {z} 0 0 0</pose><inertial><pose>0 0 0.04 0 0 0</pose><mass>0.1</mass><inertia>'
-            "<ixx>1e-4</ixx><iyy>1e-4</iyy><izz>2e-5</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial></link>")
-
-
-def arm_sdf(fixed: bool = True) -> str:
-    """trunk, upper, middle, lower on the joints one (y), two (y), three (x); welded to the world if `fixed`."""
-    links = "".join(_link(n, z) for n, z in (("trunk", 0.1), ("upper", 0.2), ("middle", 0.28), ("lower", 0.36)))
-    joints = "".join(
-        f'<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child><axis><xyz>{axis}</xyz><limit>'
-        "<lower>-2.6</lower><upper>2.6</upper><effort>1.5</effort></limit></axis></joint>"
-        for name, parent, child, axis in (("one", "trunk", "upper", "0 1 0"), ("two", "upper", "middle", "0 1 0"),
-                                          ("three", "middle", "lower", "1 0 0")))
-    weld = '<joint name="mount" type="fixed"><parent>world</parent><child>trunk</child></joint>' if fixed else ""
-    return f'<?xml version="1.0"?><sdf version="1.7"><model name="arm">{links}{weld}{joints}</model></sdf>'
 
 
 def session_content() -> dict:

@@ -42,15 +42,16 @@ def _link(name: str, z: float) -> str:
             "<ixx>1e-4</ixx><iyy>1e-4</iyy><izz>2e-5</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial></link>")
 
 
-def _sdf() -> str:
-    """trunk, upper, middle, lower upwards on the joints one (y), two (y), three (x)."""
+def arm_sdf(fixed: bool = False) -> str:
+    """trunk, upper, middle, lower upwards on the joints one (y), two (y), three (x); welded to the world if `fixed`."""
     links = "".join(_link(n, z) for n, z in (("trunk", 0.1), ("upper", 0.2), ("middle", 0.28), ("lower", 0.36)))
     joints = "".join(
         f'<joint name="{name}" type="revolute"><parent>{parent}</parent><child>{child}</child><axis><xyz>{axis}</xyz><limit>'
         "<lower>-2.6</lower><upper>2.6</upper><effort>1.5</effort></limit></axis></joint>"
         for name, parent, child, axis in (("one", "trunk", "upper", "0 1 0"), ("two", "upper", "middle", "0 1 0"),
                                           ("three", "middle", "lower", "1 0 0")))
-    return f'<?xml version="1.0"?><sdf version="1.7"><model name="arm">{links}{joints}</model></sdf>'
+    weld = '<joint name="mount" type="fixed"><parent>world</parent><child>trunk</child></joint>' if fixed else ""
+    return f'<?xml version="1.0"?><sdf version="1.7"><model name="arm">{links}{weld}{joints}</model></sdf>'
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Log:
 
 def arm(folder: Path) -> RobotModel:
     """The nominal arm, its description written into a folder."""
-    (folder / "arm.sdf").write_text(_sdf(), encoding="utf-8")
+    (folder / "arm.sdf").write_text(arm_sdf(), encoding="utf-8")
     (folder / "servo.yaml").write_text(yaml.safe_dump(SERVO), encoding="utf-8")
     (folder / "log.csv").write_text("time,goal.one\n0,0\n1,0\n", encoding="utf-8")
     return _session(folder).model
