@@ -12,10 +12,10 @@ from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
 TIERS = 3
-ALIKE = 0.25
-"""Joints that are this share as ill as the worst are asked about."""
+ILL = 0.25
+"""Joints whose gap is this share of the worst joint's are asked about."""
 FEW = 2
-"""Joints that may be ill on the ground, with the body as the model has it, without anything but these being asked about."""
+"""Joints that may be ill on the ground, with the body as the model has it, without zero offsets of others being asked about."""
 MOVED = 0.1
 """Angle [rad] beyond which a joint has moved enough to show what it lacks."""
 
@@ -25,7 +25,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     """Groups to try, and on which takes each: effects of joints at the joints with a gap, with the base held all joints at once,
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
-    joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and (s >= ALIKE * worst)}
+    joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
     grounded = tuple(i for i in takes if i not in held)
     moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current, held)
@@ -33,15 +33,15 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     def settled(c: Candidate) -> bool:
         """What servos lack at any load, and what hangs on their links, would show with the base held, too."""
         if c.effect.layer == "inertia":
-            carrying = search.nominal.kinematics.joint_of(c.where[0])
-            return carrying in well
-        if c.effect.under_load or c.name in SEEN_ELSEWHERE or (c.where and c.joint is None) or c.effect.layer == "ground":
+            return search.nominal.kinematics.joint_of(c.where[0]) in well
+        if c.effect.under_load or c.name in SEEN_ELSEWHERE or c.effect.layer == "ground":
             return False
-        return c.joint in well if c.joint else bool(well) and not ill
+        if not c.where:
+            return bool(well) and not ill
+        return c.joint in well
 
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
     groups: dict[object, list[Candidate]] = {}
-    on: list[tuple[int, ...]] = []
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:
             continue  # a point mass has that freedom
@@ -55,15 +55,14 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
                     groups[c.key] = [c]
             elif c.joint in joints and not (grounded and settled(c)):
                 groups.setdefault(c.key if c.read_off or grounded else (c.name, "joint"), []).append(c)
-        elif c.effect.layer == "ground" and c.name != "ground_tilt" and not grounded:
-            continue
-        elif (grounded and not settled(c)) or (not grounded and _could_show(search, c, joints)):
+        elif (not settled(c)) if grounded else _could_show(search, c, joints):
             groups[c.key] = [c]
-    for group in groups.values():
-        c = group[0]
-        alone = grounded and (c.effect.layer in ("ground", "inertia") or c.name in ("zero_offset", "link_length"))
-        on.append(grounded if alone or (c.joint and grounded) else takes)
-    return list(groups.values()), dict(enumerate(on))
+
+    def on(c: Candidate) -> tuple[int, ...]:
+        walks_alone = c.joint is not None or c.effect.layer in ("ground", "inertia") or c.name == "link_length"
+        return grounded if grounded and walks_alone else takes
+
+    return list(groups.values()), {n: on(group[0]) for n, group in enumerate(groups.values())}
 
 
 def _when_held(search: Search, current: Fit, held: tuple[int, ...]) -> tuple[set[str], set[str]]:
@@ -88,7 +87,7 @@ def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
-    """Whether an effect could make these joints err and no others, or with the base held: one of the whole robot errs in several,
+    """Whether an effect could make these joints err with the base held, and no others: one of the whole robot errs in several,
     one of a link in the joints that carry it, the floor in none."""
     if c.effect.layer == "ground" and c.name != "ground_tilt":
         return False

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
 from workbench.gap.contest import Standing
-from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_of, ratios
+from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
 from workbench.gap.missed import Missed
@@ -82,15 +82,7 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
     """RMS error [deg] of the joints concerned (all of them for a robot, foot or link), before and after."""
     all_joints = list(evidence[0].joints)
     joints = [c for c in all_joints if c in where] or all_joints
-
-    def error(residuals: Residuals) -> float:
-        parts = []
-        for i, e in enumerate(evidence):
-            columns = [e.channels.index(j) for j in joints if j in e.channels]
-            parts.append(np.square((residuals[i] * e.sigma)[e.uses[use]][:, columns]).ravel())
-        return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
-
-    return Change(error(before), error(after), "deg")
+    return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
 
 
 def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals

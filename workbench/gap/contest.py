@@ -57,14 +57,14 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         for i, c in enumerate(fit.effects):
             report(f"rivals of {c}", i / len(fit.effects))
             rivals.append([_put(search, fit, i, t) for t in _near(seats, fit.effects, c)])
-        best = min((r for there in rivals for r in there), key=lambda r: r.cost["choose"], default=fit)
-        if turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < LEAST_GAIN:
+        challengers = [(r, c) for c, there in zip(fit.effects, rivals) for r in there]
+        best, replaced = min(challengers, key=lambda pair: pair[0].cost["choose"], default=(fit, None))
+        if replaced is None or turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < LEAST_GAIN:
             break
-        replaced = next(c for c, there in zip(fit.effects, rivals) if best in there)
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
         fit = search.refitted(best, search.fitted, 3)
-    return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)] if fit.effects else []
+    return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:

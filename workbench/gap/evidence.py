@@ -247,3 +247,10 @@ def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: boo
     count = np.isfinite(rows).sum(axis=0)
     value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))
     return {c: float(value[i]) if count[i] else float("nan") for i, c in enumerate(e.channels)}
+
+
+def joint_error(evidence: Sequence[TakeEvidence], joints: Sequence[str], residuals: Mapping[int, Array], use: str) -> float:
+    """RMS error [deg] of some joints over all takes' frames of one use; residuals: over sigma, by take."""
+    parts = [np.square((residuals[i] * e.sigma)[e.uses[use]][:, [e.channels.index(j) for j in joints if j in e.channels]]).ravel()
+             for i, e in enumerate(evidence)]
+    return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))

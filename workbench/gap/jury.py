@@ -50,19 +50,22 @@ class Jury:
 
     def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take."""
-        wanted = [(q, i, self._key(q, i)) for q in questions for i in q.takes]
-        self._recall([key for *_, key in wanted])
-        new = {key: (q, i) for q, i, key in wanted if key not in self._known}
-        order = sorted(new, key=lambda key: -self._cost(new[key][1]))  # the longest first, so that no core waits at the end
-        jobs = [self.job(self._felt(q.model, i), i, replace(self.config, time_step=self.config.time_step * q.step))
-                for q, i in (new[k] for k in order)]
+        keys: list[dict[int, str]] = []
+        new: dict[str, tuple[Question, int, RobotModel]] = {}
+        for q in questions:
+            felt = {i: self._felt(q.model, i) for i in q.takes}
+            keys.append({i: self._key(model, i, q.step) for i, model in felt.items()})
+            new |= {key: (q, i, felt[i]) for i, key in keys[-1].items() if not self._recalled(key)}
+        order = sorted(new, key=lambda key: -self._length(new[key][1]))  # the longest first, so that no core waits at the end
+        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step))
+                for q, i, model in (new[k] for k in order)]
         rollouts = simulate_batch(jobs, self.n_jobs)
         self.rollouts += len(order)
         for key, rollout in zip(order, rollouts):
-            q, i = new[key]
+            q, i, _ = new[key]
             self._keep(key, self.evidence[i].simulated(rollout, q.model))
-        return [{i: self.evidence[i].residual(self._known[self._key(q, i)], corrected=q.step >= 1) for i in q.takes}
-                for q in questions]
+        return [{i: self.evidence[i].residual(self._known[key], corrected=q.step >= 1) for i, key in by_take.items()}
+                for q, by_take in zip(questions, keys)]
 
     def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
         """A jury on other takes of the same robot."""
@@ -84,11 +87,11 @@ class Jury:
         """One rollout; each take's own servo changes apply."""
         e = self.evidence[take]
         spec = e.take.spec
-        own = replace(model.with_servos(spec.servos), effects=model.effects)
         frames = e.take.recorded.time - e.take.measurement.starts_at
         times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[frames >= 0]])
-        return Job(own, replace(config, base=spec.base), e.take.commands, float(frames[-1]) + 2e-3, REST, name=spec.name,
-                   times=times, start=e.take.start_state())
+        duration = float(frames[-1]) + 2e-3
+        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
+                   name=spec.name, times=times, start=e.take.start_state())
 
     def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
         """Residuals of one use as one vector, weighted, gaps as zeros: comparable between models. joint: its channels alone."""
@@ -98,6 +101,15 @@ class Jury:
             columns = e.columns(joint)
             parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
         return np.concatenate(parts)
+
+    def cost(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """Chi squared: the sum of squares of `vector`."""
+        left = self.vector(residuals, use, joint)
+        return float(left @ left)
+
+    def beyond(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """`cost` less what is expected of a right model; below 0 by chance."""
+        return self.cost(residuals, use, joint) - self.expected(tuple(residuals), use, joint)
 
     def stretches(self, takes: Sequence[int], use: str) -> NDArray[np.int_]:
         """For each number of `vector`, which stretch of which take it is of."""
@@ -119,7 +131,8 @@ class Jury:
             total += float(np.sum(frames * e.weight[columns]))
         return total
 
-    def _cost(self, take: int) -> float:
+    def _length(self, take: int) -> float:
+        """Of a rollout, about as it takes time."""
         e = self.evidence[take]
         return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)
 
@@ -127,20 +140,19 @@ class Jury:
         """The model as this take can tell it: where the base is held, no floor and no mass of the base is felt."""
         if self.evidence[take].take.spec.base != "fixed":
             return model
-        return replace(model, effects=tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,)))
+        felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
+        return model if len(felt) == len(model.effects) else replace(model, effects=felt)
 
-    def _key(self, q: Question, take: int) -> str:
+    def _key(self, felt: RobotModel, take: int, step: float) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
-        return f"{self._felt(q.model, take).sha256[:20]}-{take}-{goals}-{q.step:g}"
+        return f"{felt.sha256[:20]}-{take}-{goals}-{step:g}"
 
-    def _recall(self, keys: Sequence[str]) -> None:
-        if self.memory is None:
-            return
-        for key in keys:
-            path = self.memory / f"{key}.npy"
-            if key not in self._known and path.exists():
-                self._known[key] = np.load(path)
+    def _recalled(self, key: str) -> bool:
+        """Whether an answer is known, now or from a run before."""
+        if key not in self._known and self.memory is not None and (path := self.memory / f"{key}.npy").exists():
+            self._known[key] = np.load(path)
+        return key in self._known
 
     def _keep(self, key: str, simulated: Array) -> None:
         self._known[key] = simulated

@@ -11,7 +11,7 @@ from scipy.stats import beta
 
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
-from workbench.gap.evidence import TakeEvidence
+from workbench.gap.evidence import TakeEvidence, joint_error
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
 from workbench.robot import EffectSpec, RobotModel
@@ -72,8 +72,9 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
                     for r in (residuals, after))
         frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
         if was - now > LEAST_CLOSED * (was - frames) and was - now > 100:
-            found.append(Missed(joint, count, of, _change(jury, joint, residuals, after, "fit"),
-                                _change(jury, joint, residuals, after, "validate")))
+            fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
+                                  joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
+            found.append(Missed(joint, count, of, fit, unseen))
             jury, residuals = tried, after
     return jury, tuple(found)
 
@@ -121,12 +122,3 @@ def _without(e: TakeEvidence, joint: str, missed: Sequence[int]) -> TakeEvidence
     commands = e.take.commands
     assert commands is not None
     return replace(e, take=replace(e.take, commands=without_poses(commands, commands.column(joint), missed)))
-
-
-def _change(jury: Jury, joint: str, before: Mapping[int, Array], after: Mapping[int, Array], use: str) -> Change:
-    def error(residuals: Mapping[int, Array]) -> float:
-        parts = [np.square((residuals[i] * e.sigma)[e.uses[use], e.channels.index(joint)]) for i, e in enumerate(jury.evidence)
-                 if joint in e.channels]
-        return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
-
-    return Change(error(before), error(after), "deg")

@@ -28,7 +28,7 @@ MOST_FITTED = 3
 """Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
-Steps = Generator[list[Question], list[dict[int, Array]], T]
+Part = Generator[list[Question], list[dict[int, Array]], T]
 """What a part of a race asks, is answered, and returns."""
 
 
@@ -46,7 +46,7 @@ class Trial:
     closed: float = 0.0
 
 
-Asking = Steps[list[Trial]]
+Asking = Part[list[Trial]]
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,6 @@ class Trying:
 
     def run(self) -> Asking:
         """Trials of all in the group."""
-        if self.coarse:
-            (self.without,) = yield [self._question([], [])]
         starts, gains = yield from self._looked_at()
         alive = yield from self._worth_fitting(gains)
         out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
@@ -91,23 +89,24 @@ class Trying:
         (final,) = yield [self._question(alive, sizes)]
         return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
 
-    def _looked_at(self) -> Steps[tuple[list[Array], list[float]]]:
+    def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
         probes = _scan(c, SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1])
-        power = {i: float(np.sum(self.jury.vector({i: r}, "fit") ** 2)) for i, r in self.base.items()}
+        power = {i: self.jury.cost({i: r}, "fit") for i, r in self.base.items()}
         looked_at = (max(power, key=lambda i: power[i]),) if self.coarse else self.takes  # walks are expensive
-        asked = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
-        without, *answers = yield [replace(q, takes=looked_at, step=COARSE) for q in asked]
-        r0, plain = self._left({i: self.base[i] for i in looked_at}), self._left(without)
+        asked = [replace(self._question(everyone, [p] * len(everyone)), takes=looked_at, step=COARSE) for p in probes]
+        plainly = replace(self._question([], []), takes=self.takes if self.coarse else looked_at, step=COARSE)
+        self.without, *answers = yield [plainly, *asked]
+        r0, plain = (self._left({i: r[i] for i in looked_at}) for r in (self.base, self.without))
         seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
         far = FAR_WALKING if self.walking else FAR
         guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
         share = sum(power[i] for i in looked_at) / max(sum(power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
-    def _worth_fitting(self, gains: Sequence[float]) -> Steps[list[int]]:
+    def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
         """Of the group, those that are not told to be far behind a rival."""
         race = self.race
         race.wide.extend(g for j, g in zip(self.joints, gains) if j is None)
@@ -117,7 +116,7 @@ class Trying:
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
                 if g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
 
-    def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Steps[list[Array]]:
+    def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
         bounds = [self.group[b].bounds() for b in alive]
         points = [[share * x for x in starts] for share in ((1.0, 0.5) if self.walking else (1.0,))]
@@ -125,7 +124,7 @@ class Trying:
         nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
 
         def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
-                     ) -> Steps[list[Solved]]:
+                     ) -> Part[list[Solved]]:
             fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, slopes)
             return (yield from through(fit, lambda p: self._question(alive, p),
                                        lambda answer: [self._left(self._told(answer))[b] for b in alive]))
@@ -142,11 +141,8 @@ class Trying:
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
         joint = self.joints[b]
 
-        def vector(residuals: dict[int, Array], use: str) -> Array:
-            return self.jury.vector(residuals, use, joint)
-
-        off = {use: float(np.sum(vector(self.base, use) ** 2) - np.sum(vector(answer, use) ** 2)) for use in ("fit", "choose")}
-        beyond = float(np.sum(vector(self.base, "choose") ** 2)) - self.jury.expected(self.takes, "choose", joint)
+        off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
+        beyond = self.jury.beyond(self.base, "choose", joint)
         return Trial(self.group[b], x, off, joint, closed=off["choose"] / max(beyond, 1.0))
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:

@@ -44,9 +44,15 @@ class Fit:
         ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
-    def sizes(self) -> list[tuple[Candidate, Array]]:
-        """Each effect with its own sizes."""
-        return [(c, self.x[s]) for c, s in zip(self.effects, self.slices())]
+    def sizes(self, x: Array | None = None) -> list[tuple[Candidate, Array]]:
+        """Each effect with its own sizes; with those of another x."""
+        x = self.x if x is None else x
+        return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Of x."""
+        ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
+        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 
     def model(self, nominal: RobotModel) -> RobotModel:
         """The nominal robot with these effects."""
@@ -88,13 +94,12 @@ class Search:
                                                            if i in chosen)]).astype(int)
         if not len(moving):
             return current
-        ends = [c.bounds() for c in current.effects]
-        low, high = (np.concatenate([e[k] for e in ends])[moving] for k in (0, 1))
+        low, high = (ends[moving] for ends in current.bounds())
 
         def question(point: Sequence[Array]) -> Question:
             x = current.x.copy()
             x[moving] = point[0]
-            return Question(with_effects(self.nominal, list(zip(current.effects, [x[s] for s in current.slices()]))), takes)
+            return Question(with_effects(self.nominal, current.sizes(x)), takes)
 
         # several numbers share what a walk shows: a short move of one drowns
         near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
@@ -109,7 +114,7 @@ class Search:
         stretches = self.jury.stretches(takes, "fit")
         spread = ENGINES * np.abs(solved.x) * self._walked(solved, stretches)
         covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
-        fitted = self.evaluated(list(zip(current.effects, [x[s] for s in current.slices()])), covariance)
+        fitted = self.evaluated(current.sizes(x), covariance)
         return replace(fitted, jacobian=solved.J) if takes == self.fitted and len(moving) == len(x) else fitted
 
     def refined(self, fit: Fit) -> Fit:
@@ -123,7 +128,7 @@ class Search:
             return last
         r = self.jury.vector(last.residuals, "fit")
         move = -np.linalg.lstsq(J.T @ J + 1e-6 * np.diag(np.diag(J.T @ J) + 1e-12), J.T @ r, rcond=None)[0]
-        low, high = (np.concatenate([c.bounds()[k] for c in fit.effects]) for k in (0, 1))
+        low, high = fit.bounds()
         for share in (1.0, 0.4):
             there = self._finely(fit, np.clip(x + share * move, low, high))
             if there.cost["fit"] < last.cost["fit"]:
@@ -144,12 +149,11 @@ class Search:
         return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
 
     def _finely(self, fit: Fit, x: Array) -> Fit:
-        effects = list(zip(fit.effects, [x[s] for s in fit.slices()]))
-        residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes, FINE)])[0]
+        residuals = self.jury.residuals([Question(with_effects(self.nominal, fit.sizes(x)), self.takes, FINE)])[0]
         return replace(fit, x=x, cost=self._cost(residuals), residuals=residuals)
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
-        return {use: float(np.sum(self.jury.vector(residuals, use) ** 2)) for use in ("fit", "choose", "validate")}
+        return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
 
 
 def _covariance(solved: Solved, stretches: NDArray[np.int_]) -> Array:

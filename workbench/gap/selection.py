@@ -9,8 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-
 from workbench.gap.asked import TIERS, asked
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
@@ -126,8 +124,7 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     jury, left = search.jury, 0.0
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
-            vector = jury.vector({i: current.residuals[i]}, "choose")
-            left += max(0.0, float(vector @ vector) - jury.expected([i], "choose"))
+            left += max(0.0, jury.beyond({i: current.residuals[i]}, "choose"))
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
     return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
 
@@ -158,9 +155,8 @@ def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
-    was, left = (float(np.sum(search.jury.vector(f.residuals, "choose", t.joint) ** 2)) for f in (r.before, now))
-    noise = search.jury.expected(search.fitted, "choose", t.joint)
-    return 1.0 - max(left - noise, 0.0) / max(was - noise, 1.0)
+    was, left = (search.jury.beyond(f.residuals, "choose", t.joint) for f in (r.before, now))
+    return 1.0 - max(left, 0.0) / max(was, 1.0)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
