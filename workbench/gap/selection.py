@@ -69,8 +69,11 @@ def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
     held = tuple(i for i in search.fitted if evidence[i].take.spec.base == "fixed")
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
-    for takes in dict.fromkeys(t for t in (held, search.fitted) if t):
-        current = _phase(search, pool, nominal, current, takes, held, rounds, report)
+    if held:
+        current = _phase(search, pool, nominal, current, held, held, rounds, report)
+    if held != search.fitted:
+        astray = _part_answered(search, nominal, current, held)
+        current = _phase(search, pool, nominal, current, search.fitted, held, rounds, report, astray)
     current = _without_part_answers(search, current, rounds)
     if len(current.effects):
         report("fitting together", None)
@@ -78,19 +81,27 @@ def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
     return Chosen(current, tuple(rounds))
 
 
-def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...]) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one."""
+def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
+               ) -> dict[str, float]:
+    """Channels with a gap that is not just what is left of a larger one, `share` of it where the base is held."""
     evidence = search.jury.evidence
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], nominal.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = ROUGH_SHARE if evidence[i].take.spec.base == "free" else LEAST_SHARE
+        least = ROUGH_SHARE if evidence[i].take.spec.base == "free" else share
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
     return out
 
 
+def _part_answered(search: Search, nominal: Fit, current: Fit, held: tuple[int, ...]) -> bool:
+    """Whether a joint that was given an effect still goes wrong with the base held. No known name is what it lacks, and on the
+    ground it leads all others astray: only what moves the robot as a whole is asked there, and taken where it is most of it."""
+    given = {c.joint for c in current.effects}
+    return any(joint_of(c) in given for c in _remaining(search, current, nominal, held, ROUGH_SHARE))
+
+
 def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...], held: tuple[int, ...],
-           rounds: list[Round], report: Report) -> Fit:
+           rounds: list[Round], report: Report, astray: bool = False) -> Fit:
     while len(current.effects) < MOST_EFFECTS:
         beyond = _remaining(search, current, nominal, takes)
         if not beyond or _too_little_left(search, current, takes, rounds):
@@ -98,14 +109,15 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         trials: list[Trial] = []
-        for tier in range(TIERS):
+        for tier in range(1 if astray else TIERS):
             groups, on = asked(search, pool, current, beyond, takes, held, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead)
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
                 break
-        fits = [(_with(search, current, accepted, takes), accepted) for accepted in _accepted(trials, rounds)]
+        fits = [(_with(search, current, accepted, takes), accepted) for accepted in
+                _accepted(trials, rounds, LAST_CLOSED if astray else LEAST_CLOSED)]
         after, accepted = min(fits, key=lambda f: f[0].cost["choose"], default=(current, []))
         rounds.append(Round(current, tuple(trials), tuple(accepted)))
         if not accepted:
@@ -129,10 +141,10 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
 
 
-def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[list[Trial]]:
+def _accepted(trials: Sequence[Trial], rounds: Sequence[Round], least: float = LEAST_CLOSED) -> list[list[Trial]]:
     """Which to take: the best and the best at other joints where it is about as good; of the whole robot's the best or one that
     is close behind, as a race in coarse steps does not tell these; nothing where the best is not worth it."""
-    worth = [t for t in trials if not t.foretold and _worthwhile(t, rounds)]
+    worth = [t for t in trials if not t.foretold and t.closed > least and _worthwhile(t, rounds)]
     if not worth:
         return []
     best = worth[0]
@@ -148,9 +160,7 @@ def _accepted(trials: Sequence[Trial], rounds: Sequence[Round]) -> list[list[Tri
 def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     brought = sum(a.gain["choose"] for r in rounds for a in r.accepted if t.joint is None or a.joint in (None, t.joint))
-    if gain <= max(LEAST_GAIN * max(1, t.candidate.size), LEAST_SHARE * brought):
-        return False
-    return t.closed > LEAST_CLOSED
+    return gain > max(LEAST_GAIN * max(1, t.candidate.size), LEAST_SHARE * brought)
 
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
