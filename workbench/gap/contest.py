@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from workbench.gap.candidates import Candidate
 from workbench.gap.race import Trial
 from workbench.gap.search import Fit, Report, Search
-from workbench.gap.selection import CLOSE, LEAST_GAIN, MOST_RIVALS, Chosen, Round, completed
+from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
 
 Array = NDArray[np.float64]
 Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
@@ -21,6 +21,8 @@ TEMPER = 4.0
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
+BETTER = 30.0
+"""Of the same: a rival that does better by this much takes an effect's place."""
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
@@ -59,7 +61,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
             rivals.append([_put(search, fit, i, t) for t in _near(seats, fit.effects, c)])
         challengers = [(r, c) for c, there in zip(fit.effects, rivals) for r in there]
         best, replaced = min(challengers, key=lambda pair: pair[0].cost["choose"], default=(fit, None))
-        if replaced is None or turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < LEAST_GAIN:
+        if replaced is None or turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < BETTER:
             break
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)

@@ -17,8 +17,9 @@ from workbench.gap.race import Trial
 from workbench.gap.search import Fit, Report, Search
 
 MOST_EFFECTS = 6
-LEAST_GAIN = 30.0
-"""Of chi squared on the choosing stretches that each number of an effect must bring."""
+LEAST_GAIN = 150.0
+"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
+is half its noise: engines, and a robot and its model, differ by as much."""
 LEAST_SHARE = 0.05
 """Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
@@ -28,7 +29,7 @@ ROUGH_SHARE = 0.1
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
 several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
-CLEARLY = 20.0
+CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH, NEARLY_ALL = 0.6, 0.9
 """Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
