@@ -149,3 +149,35 @@ def test_fits_side_by_side_are_answered_together():
 
 def test_channels_across_an_axis_belong_to_their_joint():
     assert [joint_of(c) for c in ("flm", "flm~z", "roll")] == ["flm", "flm", "roll"]
+
+
+def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn):
+    session, evidence = worn[0], worn[1].jury.evidence
+    search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
+    pool = {c.key: c for c in candidates(session.model, evidence)}
+    first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
+    told = search.settled = search.refitted(search.evaluated([(first, np.array([1.0]))]), (0,), 2)
+    both = search.refitted(search.evaluated([(second, np.array([0.3])), *told.sizes()]), (0,), 2)
+    assert both.x[1] == told.x[0]
+    assert both.covariance[1, 1] == told.covariance[0, 0]
+    assert np.isinf(both.covariance[0, 1])
+    assert both.x[0] != 0.3
+    assert [s.numbers.tolist() for s in both.slopes] == [[0], [1]]
+    np.testing.assert_array_equal(both.slopes[1].J, told.slopes[0].J)
+    alone = search.resettled(search.evaluated([(second, np.array([0.1]))]), second)
+    assert [c.key for c in search.settled.effects] == [second.key]
+    assert alone.x == pytest.approx(search.settled.x)
+
+
+def test_what_is_well_hides_no_gap_and_closes_none(worn):
+    jury = worn[1].jury
+    e = jury.evidence[0]
+    quiet = 0.5 * np.ones_like(worn[2].residuals[0])
+    ill, better = quiet.copy(), quiet.copy()
+    ill[:, e.channels.index("two")] = 3.0
+    better[:, e.channels.index("two")] = 2.0
+    assert jury.beyond({0: quiet}, "choose") == 0
+    assert jury.closed({0: ill}, {0: quiet}, "choose") == 1
+    assert 0.4 < jury.closed({0: ill}, {0: better}, "choose") < 0.8
+    assert jury.closed({0: ill}, {0: better}, "choose", "one") == 0
+    assert jury.closed({0: quiet}, {0: ill}, "choose") == 0

@@ -65,6 +65,8 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
             break
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
+        if search.is_settled(replaced):
+            best = search.resettled(best, best.effects[-1])
         fit = search.refitted(best, search.fitted, 3)
     return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
 
@@ -96,4 +98,5 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
     there = search.evaluated([*others, (rival.candidate, rival.x)])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
-    return search.refitted(there, search.fitted, 3, free=[len(others)])
+    takes = search.held if search.is_settled(fit.effects[i]) else search.fitted
+    return search.refitted(there, takes, 3, free=[len(others)])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.registry import known_effects
 from workbench.gap.evidence import BLOCK, TakeEvidence
+from workbench.gap.ledger import GAP_RATIO
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
@@ -107,9 +108,17 @@ class Jury:
         left = self.vector(residuals, use, joint)
         return float(left @ left)
 
-    def beyond(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
-        """`cost` less what is expected of a right model; below 0 by chance."""
-        return self.cost(residuals, use, joint) - self.expected(tuple(residuals), use, joint)
+    def beyond(self, residuals: dict[int, Array], use: str) -> float:
+        """Chi squared in gaps: beyond what a right model leaves at most, channel by channel."""
+        cost, most = self._by_channel(residuals, use)
+        return float(np.sum(np.maximum(cost - most, 0.0)))
+
+    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
+        cost, most = self._by_channel(before, use, joint)
+        left, _ = self._by_channel(after, use, joint)
+        ill = cost > most
+        return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
     def stretches(self, takes: Sequence[int], use: str) -> NDArray[np.int_]:
         """For each number of `vector`, which stretch of which take it is of."""
@@ -121,15 +130,21 @@ class Jury:
             parts.append(np.repeat(stretch, len(e.channels)))
         return np.concatenate(parts)
 
-    def expected(self, takes: Sequence[int], use: str, joint: str | None = None) -> float:
+    def expected(self, takes: Sequence[int], use: str) -> float:
         """The sum of squares of `vector` that noise, numerics and contact models make."""
-        total = 0.0
-        for i in takes:
+        frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
+        return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
+
+    def _by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
+        """Chi squared of each take's each channel, and the most that is no gap."""
+        cost, most = [np.empty(0)], [np.empty(0)]
+        for i, r in sorted(residuals.items()):
             e = self.evidence[i]
             columns = e.columns(joint)
-            frames = np.isfinite(e.recorded[e.uses[use]][:, columns]).sum(axis=0)
-            total += float(np.sum(frames * e.weight[columns]))
-        return total
+            rows = r[e.uses[use]][:, columns]
+            cost.append(np.nansum(np.square(rows), axis=0) * e.weight[columns])
+            most.append(GAP_RATIO**2 * np.isfinite(rows).sum(axis=0) * e.weight[columns])
+        return np.concatenate(cost), np.concatenate(most)
 
     def _length(self, take: int) -> float:
         """Of a rollout, about as it takes time."""

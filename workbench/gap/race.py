@@ -20,11 +20,11 @@ SCANNED, SCANNED_GROUND = (1.0, 4.0), (0.7, 2.0)
 """Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
-WORTH = 0.4
+WORTH = 0.3
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
-MOST_FITTED = 3
+MOST_FITTED = 5
 """Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
@@ -142,8 +142,7 @@ class Trying:
         joint = self.joints[b]
 
         off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
-        beyond = self.jury.beyond(self.base, "choose", joint)
-        return Trial(self.group[b], x, off, joint, closed=off["choose"] / max(beyond, 1.0))
+        return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint))
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
         """The robot with those of the group at these sizes, beside what there is already."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -21,15 +21,26 @@ Report = Callable[[str, float | None], None]
 SEEN_ELSEWHERE = ("zero_offset",)
 """What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
 
+RESETTLING = 3
+"""Steps of a fit of effects that were settled before."""
 ENGINES = 0.06
 """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step."""
+
+    numbers: NDArray[np.int_]
+    takes: tuple[int, ...]
+    J: Array
 
 
 @dataclass(frozen=True)
 class Fit:
     """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
 
-    cost: chi squared by use ("fit", "choose", "validate"); residuals by take. jacobian: of what is fitted on all takes.
+    cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
     """
 
     effects: tuple[Candidate, ...]
@@ -37,12 +48,17 @@ class Fit:
     covariance: Array
     cost: dict[str, float]
     residuals: dict[int, Array] = field(repr=False)
-    jacobian: Array | None = field(default=None, repr=False)
+    slopes: tuple[Slopes, ...] = field(default=(), repr=False)
 
     def slices(self) -> list[slice]:
         """Of x, for each effect."""
         ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
+
+    def numbers(self, effects: Iterable[int]) -> NDArray[np.int_]:
+        """Indices of x, of some effects."""
+        slices = self.slices()
+        return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
 
     def sizes(self, x: Array | None = None) -> list[tuple[Candidate, Array]]:
         """Each effect with its own sizes; with those of another x."""
@@ -60,19 +76,36 @@ class Fit:
 
 
 class Search:
-    """Fits on one session."""
+    """Fits on one session.
+
+    settled: effects that showed with the base held, as held takes tell them: these keep their numbers in all fits that follow,
+    as contact bends what walks tell.
+    """
 
     def __init__(self, jury: Jury, nominal: RobotModel) -> None:
         self.jury, self.nominal = jury, nominal
         self.takes = tuple(range(len(jury.evidence)))
         self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
+        self.held = tuple(i for i in self.fitted if not jury.walks((i,)))
+        self.settled: Fit | None = None
 
-    def evaluated(self, effects: Sequence[tuple[Candidate, Array]], covariance: Array | None = None) -> Fit:
+    def is_settled(self, c: Candidate) -> bool:
+        """Whether held takes told its numbers."""
+        return self.settled is not None and c.key in {e.key for e in self.settled.effects}
+
+    def resettled(self, current: Fit, *more: Candidate) -> Fit:
+        """`current` with those that are settled, and `more`, fitted anew on held takes: for when one went or another came."""
+        there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
+        self.settled = None
+        self.settled = self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there)))
+        told = {c.key: x for c, x in self.settled.sizes()}
+        return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
+
+    def evaluated(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
         """Effects as they are, on all takes."""
         residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes)])[0]
         x = np.concatenate([np.empty(0), *(x for _, x in effects)])
-        covariance = np.full((len(x), len(x)), np.inf) if covariance is None else covariance
-        return Fit(tuple(c for c, _ in effects), x, covariance, self._cost(residuals), residuals)
+        return Fit(tuple(c for c, _ in effects), x, np.full((len(x), len(x)), np.inf), self._cost(residuals), residuals)
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
               report: Callable[[float], None], ahead: float = 0.0) -> list[Trial]:
@@ -88,12 +121,10 @@ class Search:
         return [trial for n in range(len(groups)) for trial in done[n]]
 
     def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
-        """All effects' sizes fitted together (or those of the effects listed in `free`), with their covariance."""
-        chosen = list(range(len(current.effects))) if free is None else list(free)
-        moving = np.concatenate([np.empty(0, dtype=int), *(np.arange(s.start, s.stop) for i, s in enumerate(current.slices())
-                                                           if i in chosen)]).astype(int)
+        """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
+        moving = current.numbers([i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else free)
         if not len(moving):
-            return current
+            return self._told_held(current)
         low, high = (ends[moving] for ends in current.bounds())
 
         def question(point: Sequence[Array]) -> Question:
@@ -114,20 +145,36 @@ class Search:
         stretches = self.jury.stretches(takes, "fit")
         spread = ENGINES * np.abs(solved.x) * self._walked(solved, stretches)
         covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
-        fitted = self.evaluated(current.sizes(x), covariance)
-        return replace(fitted, jacobian=solved.J) if takes == self.fitted and len(moving) == len(x) else fitted
+        fitted = replace(self.evaluated(current.sizes(x)), covariance=covariance, slopes=(Slopes(moving, takes, solved.J),))
+        return self._told_held(fitted)
+
+    def _told_held(self, fit: Fit) -> Fit:
+        """With covariance and slopes of those that are settled."""
+        if self.settled is None:
+            return fit
+        where = {c.key: i for i, c in enumerate(self.settled.effects)}
+        both = [(i, where[c.key]) for i, c in enumerate(fit.effects) if c.key in where]
+        here, there = fit.numbers(i for i, _ in both), self.settled.numbers(k for _, k in both)
+        covariance = fit.covariance.copy()
+        covariance[here], covariance[:, here] = np.inf, np.inf
+        covariance[np.ix_(here, here)] = self.settled.covariance[np.ix_(there, there)]
+        slopes = [Slopes(here, s.takes, s.J[:, [s.numbers.tolist().index(n) for n in there]]) for s in self.settled.slopes]
+        others = [s for s in fit.slopes if not np.isin(s.numbers, here).any()]
+        return replace(fit, covariance=covariance, slopes=(*others, *slopes))
 
     def refined(self, fit: Fit) -> Fit:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
-        cent. One Gauss-Newton step with the search's Jacobian, halved while it makes things worse; a quarter of the way counts
+        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; a quarter of the way counts
         as a standard deviation more."""
         x = fit.x
         last = self._finely(fit, x)
-        J = fit.jacobian
-        if J is None or not len(x) or not np.isfinite(fit.covariance).any():
+        if not fit.slopes or not np.isfinite(fit.covariance).any():
             return last
-        r = self.jury.vector(last.residuals, "fit")
-        move = -np.linalg.lstsq(J.T @ J + 1e-6 * np.diag(np.diag(J.T @ J) + 1e-12), J.T @ r, rcond=None)[0]
+        move = np.zeros(len(x))
+        for s in fit.slopes:
+            r = self.jury.vector({i: last.residuals[i] for i in s.takes}, "fit")
+            H = s.J.T @ s.J
+            move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         low, high = fit.bounds()
         for share in (1.0, 0.4):
             there = self._finely(fit, np.clip(x + share * move, low, high))

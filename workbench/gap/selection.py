@@ -20,6 +20,8 @@ MOST_EFFECTS = 6
 LEAST_GAIN = 150.0
 """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
 is half its noise: engines, and a robot and its model, differ by as much."""
+LEAST_WALKING = 600.0
+"""The same of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 LEAST_SHARE = 0.05
 """Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
@@ -36,8 +38,9 @@ ENOUGH, NEARLY_ALL = 0.6, 0.9
 like the ground's, before joints are asked."""
 MOST_STEPS = 5
 """Of a fit of all effects, when one was added; it ends where little changes."""
-MOST_RIVALS, CLOSE = 2, 0.15
-"""Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge."""
+MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
+"""Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
+joint, where the best leaves more than a tenth: there some fit has not come to its end."""
 ALIKE = 0.25
 """Joints whose best gain is this share of the greatest are taken in the same round."""
 
@@ -66,20 +69,23 @@ class Chosen:
 
 def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
     """The effects that stay."""
-    evidence = search.jury.evidence
-    held = tuple(i for i in search.fitted if evidence[i].take.spec.base == "fixed")
+    held = search.held
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
     if held:
         current = _phase(search, pool, nominal, current, held, held, rounds, report)
     if held != search.fitted:
+        search.settled = current if held else None
         astray = _part_answered(search, nominal, current, held)
         current = _phase(search, pool, nominal, current, search.fitted, held, rounds, report, astray)
-    current = _without_part_answers(search, current, rounds)
-    if len(current.effects):
+    kept = _without_part_answers(search, current, rounds)
+    if len(kept.effects):
         report("fitting together", None)
-        current = search.refitted(without_idle(search, current), search.fitted, 3)
-    return Chosen(current, tuple(rounds))
+        kept = without_idle(search, kept)
+        if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
+            kept = search.resettled(kept)
+        kept = search.refitted(kept, search.fitted, 3)
+    return Chosen(kept, tuple(rounds))
 
 
 def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
@@ -115,10 +121,11 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and set(takes) - set(held) else ENOUGH):
+            if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and search.jury.walks(takes) else ENOUGH):
                 break
-        fits = [(_with(search, current, accepted, takes), accepted) for accepted in
-                _accepted(trials, rounds, LAST_CLOSED if astray else LEAST_CLOSED)]
+        least = LAST_CLOSED if astray else LEAST_CLOSED
+        worth = [t for t in trials if t.closed > least and _worthwhile(search, t, takes, rounds)]
+        fits = [(_with(search, current, accepted, takes), accepted) for accepted in _accepted(worth)]
         after, accepted = min(fits, key=lambda f: f[0].cost["choose"], default=(current, []))
         rounds.append(Round(current, tuple(trials), tuple(accepted)))
         if not accepted:
@@ -137,37 +144,40 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     jury, left = search.jury, 0.0
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
-            left += max(0.0, jury.beyond({i: current.residuals[i]}, "choose"))
+            left += jury.beyond({i: current.residuals[i]}, "choose")
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
-    return left < max(LEAST_GAIN, (ROUGH_SHARE if jury.walks(takes) else LEAST_SHARE) * brought)
+    least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (LEAST_GAIN, LEAST_SHARE)
+    return left < max(least, share * brought)
 
 
-def _accepted(trials: Sequence[Trial], rounds: Sequence[Round], least: float = LEAST_CLOSED) -> list[list[Trial]]:
-    """Which to take: the best and the best at other joints where it is about as good; of the whole robot's the best or one that
-    is close behind, as a race in coarse steps does not tell these; nothing where the best is not worth it."""
-    worth = [t for t in trials if not t.foretold and t.closed > least and _worthwhile(t, rounds)]
+def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
+    """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
+    robot's the best. Where a race does not tell who is ahead, each of them to be fitted."""
     if not worth:
         return []
     best = worth[0]
     if best.joint is None:
         return [[t] for t in worth[:MOST_RIVALS + 1] if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
-    out = [best]
+    elsewhere: list[Trial] = []
     for t in worth[1:]:
-        if t.joint is not None and t.joint not in {o.joint for o in out} and t.gain["choose"] > ALIKE * best.gain["choose"]:
-            out.append(t)
-    return [out]
+        if t.joint not in {None, best.joint, *(o.joint for o in elsewhere)} and t.gain["choose"] > ALIKE * best.gain["choose"]:
+            elsewhere.append(t)
+    rivals = [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
+              and t.gain["choose"] > HALFWAY * best.gain["choose"]]
+    return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
 
 
-def _worthwhile(t: Trial, rounds: Sequence[Round]) -> bool:
+def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> bool:
+    """Whether an effect that was fitted brings enough."""
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     brought = sum(a.gain["choose"] for r in rounds for a in r.accepted if t.joint is None or a.joint in (None, t.joint))
-    return gain > max(LEAST_GAIN * max(1, t.candidate.size), LEAST_SHARE * brought)
+    least = LEAST_WALKING if t.joint is None and search.jury.walks(takes) else LEAST_GAIN * max(1, t.candidate.size)
+    return not t.foretold and gain > max(least, LEAST_SHARE * brought)
 
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
-    was, left = (search.jury.beyond(f.residuals, "choose", t.joint) for f in (r.before, now))
-    return 1.0 - max(left, 0.0) / max(was, 1.0)
+    return search.jury.closed(r.before.residuals, now.residuals, "choose", t.joint)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
@@ -187,7 +197,8 @@ def without_idle(search: Search, current: Fit) -> Fit:
         least = LEAST_GAIN * max(1, current.effects[i].size)
         rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
         if rest.cost["choose"] - current.cost["choose"] < CLEARLY * least:
-            rest = search.refitted(rest, search.fitted, 1)
+            free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None
+            rest = search.refitted(rest, search.fitted, 1, free)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
     return current
