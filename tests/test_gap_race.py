@@ -27,14 +27,14 @@ def friction():
 
 def test_an_effect_of_one_number_is_looked_at_at_several_sizes_within_its_bounds():
     c = friction()
-    assert [c.values(p)[0] for p in _scan(c, (0.7, 2.0))] == pytest.approx([0.46, 0.2])
-    assert len(_scan(c, (90.0, 99.0))) == 1  # both at the bound
+    assert [c.values(p)[0] for p in _scan(c, (0.7, 2.0), True)] == pytest.approx([0.46, 0.2])
+    assert len(_scan(c, (90.0, 99.0), True)) == 1  # both at the bound
 
 
 def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     c = Candidate.of(known_effects()["command_delay"], (), (0.0,))
     r0 = np.ones(20)
-    probes = _scan(c, (0.7, 2.0))
+    probes = _scan(c, (0.7, 2.0), True)
     weak = [r0 - 0.01 * p[0] for p in probes]  # a line would say: a hundred times that
     x, gain = _guess(c, r0, probes, weak, FAR_WALKING)
     assert x[0] == pytest.approx(FAR_WALKING * 2.0)
@@ -126,3 +126,22 @@ def test_of_one_number_the_lowest_point_of_what_was_seen_is_tried_within_it():
     assert _lowest(seen((0, 0.0), (1, 4.0), (2, 1.0)), *bounds) is None
     assert _lowest(seen((0, 1.0), (1, 4.0)), *bounds) is None
     assert _lowest([(np.zeros(2), 1.0)] * 3, np.zeros(2), np.ones(2)) is None
+
+
+def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_what_was_seen():
+    c = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    rng = np.random.default_rng(0)
+    line, bend, truth = rng.normal(size=(2, 50)), rng.normal(size=(2, 50)), np.array([0.6, -0.9])
+    probes = _scan(c, (1.0,), True)
+    assert [p.tolist() for p in probes] == [[1, 0], [0, 1], [-1, 0], [0, -1]]
+
+    def shown(x):
+        return x @ line + x**2 @ bend
+
+    r0 = -shown(truth)
+    seen = [r0 + shown(p) for p in probes]
+    x, gain = _guess(c, r0, probes, seen, FAR_WALKING)
+    assert x == pytest.approx(truth, abs=1e-3)
+    assert gain == pytest.approx(r0 @ r0, rel=1e-6)
+    far, _ = _guess(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
+    assert np.abs(far).max() <= 2 * FAR_WALKING

@@ -113,9 +113,13 @@ class Candidate:
             low[1:], high[1:] = [-MOST_MOMENT] * 3, [MOST_MOMENT] * 3
         return np.array(low), np.array(high)
 
-    def probes(self) -> list[Array]:
+    def probes(self, mirrored: bool = False) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
-        that says where a scalar acts; one empty for an effect without numbers."""
+        that says where a scalar acts; one empty for an effect without numbers. mirrored: directions the other way, too."""
+        if mirrored and self.size > 1:
+            there = self.probes()
+            back = [p * (1.0, -1.0, -1.0, -1.0) if self._point_mass else -p for p in there]
+            return there + [b for b, p in zip(back, there) if not np.array_equal(b, p)]
         if self._point_mass:
             return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)
@@ -128,10 +132,6 @@ class Candidate:
         """Whether the sizes are a mass and where it is, all to be fitted: then as mass and its moments about the link's centre of
         mass, which show linearly, as mass and distance do not."""
         return self.effect.name == "payload" and self.size == 4
-
-    def combined(self, shares: NDArray[np.floating]) -> Array:
-        """Sizes at which the effect shows what `shares` of its probes show together."""
-        return np.asarray(np.sum([s * p for s, p in zip(shares, self.probes())], axis=0))
 
     def spec(self, x: Sequence[float] | Array) -> EffectSpec:
         """The effect at these sizes."""

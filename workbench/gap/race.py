@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize
 
 from workbench.gap.candidates import Candidate, with_effects
 from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through
@@ -93,7 +94,8 @@ class Trying:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
-        probes = _scan(c, SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1])
+        sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
+        probes = _scan(c, sizes, self.walking)
         power = {i: self.jury.cost({i: r}, "fit") for i, r in self.base.items()}
         looked_at = (max(power, key=lambda i: power[i]),) if self.coarse else self.takes  # walks are expensive
         asked = [replace(self._question(everyone, [p] * len(everyone)), takes=looked_at, step=COARSE) for p in probes]
@@ -167,11 +169,11 @@ def _best(best: dict[str | None, float], joint: str | None) -> float:
     return max(best.values()) if joint is None else best[joint]
 
 
-def _scan(c: Candidate, sizes: Sequence[float]) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several; of more, each alone."""
+def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several; of more, each alone, of a walk both ways."""
     if c.read_off:
         return [np.ones(c.size)]
-    probes = c.probes()
+    probes = c.probes(mirrored=walking)
     if len(probes) > 1 or not c.size:
         return probes
     low, high = c.bounds()
@@ -186,9 +188,7 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
         return np.empty(0), whole - float(seen[0] @ seen[0])
     low, high = c.bounds()
     if np.linalg.matrix_rank(np.array(probes)) > 1:  # several numbers, not one at several sizes
-        S = np.stack([(v - r0) for v in seen], axis=1)
-        shares, *_ = np.linalg.lstsq(S, -r0, rcond=1e-8)
-        return np.clip(c.combined(shares), low, high), whole - float(np.sum((r0 + S @ shares) ** 2))
+        return _bent_guess(r0, np.array(probes), np.array(seen), (low, high), 2 * far)
     best = (probes[0], -np.inf)
     for p, v in zip(probes, seen):
         S = v - r0
@@ -199,3 +199,24 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
         if gain > best[1]:
             best = (x, gain)
     return best
+
+
+def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
+    """The same of several numbers: what is seen at points (k, n) told by a line for each number, and by a parabola for those that
+    were seen both ways, as a walk hardly answers in lines; sizes where the sum of squares of that is least."""
+    both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
+
+    def terms(x: Array) -> Array:
+        return np.concatenate([x, x[..., both] ** 2], axis=-1)
+
+    answers = np.linalg.lstsq(terms(points), seen - r0, rcond=1e-8)[0]
+    G, g = answers @ answers.T, answers @ r0
+
+    def cost(x: Array) -> float:
+        return float(terms(x) @ G @ terms(x) + 2 * terms(x) @ g)
+
+    reach = far * np.abs(points).max(axis=0)
+    box = Bounds(np.maximum(bounds[0], -reach), np.minimum(bounds[1], reach))
+    ends = [minimize(cost, start, method="L-BFGS-B", bounds=box) for start in (np.zeros(points.shape[1]), *points)]
+    best = min(ends, key=lambda end: float(end.fun))
+    return np.asarray(best.x, dtype=float), -float(best.fun)
