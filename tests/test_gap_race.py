@@ -133,10 +133,11 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
     rng = np.random.default_rng(0)
     line, bend, truth = rng.normal(size=(2, 50)), rng.normal(size=(2, 50)), np.array([0.6, -0.9])
     probes = _scan(c, (1.0,), True)
-    assert [p.tolist() for p in probes] == [[1, 0], [0, 1], [-1, 0], [0, -1]]
+    assert [p.tolist() for p in probes] == [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]]
+    both = rng.normal(size=50)
 
     def shown(x):
-        return x @ line + x**2 @ bend
+        return x @ line + x**2 @ bend + x[0] * x[1] * both
 
     r0 = -shown(truth)
     seen = [r0 + shown(p) for p in probes]

@@ -113,13 +113,16 @@ class Candidate:
             low[1:], high[1:] = [-MOST_MOMENT] * 3, [MOST_MOMENT] * 3
         return np.array(low), np.array(high)
 
-    def probes(self, mirrored: bool = False) -> list[Array]:
+    def probes(self, around: bool = False) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
-        that says where a scalar acts; one empty for an effect without numbers. mirrored: directions the other way, too."""
-        if mirrored and self.size > 1:
-            there = self.probes()
-            back = [p * (1.0, -1.0, -1.0, -1.0) if self._point_mass else -p for p in there]
-            return there + [b for b, p in zip(back, there) if not np.array_equal(b, p)]
+        that says where a scalar acts; one empty for an effect without numbers. around: directions both ways, and
+        the first two together: what a push to the left shows depends on that to the front."""
+        if around and len(self.probes()) > 1:
+            middle = self.probes()[0] if self._point_mass else np.zeros(self.size)
+            ways = [p - middle for p in self.probes() if not np.array_equal(p, middle)]
+            signs = (1.0, -1.0)
+            return [*([middle] if self._point_mass else []), *(middle + s * way for s in signs for way in ways),
+                    *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
         if self._point_mass:
             return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)

@@ -109,14 +109,15 @@ class Jury:
         return float(left @ left)
 
     def beyond(self, residuals: dict[int, Array], use: str) -> float:
-        """Chi squared in gaps: beyond what a right model leaves at most, channel by channel."""
-        cost, most = self._by_channel(residuals, use)
-        return float(np.sum(np.maximum(cost - most, 0.0)))
+        """Chi squared beyond what is expected of a right model, of the channels that have a gap."""
+        cost, expected = self._by_channel(residuals, use)
+        return float(np.sum((cost - expected)[cost > GAP_RATIO**2 * expected]))
 
     def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
         """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
-        cost, most = self._by_channel(before, use, joint)
+        cost, expected = self._by_channel(before, use, joint)
         left, _ = self._by_channel(after, use, joint)
+        most = GAP_RATIO**2 * expected
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
@@ -136,15 +137,15 @@ class Jury:
         return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
 
     def _by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
-        """Chi squared of each take's each channel, and the most that is no gap."""
-        cost, most = [np.empty(0)], [np.empty(0)]
+        """Chi squared of each take's each channel, and what is expected of it."""
+        cost, expected = [np.empty(0)], [np.empty(0)]
         for i, r in sorted(residuals.items()):
             e = self.evidence[i]
             columns = e.columns(joint)
             rows = r[e.uses[use]][:, columns]
             cost.append(np.nansum(np.square(rows), axis=0) * e.weight[columns])
-            most.append(GAP_RATIO**2 * np.isfinite(rows).sum(axis=0) * e.weight[columns])
-        return np.concatenate(cost), np.concatenate(most)
+            expected.append(np.isfinite(rows).sum(axis=0) * e.weight[columns])
+        return np.concatenate(cost), np.concatenate(expected)
 
     def _length(self, take: int) -> float:
         """Of a rollout, about as it takes time."""

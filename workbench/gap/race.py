@@ -170,10 +170,10 @@ def _best(best: dict[str | None, float], joint: str | None) -> float:
 
 
 def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several; of more, each alone, of a walk both ways."""
+    """Sizes at which a candidate is looked at: of one number, several; of more, each alone, of a walk all around."""
     if c.read_off:
         return [np.ones(c.size)]
-    probes = c.probes(mirrored=walking)
+    probes = c.probes(around=walking)
     if len(probes) > 1 or not c.size:
         return probes
     low, high = c.bounds()
@@ -202,12 +202,14 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
 
 
 def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
-    """The same of several numbers: what is seen at points (k, n) told by a line for each number, and by a parabola for those that
-    were seen both ways, as a walk hardly answers in lines; sizes where the sum of squares of that is least."""
+    """The same of several numbers: what is seen at points (k, n) told by a line for each number and, as a walk hardly answers in
+    lines, by squares of those that were seen both ways and the product of the first two; sizes where the sum of squares of that,
+    or of a point that was seen, is least."""
     both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
 
     def terms(x: Array) -> Array:
-        return np.concatenate([x, x[..., both] ** 2], axis=-1)
+        together = x[..., both[:2]].prod(axis=-1, keepdims=True) if len(both) > 1 else x[..., :0]
+        return np.concatenate([x, x[..., both] ** 2, together], axis=-1)
 
     answers = np.linalg.lstsq(terms(points), seen - r0, rcond=1e-8)[0]
     G, g = answers @ answers.T, answers @ r0
@@ -218,5 +220,6 @@ def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Arra
     reach = far * np.abs(points).max(axis=0)
     box = Bounds(np.maximum(bounds[0], -reach), np.minimum(bounds[1], reach))
     ends = [minimize(cost, start, method="L-BFGS-B", bounds=box) for start in (np.zeros(points.shape[1]), *points)]
-    best = min(ends, key=lambda end: float(end.fun))
-    return np.asarray(best.x, dtype=float), -float(best.fun)
+    known = [(np.asarray(end.x, dtype=float), -float(end.fun)) for end in ends]
+    known += [(p, float(r0 @ r0 - r @ r)) for p, r in zip(points, seen)]
+    return max(known, key=lambda k: k[1])

@@ -144,7 +144,7 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     jury, left = search.jury, 0.0
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
-            left += jury.beyond({i: current.residuals[i]}, "choose")
+            left += sum(jury.beyond({i: current.residuals[i]}, use) for use in ("fit", "choose")) / 3  # a third chooses
     brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
     least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (LEAST_GAIN, LEAST_SHARE)
     return left < max(least, share * brought)
