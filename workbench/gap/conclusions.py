@@ -23,8 +23,8 @@ Z90 = 1.645
 WIDER = 1.5
 """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
 engine, or the world, is not ours."""
-LEAST_RELATIVE = 0.01
-"""Standard deviation that no number's interval goes below, in shares of the number."""
+LEAST_RELATIVE = 0.015
+"""Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
@@ -61,7 +61,8 @@ def estimates(c: Candidate, x: Array, sd: Array) -> dict[str, Estimate]:
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
     values = np.array(c.values(x))
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
-    least = Z90 * LEAST_RELATIVE * np.abs(values)
+    neutral = np.array([n if np.isfinite(n) and n != t else 0.0 for n, t in zip(c.neutral, c.typical)])
+    least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     unknown = np.array([True] * len(values))
     unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)

@@ -16,8 +16,9 @@ from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
 Array = NDArray[np.float64]
 Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
 """By effect, when it was taken and on what."""
-TEMPER = 4.0
-"""Neighbouring frames err alike, and engines differ: chi squared differences count a quarter when they become probabilities."""
+TEMPER, TEMPER_WALKING = 4.0, 60.0
+"""Neighbouring frames err alike, and engines differ: what chi squared differences are divided by when they become probabilities.
+The second where walks tell: fits of the same effect that begin elsewhere end some hundreds apart there."""
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
@@ -72,7 +73,10 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
-    temper = TEMPER * max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
+    taken = seats[fit.effects[i].key][1]
+    walked = taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(fit.effects[i])
+    temper = TEMPER_WALKING if walked else TEMPER
+    temper *= max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
     cost = np.array([fit.cost["choose"], *(r.cost["choose"] for r in rivals)])
     weight = np.exp(-0.5 * (cost - cost.min()) / temper)
     p = weight / weight.sum()

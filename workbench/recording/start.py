@@ -18,6 +18,8 @@ _LAG = 45.0
 _BEFORE, _AFTER = 0.05, 0.25  # [s] window around a joint's first motion
 _FINE = 0.06  # [s] how far a joint may differ from the common start
 _LEAST = np.deg2rad(1.0)  # a joint that moves less in its window says nothing
+_STAYS = 0.05  # [s] for which a joint that has begun to move is away from rest
+_FIRST = 0.08  # [s] how far the start may be from where first motions meet: some joints set out late
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,14 @@ def _onset(t: Array, q: Array) -> float | None:
 
 
 def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int, int, float]]) -> float:
-    """Start [s] on the grid of frames at which most joints agree over the first second."""
+    """Start [s] on the grid of frames at which most joints agree over the first second; not far from where recorded and predicted
+    first motions meet, where both are seen: a robot that rests at the end agrees with one that has not begun."""
     step = float(np.median(np.diff(time)))
     horizon = min(1.0, float(tp[-1]))
     candidates = np.arange(time[0], max(time[-1] - 0.3 * horizon, time[0] + step), step)
+    first, told = _first_motion(time, q[:, [i for i, *_ in moving]]), _first_motion(tp, qp[:, [c for _, c, _ in moving]])
+    if first is not None and told is not None and (np.abs(candidates - first + told) < _FIRST).any():
+        candidates = candidates[np.abs(candidates - first + told) < _FIRST]
     offsets = np.arange(-0.2, horizon, 2 * step)
     total = np.zeros(len(candidates))
     for i, c, _ in moving:
@@ -102,6 +108,15 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
         error = np.nanmean(np.square(seen - model), axis=1) / max(float(np.mean(np.square(model))), _LEAST**2)
         total += np.minimum(np.nan_to_num(error, nan=1.0), 1.0)
     return float(candidates[np.argmin(total)])
+
+
+def _first_motion(t: Array, q: Array) -> float | None:
+    """When two of the joints q (N, n) (or one, of few) have left rest to stay away; None where they never rest before."""
+    away = np.sum(np.abs(np.nan_to_num(q)) > _LEAST, axis=1) >= min(2, q.shape[1])
+    frames = max(1, round(_STAYS / float(np.median(np.diff(t)))))
+    stays = np.convolve(away, np.ones(frames), mode="valid") == frames
+    at = int(np.argmax(stays))
+    return float(t[at]) if stays.any() and at >= frames else None
 
 
 def _fine(time: Array, q: Array, tp: Array, qp: Array, onset: float, coarse: float, noise: float) -> tuple[float, float] | None:

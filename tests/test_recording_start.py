@@ -1,0 +1,24 @@
+"""When the first command went out, where the robot does not move as predicted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workbench.motion.commands import Commands
+from workbench.recording.start import find_start, lagged_reference
+
+JOINTS = ("one", "two", "three")
+
+
+def test_a_robot_that_rests_at_the_end_is_not_taken_for_one_that_has_not_begun():
+    """At wrong speeds nothing fits; rest at the end of the take fits the rest before the first pose."""
+    goals = np.deg2rad([[0, 0, 0], [30, -30, 20], [-30, 30, -20], [0, 0, 0]])
+    commands = Commands(times=np.array([0.0, 0.5, 1.5, 2.5]), joints=JOINTS, goals=goals, speeds=np.full((4, 3), 0.6),
+                        enabled=np.ones((4, 3), dtype=bool), end=3.5, poses=np.arange(4))
+    wrong = replace(commands, goals=goals[:, [1, 2, 0]], speeds=np.zeros((4, 3)))
+    recorded = lagged_reference(wrong)
+    time = np.arange(0, 6.0, 1 / 120)
+    q = np.stack([np.interp(time - 0.4, recorded.time, c) for c in recorded.q.T], axis=1)
+    found = find_start(time, JOINTS, q, np.full(3, 1e-3), lagged_reference(commands))
+    assert found.time == pytest.approx(0.4, abs=0.2)
