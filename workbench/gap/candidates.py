@@ -80,7 +80,7 @@ class Candidate:
     def values(self, x: Sequence[float] | Array) -> list[float]:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
         x = np.asarray(x, dtype=float)
-        if self._point_mass:
+        if self.point_mass:
             x = np.array([x[0], *(x[1:] / max(x[0], LEAST_MASS))])
         sizes = iter(x.tolist())
         out = []
@@ -109,7 +109,7 @@ class Candidate:
                 ends = [(end - n) / (t - n) for end in (p.low, p.high)]
             low.append(min(ends))
             high.append(max(ends))
-        if self._point_mass:
+        if self.point_mass:
             low[1:], high[1:] = [-MOST_MOMENT] * 3, [MOST_MOMENT] * 3
         return np.array(low), np.array(high)
 
@@ -118,12 +118,12 @@ class Candidate:
         that says where a scalar acts; one empty for an effect without numbers. around: directions both ways, and
         the first two together: what a push to the left shows depends on that to the front."""
         if around and len(self.probes()) > 1:
-            middle = self.probes()[0] if self._point_mass else np.zeros(self.size)
+            middle = self.probes()[0] if self.point_mass else np.zeros(self.size)
             ways = [p - middle for p in self.probes() if not np.array_equal(p, middle)]
             signs = (1.0, -1.0)
-            return [*([middle] if self._point_mass else []), *(middle + s * way for s in signs for way in ways),
+            return [*([middle] if self.point_mass else []), *(middle + s * way for s in signs for way in ways),
                     *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
-        if self._point_mass:
+        if self.point_mass:
             return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)
         fitted = [(p, n, t) for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held) if not held]
@@ -131,7 +131,7 @@ class Candidate:
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
 
     @property
-    def _point_mass(self) -> bool:
+    def point_mass(self) -> bool:
         """Whether the sizes are a mass and where it is, all to be fitted: then as mass and its moments about the link's centre of
         mass, which show linearly, as mass and distance do not."""
         return self.effect.name == "payload" and self.size == 4

@@ -42,24 +42,24 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standi
     c, x = fit.sizes()[i]
     alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals[:1]
                          if r.probability >= 0.01)
-    numbers = estimates(c, x, deviations(fit)[fit.slices()[i]])
+    own = fit.slices()[i]
+    numbers = estimates(c, x, WIDER**2 * fit.covariance[own, own])
     return Finding(
         effect=c.name, where=c.where, confidence=standing.probability, parameters=numbers,
         alternatives=alternatives, fit=change(evidence, c.where, before, after, "fit"),
         validation=change(evidence, c.where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
 
 
-def deviations(fit: Fit) -> Array:
-    """Standard deviations of a fit's sizes, as wide as they are believed."""
-    return np.asarray(WIDER * np.sqrt(np.diag(fit.covariance)))
-
-
-def estimates(c: Candidate, x: Array, sd: Array) -> dict[str, Estimate]:
+def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
-    half = Z90 * sd
+    half = Z90 * np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
     values = np.array(c.values(x))
+    if c.point_mass and np.isfinite(half).all():  # where it is says a moment over a mass: both err, together
+        slopes = _slopes(c, x)
+        half = Z90 * np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+        ends = np.array([values - half, values + half])
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and n != t else 0.0 for n, t in zip(c.neutral, c.typical)])
     least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
@@ -157,10 +157,7 @@ def posterior(fit: Fit, missed: Sequence[Missed] = ()) -> Posterior:
     mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
     slopes = np.zeros((len(mean), len(fit.x)))
     for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
-        for k, n in enumerate(range(s.start, s.stop)):
-            step = np.eye(c.size)[k] * 1e-4
-            ends = [np.array(c.values(fit.x[s] + sign * step)) for sign in (1, -1)]
-            slopes[row:row + len(c.neutral), n] = (ends[0] - ends[1]) / 2e-4
+        slopes[row:row + len(c.neutral), s] = _slopes(c, fit.x[s])
     known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
     inner = WIDER**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
     covariance = slopes @ inner @ slopes.T
@@ -174,3 +171,10 @@ def posterior(fit: Fit, missed: Sequence[Missed] = ()) -> Posterior:
         wider[-1, -1] = m.probability * (1 - m.probability) / m.of
         covariance = wider
     return Posterior(tuple(names), mean, covariance)
+
+
+def _slopes(c: Candidate, x: Array) -> Array:
+    """Of a candidate's values with respect to its sizes."""
+    steps = 1e-4 * np.eye(c.size)
+    columns = [(np.array(c.values(x + h)) - np.array(c.values(x - h))) / 2e-4 for h in steps]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(c.neutral), 0))

@@ -17,8 +17,9 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-SCANNED, SCANNED_GROUND = (1.0, 4.0), (0.7, 2.0)
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two."""
+SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two, and those of
+several numbers at one, so large that it is more than what a walk makes of anything small."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 WORTH = 0.3
@@ -174,9 +175,9 @@ def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     if c.read_off:
         return [np.ones(c.size)]
     probes = c.probes(around=walking)
-    if len(probes) > 1 or not c.size:
-        return probes
     low, high = c.bounds()
+    if len(probes) > 1 or not c.size:
+        return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
     points = [np.clip(s * probes[0], low, high) for s in sizes]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
