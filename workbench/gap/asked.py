@@ -11,7 +11,8 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS = 3
+TIERS, TIERS_OF_ALL = 4, 2
+"""On the ground the first are what moves the robot as a whole."""
 ILL = 0.25
 """Joints whose gap is this share of the worst joint's are asked about."""
 FEW = 2
@@ -75,15 +76,16 @@ def _when_held(search: Search, current: Fit, held: tuple[int, ...]) -> tuple[set
 
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
-    """With the base held, joints and the whole robot come first, then links. On the ground,
-    what moves the robot as a whole, then joints, then zero offsets and what is in lighter links."""
+    """With the base held, joints and the whole robot come first, then links. On the ground, what moves the robot as a whole by
+    one number, by several (for which a walk has to be looked at all around), then joints, then zero offsets and what is in
+    lighter links."""
     if not grounded:
         return 1 if "link" in c.effect.places else 0
-    if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
+    if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
+        return 3
+    if c.joint is not None:
         return 2
-    if c.name in SEEN_ELSEWHERE:
-        return 2
-    return 1 if c.joint is not None else 0
+    return 1 if c.size > 1 else 0
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:

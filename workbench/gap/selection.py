@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from workbench.gap.asked import TIERS, asked
+from workbench.gap.asked import TIERS, TIERS_OF_ALL, asked
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
@@ -116,12 +116,12 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         trials: list[Trial] = []
-        for tier in range(1 if astray else TIERS):
+        for tier in range(TIERS_OF_ALL if astray else TIERS):
             groups, on = asked(search, pool, current, beyond, takes, held, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and trials[0].closed > (NEARLY_ALL if tier == 0 and search.jury.walks(takes) else ENOUGH):
+            if trials and trials[0].closed > (NEARLY_ALL if tier < TIERS_OF_ALL and search.jury.walks(takes) else ENOUGH):
                 break
         least = LAST_CLOSED if astray else LEAST_CLOSED
         worth = [t for t in trials if t.closed > least and _worthwhile(search, t, takes, rounds)]
