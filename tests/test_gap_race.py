@@ -112,7 +112,7 @@ def test_every_number_of_a_vector_has_its_stretch(quiet):
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     session, evidence = quiet
     search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
-    well, ill = _when_held(search, search.evaluated([]), (0,))
+    well, ill = _when_held(search, search.evaluated([]))
     assert (well, ill) == (set(session.model.joints), set())
 
 

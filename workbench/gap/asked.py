@@ -22,14 +22,14 @@ MOVED = 0.1
 
 
 def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
-            held: tuple[int, ...], tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
+            tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
     """Groups to try, and on which takes each: effects of joints at the joints with a gap, with the base held all joints at once,
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
-    grounded = tuple(i for i in takes if i not in held)
+    grounded = tuple(i for i in takes if i not in search.held)
     moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
-    well, ill = _when_held(search, current, held)
+    well, ill = _when_held(search, current)
 
     def settled(c: Candidate) -> bool:
         """What servos lack at any load, and what hangs on their links, would show with the base held, too."""
@@ -66,11 +66,11 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     return list(groups.values()), {n: on(group[0]) for n, group in enumerate(groups.values())}
 
 
-def _when_held(search: Search, current: Fit, held: tuple[int, ...]) -> tuple[set[str], set[str]]:
+def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     """Joints that moved while the base was held and went as the model has it; those that did not go so."""
     evidence = search.jury.evidence
-    ill = {joint_of(c) for i in held for c in channel_gaps(evidence[i], current.residuals[i])}
-    moved = {j for i in held for j in evidence[i].joints
+    ill = {joint_of(c) for i in search.held for c in channel_gaps(evidence[i], current.residuals[i])}
+    moved = {j for i in search.held for j in evidence[i].joints
              if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > MOVED}
     return moved - ill, ill
 

@@ -113,22 +113,26 @@ class Candidate:
             low[1:], high[1:] = [-MOST_MOMENT] * 3, [MOST_MOMENT] * 3
         return np.array(low), np.array(high)
 
-    def probes(self, around: bool = False) -> list[Array]:
+    def probes(self) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
-        that says where a scalar acts; one empty for an effect without numbers. around: directions both ways, and
-        the first two together: what a push to the left shows depends on that to the front."""
-        if around and len(self.probes()) > 1:
-            middle = self.probes()[0] if self.point_mass else np.zeros(self.size)
-            ways = [p - middle for p in self.probes() if not np.array_equal(p, middle)]
-            signs = (1.0, -1.0)
-            return [*([middle] if self.point_mass else []), *(middle + s * way for s in signs for way in ways),
-                    *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
+        that says where a scalar acts; one empty for an effect without numbers."""
         if self.point_mass:
             return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)
         fitted = [(p, n, t) for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held) if not held]
         shown = [i for i, (p, n, t) in enumerate(fitted) if n != t and not (scalar and p.vector)]
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
+
+    def around(self) -> list[Array]:
+        """Probes both ways and, of the first two, together: what a push to the left shows depends on that to the front. The same
+        as probes where there is one."""
+        probes, signs = self.probes(), (1.0, -1.0)
+        if len(probes) < 2:
+            return probes
+        middle = probes.pop(0) if self.point_mass else np.zeros(self.size)
+        ways = [p - middle for p in probes]
+        return [*([middle] if self.point_mass else []), *(middle + s * way for s in signs for way in ways),
+                *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
 
     @property
     def point_mass(self) -> bool:

@@ -18,8 +18,8 @@ from workbench.robot import RobotModel
 Array = NDArray[np.float64]
 T = TypeVar("T")
 SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two, and those of
-several numbers at one, so large that it is more than what a walk makes of anything small."""
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two sizes,
+and those of several numbers at the last, beyond what a walk makes of anything small."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 WORTH = 0.3
@@ -100,7 +100,7 @@ class Trying:
         power = {i: self.jury.cost({i: r}, "fit") for i, r in self.base.items()}
         looked_at = (max(power, key=lambda i: power[i]),) if self.coarse else self.takes  # walks are expensive
         asked = [replace(self._question(everyone, [p] * len(everyone)), takes=looked_at, step=COARSE) for p in probes]
-        plainly = replace(self._question([], []), takes=self.takes if self.coarse else looked_at, step=COARSE)
+        plainly = replace(self._question([], []), step=COARSE)
         self.without, *answers = yield [plainly, *asked]
         r0, plain = (self._left({i: r[i] for i in looked_at}) for r in (self.base, self.without))
         seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
@@ -143,7 +143,6 @@ class Trying:
 
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
         joint = self.joints[b]
-
         off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
         return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint))
 
@@ -174,7 +173,7 @@ def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     """Sizes at which a candidate is looked at: of one number, several; of more, each alone, of a walk all around."""
     if c.read_off:
         return [np.ones(c.size)]
-    probes = c.probes(around=walking)
+    probes = c.around() if walking else c.probes()
     low, high = c.bounds()
     if len(probes) > 1 or not c.size:
         return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes

@@ -69,15 +69,14 @@ class Chosen:
 
 def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
     """The effects that stay."""
-    held = search.held
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
-    if held:
-        current = _phase(search, pool, nominal, current, held, held, rounds, report)
-    if held != search.fitted:
-        search.settled = current if held else None
-        astray = _part_answered(search, nominal, current, held)
-        current = _phase(search, pool, nominal, current, search.fitted, held, rounds, report, astray)
+    if search.held:
+        current = _phase(search, pool, nominal, current, search.held, rounds, report)
+    if search.held != search.fitted:
+        search.settled = current
+        astray = _part_answered(search, nominal, current)
+        current = _phase(search, pool, nominal, current, search.fitted, rounds, report, astray)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -95,19 +94,19 @@ def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], nominal.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = ROUGH_SHARE if evidence[i].take.spec.base == "free" else share
+        least = share if i in search.held else ROUGH_SHARE
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
     return out
 
 
-def _part_answered(search: Search, nominal: Fit, current: Fit, held: tuple[int, ...]) -> bool:
+def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
     """Whether a joint that was given an effect still goes wrong with the base held. No known name is what it lacks, and on the
     ground it leads all others astray: only what moves the robot as a whole is asked there, and taken where it is most of it."""
     given = {c.joint for c in current.effects}
-    return any(joint_of(c) in given for c in _remaining(search, current, nominal, held, ROUGH_SHARE))
+    return any(joint_of(c) in given for c in _remaining(search, current, nominal, search.held, ROUGH_SHARE))
 
 
-def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...], held: tuple[int, ...],
+def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...],
            rounds: list[Round], report: Report, astray: bool = False) -> Fit:
     while len(current.effects) < MOST_EFFECTS:
         beyond = _remaining(search, current, nominal, takes)
@@ -117,7 +116,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         trials: list[Trial] = []
         for tier in range(TIERS_OF_ALL if astray else TIERS):
-            groups, on = asked(search, pool, current, beyond, takes, held, tier)
+            groups, on = asked(search, pool, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead)
             trials.sort(key=lambda t: -t.gain["choose"])

@@ -95,8 +95,9 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
     horizon = min(1.0, float(tp[-1]))
     candidates = np.arange(time[0], max(time[-1] - 0.3 * horizon, time[0] + step), step)
     first, told = _first_motion(time, q[:, [i for i, *_ in moving]]), _first_motion(tp, qp[:, [c for _, c, _ in moving]])
-    if first is not None and told is not None and (np.abs(candidates - first + told) < _FIRST).any():
-        candidates = candidates[np.abs(candidates - first + told) < _FIRST]
+    if first is not None and told is not None:
+        near = np.abs(candidates - (first - told)) < _FIRST
+        candidates = candidates[near] if near.any() else candidates
     offsets = np.arange(-0.2, horizon, 2 * step)
     total = np.zeros(len(candidates))
     for i, c, _ in moving:
