@@ -149,16 +149,15 @@ def table(outcomes: Sequence[Outcome]) -> Table:
     rows = []
     for o in outcomes:
         (before, after), expected = o.ratios, o.experiment.separations[0]
-        hidden, rival = o.after
+        hidden, _ = o.after
         rows.append([o.case.hidden.effect, o.case.rival.effect, o.case.joint, sign(before),
                      f"{expected.log_likelihood_ratio:.0f}", sign(after),
                      f"{probability(before):.3f}", f"{probability(after):.3f}",
-                     f"{hidden.value:.3g} {o.case.hidden.unit} ({o.case.value:g} hidden)",
-                     f"{rival.value:.3g} {o.case.rival.unit}"])
-    return Table(("hidden", "rival", "joint", "LLR, first take", "LLR, expected", "LLR, both takes", "P, first", "P, both",
-                  "fitted", "rival's fit"), rows,
-                 "LLR: log-likelihood ratio of the hidden name over its rival, each fitted; expected: what the design promised "
-                 "of the new take alone. P: of the hidden name, the two being equally likely at the outset.")
+                     f"{o.case.value:g}", f"{hidden.value:.3g}", o.case.hidden.unit])
+    return Table(("hidden", "rival", "joint", "first", "expected", "both", "P, first", "P, both", "size", "fitted", "unit"), rows,
+                 "First, expected, both: log-likelihood ratio of the hidden name over its rival, each fitted, of the first take, "
+                 "as the design promised of the new take alone, and of both takes. P: probability of the hidden name, both being "
+                 "as likely at the outset. Size: hidden.")
 
 
 def probability(ratio: float) -> float:
