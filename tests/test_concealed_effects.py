@@ -37,6 +37,14 @@ def test_a_hundred_sessions_hold_what_the_trial_asks():
     assert plan_sessions(8) != plans
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_no_joint_is_dealt_two_effects(seed):
+    for p in plan_sessions(seed):
+        joints = {"rig": 1, "arm": 2}.get(p.robot, 15)
+        in_a_joint = [e for e in p.effects if draw(e, np.random.default_rng(0), MAKERS[p.robot](np.random.default_rng(0))).where]
+        assert len([e for e in in_a_joint if e != "payload"]) <= joints, p
+
+
 @pytest.mark.parametrize("kind", sorted(MAKERS))
 def test_every_effect_can_be_drawn_for_every_robot_that_shows_it(kind):
     robot = MAKERS[kind](np.random.default_rng(3))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -228,3 +228,8 @@ def possible(robot: Robot, outside: bool) -> list[str]:
     logs = not robot.rigid_bodies
     names = OUTSIDE if outside else VOCABULARY
     return [e for e in names if CATALOGUE[e].logged or not logs]
+
+
+def crowded(robot: Robot, effects: Sequence[str]) -> bool:
+    """Whether more of the effects sit in a joint than the robot has joints: none gets two."""
+    return sum(CATALOGUE[e].place in (_joint, _knee_or_hip) for e in effects) > {"rig": 1, "arm": 2}.get(robot.kind, len(effects))

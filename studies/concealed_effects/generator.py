@@ -29,6 +29,7 @@ from studies.other_engine.motive_file import motive_csv
 from workbench.robot import EffectSpec, RobotModel
 
 Files = dict[str, str]
+REDRAWS = 100
 
 
 def generate(out: Path, vault: Vault, workers: int = 1, say: Callable[[str], None] = print) -> None:
@@ -75,7 +76,7 @@ def is_what_was_sealed(vault: Vault, name: str) -> bool:
 def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
     """What a user would send, and what is sealed, as files by name. `folder` gets the robot's SDF."""
     rng = np.random.default_rng(plan.seed)
-    while True:  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
+    for _ in range(REDRAWS):  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
         robot = MAKERS[plan.robot](rng)
         (folder / "robot.sdf").unlink(missing_ok=True)
         model = robot.model(folder / "robot.sdf")
@@ -88,6 +89,8 @@ def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
             break
         except NoneFoundError:
             continue
+    else:
+        raise RuntimeError(f"{plan.name}: none of {REDRAWS} robots can hide what was drawn")
     hidden = bench.with_effects(effects)
     session = session_entry(model, "robot.sdf" if robot.sdf else model.description, "servo.yaml")
     shown, sealed = {"servo.yaml": servo_yaml(model)}, Files()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.concealed_effects.catalogue import CATALOGUE, MOVES, PULLS, TIES, possible
+from studies.concealed_effects.catalogue import CATALOGUE, MOVES, PULLS, TIES, crowded, possible
 from studies.concealed_effects.robots import Robot, arm, puppy, quadruped, rig
 from studies.other_engine.hidden import OUTSIDE, VOCABULARY
 
@@ -49,31 +49,32 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
         robot = str(rng.choice(walkers) if masked or rng.uniform() > 0.25 else rng.choice(["arm", "rig"]))
         effects: list[str] = []
         if kind == "outside":
-            effects = _deal(unnamed, MAKERS[robot](np.random.default_rng(0)), 1, True)
+            effects = _deal(unnamed, MAKERS[robot](np.random.default_rng(0)), [], 1, True)
         wanted = {"one": 1, "two": 2, "three": 3, "outside": int(sum(p.effects[:1] != () and p.effects[0] in OUTSIDE
                                                                    for p in plans) % 3 == 0)}.get(kind, 0)
-        effects += _deal(named, MAKERS[robot](np.random.default_rng(0)), wanted, False, masked)
+        effects += _deal(named, MAKERS[robot](np.random.default_rng(0)), effects, wanted, False, masked)
         plans.append(SessionPlan(f"s{order[k]:03d}", robot, tuple(effects), masked, int(rng.integers(2**62))))
     return sorted(plans, key=lambda p: p.name)
 
 
 def _deck(names: tuple[str, ...], rng: np.random.Generator) -> Iterator[list[str]]:
-    """One deck, refilled and shuffled as it runs out: what is not dealt goes back to its bottom."""
+    """One deck, to whose bottom another one goes, shuffled, as soon as a card has run out."""
     deck: list[str] = []
     while True:
-        if len(deck) < len(names):
+        if set(names) - set(deck):
             deck += [str(n) for n in rng.permutation(names)]
         yield deck
 
 
-def _deal(deck: Iterator[list[str]], robot: Robot, n: int, outside: bool, masked: bool = False) -> list[str]:
-    """Cards that the robot can play; where one is masked, the first moves the body and the last pulls it back."""
+def _deal(deck: Iterator[list[str]], robot: Robot, beside: list[str], n: int, outside: bool, masked: bool = False) -> list[str]:
+    """Cards that the robot can play beside others; where one is masked, the first moves the body and the last pulls it back."""
     cards, hand = next(deck), list[str]()
     while len(hand) < n:
         allowed = set(possible(robot, outside))
         if masked and len(hand) in (0, n - 1):
             allowed &= set(PULLS) if hand else {*PULLS, *MOVES}
-        i = next((i for i, c in enumerate(cards) if c in allowed and not _too_alike(c, hand)), None)
+        i = next((i for i, c in enumerate(cards) if c in allowed and not _too_alike(c, hand)
+                  and not crowded(robot, [*beside, *hand, c])), None)
         if i is None:
             cards = next(deck)
             continue

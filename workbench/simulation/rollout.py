@@ -158,6 +158,8 @@ class Simulation:
         key = None if gantry is None else gantry.tobytes()
         if self._rest is None or self._rest[0] != key:
             self.context.SetTimeStateAndParametersFrom(self.diagram.CreateDefaultContext())
+            for joint, angle in zip(self._joints, self._zero):  # not from elsewhere: friction would hold it short
+                joint.set_angle(self._plant_context, float(angle))
             self._place_base(gantry)
             self._hold_neutral()
             self._set_first_command(np.inf)
@@ -178,7 +180,7 @@ class Simulation:
         elif self.config.base == "free":
             k = self._structure.kinematics if self._structure else self.model.kinematics
             poses = {link: RigidTransform(RotationMatrix(R[0]), p[0])
-                     for link, (p, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
+                     for link, (p, R) in k.forward(np.atleast_2d(self._zero), self.joints).items()}
             height = -lowest_point(self.plant, self.diagram.scene_graph(), self._base.model_instance(), poses)
             self.plant.SetFloatingBaseBodyPoseInWorldFrame(self._plant_context, self._base, RigidTransform([0, 0, height]))
 
