@@ -170,14 +170,17 @@ def _best(best: dict[str | None, float], joint: str | None) -> float:
 
 
 def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several; of more, each alone, of a walk all around."""
+    """Sizes at which a candidate is looked at: of one number, several, both ways where it lifts feet; of more, each alone, of
+    a walk all around."""
     if c.read_off:
         return [np.ones(c.size)]
     probes = c.around() if walking else c.probes()
     low, high = c.bounds()
     if len(probes) > 1 or not c.size:
         return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
-    points = [np.clip(s * probes[0], low, high) for s in sizes]
+    lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
+    ways = (1.0, -1.0) if lifts else (1.0,)
+    points = [np.clip(w * s * probes[0], low, high) for s in sizes for w in ways]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
