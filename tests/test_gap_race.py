@@ -146,3 +146,13 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
     assert gain == pytest.approx(r0 @ r0, rel=1e-6)
     far, _ = _guess(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
     assert np.abs(far).max() <= 4 * FAR_WALKING
+
+
+def test_one_number_looks_far_where_slopes_are_noise():
+    """Where a foot grips or slips, a small move makes worse what a large one mends."""
+    def left(x: list[float]) -> np.ndarray:
+        return np.array([abs(x[0] - 1.6) + (0.5 if 1.02 < x[0] < 1.2 else 0.0)])
+
+    fit = fit_blocks([np.array([1.0])], [left([1.0])], [(np.array([0.0]), np.array([9.0]))], 4, 0.08)
+    (solved,) = together({0: fit}, lambda wanted: [[left(list(p)) for p in point] for _, point in wanted])[0]
+    assert solved.x[0] == pytest.approx(1.6, abs=0.05)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
 from workbench.effects.registry import known_effects
+from workbench.effects.sdf import SdfRobot
 from workbench.gap.evidence import TakeEvidence
 from workbench.gap.footfalls import foot_points
 from workbench.robot import EffectSpec, RobotModel
@@ -21,6 +22,8 @@ HEAVY = 0.15
 """Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows."""
 LEAST_MASS, MOST_MOMENT = 0.05, 100.0
 """Of a point mass, in typical masses and moments: what positions are divided by at least, and how far moments go."""
+LENGTH = 0.5
+"""Share of a link's length by which the search changes it at most."""
 AWAY = 2.5
 """Typical distances from a link's centre of mass at which a point mass is probed, along each axis."""
 ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
@@ -40,6 +43,7 @@ class Candidate:
     neutral: tuple[float, ...]
     typical: tuple[float, ...]
     held: tuple[bool, ...]
+    reach: float = math.inf
 
     @staticmethod
     def of(effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
@@ -106,7 +110,7 @@ class Candidate:
             elif n == t:
                 ends = [math.log2(end / n) if end > 0 else -10.0 for end in (p.low, p.high)]
             else:
-                ends = [(end - n) / (t - n) for end in (p.low, p.high)]
+                ends = [(end - n) / (t - n) for end in (max(p.low, n - self.reach), min(p.high, n + self.reach))]
             low.append(min(ends))
             high.append(max(ends))
         if self.point_mass:
@@ -171,7 +175,10 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
         for where in _places(effect, model, seen):
             if effect.name == "command_delay" and not where and not start_known:
                 continue  # a late start and a delay of all joints are the same
-            out.append(Candidate.of(effect, where, *_at_rest(effect, model, where, neutral)))
+            candidate = Candidate.of(effect, where, *_at_rest(effect, model, where, neutral))
+            if effect.name == "link_length":
+                candidate = replace(candidate, reach=LENGTH * float(np.linalg.norm(SdfRobot(model.path).way(where[0]))))
+            out.append(candidate)
     return out
 
 

@@ -22,6 +22,8 @@ The second where walks tell: fits of the same effect that begin elsewhere end so
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
+STEPS = 4
+"""Of a fit: names that differ by little are told apart at their best alone."""
 BETTER = 30.0
 """Of the same: a rival that does better by this much takes an effect's place."""
 SUREST = 0.98
@@ -68,7 +70,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
         if search.is_settled(replaced):
             best = search.resettled(best, best.effects[-1])
-        fit = search.refitted(best, search.fitted, 3)
+        fit = search.refitted(best, search.fitted, STEPS)
     return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
 
 
@@ -103,4 +105,4 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
     takes = search.held if search.is_settled(fit.effects[i]) else search.fitted
-    return search.refitted(there, takes, 3, free=[len(others)])
+    return search.refitted(there, takes, STEPS, free=[len(others)])

@@ -22,6 +22,8 @@ Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
 HELD, WALKING, NEAR = 0.15, 0.4, 0.08
 """Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
+WIDE = 0.35
+"""Share of a number by which it is moved where slopes led nowhere, and all that was seen lies closer."""
 TINY = 1e-6
 """Of a number, below which a move tells nothing of slopes."""
 SETTLED = 3e-3
@@ -105,9 +107,12 @@ class _Block:
             self.differences.append((self.moved(i), r))
 
     def trials(self) -> tuple[Array, Array]:
-        """Where to go: a damped step and a short one, in whose place comes the bottom of a parabola where steps led nowhere."""
+        """Where to go: a damped step and a short one. Where steps led nowhere, slopes were noise: one number looks far both ways,
+        and then takes the bottom of the parabola through what it saw for the short one."""
         if not self.open:
             return self.x, self.x
+        if self.missed and len(self.x) == 1 and np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]):
+            return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
                          for k, extra in ((1, 0.0), (30, 0.3)))
         lowest = _lowest(self.known, self.low, self.high) if self.missed else None
