@@ -9,7 +9,7 @@ from tests.test_gap_search import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
-from workbench.gap.fitting import Solved, _lowest, fit_blocks, together
+from workbench.gap.fitting import Solved, fit_blocks, lowest, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.race import FAR_WALKING, Race, _best, _guess, _scan, _tell
 from workbench.gap.search import Search, _covariance
@@ -116,16 +116,16 @@ def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     assert (well, ill) == (set(session.model.joints), set())
 
 
-def test_of_one_number_the_lowest_point_of_what_was_seen_is_tried_within_it():
+def test_of_one_number_thelowest_point_of_what_was_seen_is_tried_within_it():
     def seen(*points):
         return [(np.array([x]), y) for x, y in points]
 
     bounds = np.zeros(1), np.full(1, 9.0)
-    assert _lowest(seen((0, 9.0), (1, 4.0), (2, 1.0), (4, 1.0), (2, 1.0)), *bounds) == pytest.approx([3.0])
-    assert _lowest(seen((0, 9.0), (1, 4.0), (2, 1.0)), *bounds) == pytest.approx([2.0])  # not beyond
-    assert _lowest(seen((0, 0.0), (1, 4.0), (2, 1.0)), *bounds) is None
-    assert _lowest(seen((0, 1.0), (1, 4.0)), *bounds) is None
-    assert _lowest([(np.zeros(2), 1.0)] * 3, np.zeros(2), np.ones(2)) is None
+    assert lowest(seen((0, 9.0), (1, 4.0), (2, 1.0), (4, 1.0), (2, 1.0)), *bounds) == pytest.approx([3.0])
+    assert lowest(seen((0, 9.0), (1, 4.0), (2, 1.0)), *bounds) == pytest.approx([2.0])  # not beyond
+    assert lowest(seen((0, 0.0), (1, 4.0), (2, 1.0)), *bounds) is None
+    assert lowest(seen((0, 1.0), (1, 4.0)), *bounds) is None
+    assert lowest([(np.zeros(2), 1.0)] * 3, np.zeros(2), np.ones(2)) is None
 
 
 def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_what_was_seen():

@@ -115,8 +115,8 @@ class _Block:
             return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
                          for k, extra in ((1, 0.0), (30, 0.3)))
-        lowest = _lowest(self.known, self.low, self.high) if self.missed else None
-        return first, second if lowest is None else lowest
+        bottom = lowest(self.known, self.low, self.high) if self.missed else None
+        return first, second if bottom is None else bottom
 
     def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
         """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
@@ -146,7 +146,7 @@ def _steps(x: Array, low: Array, high: Array, stride: float | Array) -> Array:
     return np.asarray(np.where(x + step <= high, step, -step))
 
 
-def _lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:
+def lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:
     """Of one number, where the parabola through the three best sizes seen is lowest; None where it is not, or not known."""
     if len(low) != 1:
         return None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate, with_effects
-from workbench.gap.fitting import HELD, NEAR, WALKING, Solved, fit_blocks, through, together
+from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, Solved, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question, take_of
 from workbench.gap.metrics import rms
 from workbench.gap.race import Race, Trial, Trying
@@ -164,23 +164,40 @@ class Search:
 
     def refined(self, fit: Fit) -> Fit:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
-        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; a quarter of the way counts
-        as a standard deviation more."""
-        x = fit.x
-        last = self._finely(fit, x)
+        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
+        tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
+        seen = [self._finely(fit, fit.x)]
         if not fit.slopes or not np.isfinite(fit.covariance).any():
-            return last
-        move = np.zeros(len(x))
+            return seen[0]
+        move = np.zeros(len(fit.x))
         for s in fit.slopes:
-            r = self.jury.vector({i: last.residuals[i] for i in s.takes}, "fit")
+            r = self.jury.vector({i: seen[0].residuals[i] for i in s.takes}, "fit")
             H = s.J.T @ s.J
             move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         low, high = fit.bounds()
         for share in (1.0, 0.4):
-            there = self._finely(fit, np.clip(x + share * move, low, high))
-            if there.cost["fit"] < last.cost["fit"]:
-                return replace(there, covariance=fit.covariance + np.diag(((there.x - x) / 4) ** 2))
-        return last
+            seen.append(self._finely(fit, np.clip(fit.x + share * move, low, high)))
+            if seen[-1].cost["fit"] < seen[0].cost["fit"]:
+                break
+        walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
+        if len(walked) == 1 and self.held != self.fitted:
+            seen += self._far_and_between(seen, int(walked[0]), (low, high))
+        best = min(seen, key=lambda f: f.cost["fit"])
+        return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
+
+    def _far_and_between(self, seen: Sequence[Fit], n: int, bounds: tuple[Array, Array]) -> list[Fit]:
+        """Refined fits with number n far on both sides of the best, and at the bottom of the parabola through what was seen."""
+        best = min(seen, key=lambda f: f.cost["fit"])
+
+        def at(value: float) -> Fit:
+            x = best.x.copy()
+            x[n] = value
+            return self._finely(best, np.clip(x, *bounds))
+
+        there = [at(best.x[n] * (1 + WIDE)), at(best.x[n] / (1 + WIDE))]
+        known = [(f.x[[n]], f.cost["fit"]) for f in (best, *there)]
+        bottom = lowest(known, bounds[0][[n]], bounds[1][[n]])
+        return there if bottom is None else [*there, at(float(bottom[0]))]
 
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
