@@ -48,7 +48,8 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
     block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants
     where there is one number). Walking answers small changes with noise: there strides are long (WALKING)."""
-    blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends) for s, r, ends in zip(start, left, bounds)]
+    rough = bool(np.any(np.asarray(stride) != HELD))
+    blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
     for b, J in zip(blocks, slopes or ()):
         b.J, b.updated = J, True
     for _ in range(iterations):
@@ -74,13 +75,14 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
 @dataclass(eq=False)
 class _Block:
     """One block on its way: x, what it leaves and the slopes J there; updated: by Broyden's rule, since they were measured.
-    missed: a step from measured slopes led nowhere. steps: by which numbers move for slopes, and differences, what was seen
-    there. known: sizes tried so far and their cost."""
+    rough: slopes may be noise. missed: a step from measured slopes led nowhere. steps: by which numbers move for slopes, and
+    differences, what was seen there. known: sizes tried so far and their cost."""
 
     x: Array
     r: Array
     low: Array
     high: Array
+    rough: bool
     J: Array = field(init=False)
     updated: bool = False
     damping: float = 1e-3
@@ -107,11 +109,11 @@ class _Block:
             self.differences.append((self.moved(i), r))
 
     def trials(self) -> tuple[Array, Array]:
-        """Where to go: a damped step and a short one. Where steps led nowhere, slopes were noise: one number looks far both ways,
-        and then takes the bottom of the parabola through what it saw for the short one."""
+        """Where to go: a damped step and a short one. Where steps led nowhere on a walk, slopes were noise: one number looks far
+        both ways, and then takes the bottom of the parabola through what it saw for the short one."""
         if not self.open:
             return self.x, self.x
-        if self.missed and len(self.x) == 1 and np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]):
+        if self.rough and self.missed and len(self.x) == 1 and np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]):
             return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
                          for k, extra in ((1, 0.0), (30, 0.3)))
