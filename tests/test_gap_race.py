@@ -116,7 +116,7 @@ def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     assert (well, ill) == (set(session.model.joints), set())
 
 
-def test_of_one_number_thelowest_point_of_what_was_seen_is_tried_within_it():
+def test_of_one_number_the_lowest_point_of_what_was_seen_is_tried_within_it():
     def seen(*points):
         return [(np.array([x]), y) for x, y in points]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
-from workbench.robot import InputError, Kinematics
+from workbench.robot import InputError, JointFrame, Kinematics
 
 Array = NDArray[np.float64]
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
@@ -115,12 +115,11 @@ class SdfRobot:
         """The way from the link's joint to the next longer by `change`: what hangs on it moves along; of a last link, its foot
         does. The next of several is their mean. The link's inertia stays."""
         k = Kinematics.from_text(self.text(), self.path)
-        way = self._way(k, link)
+        way = self.way(k, link)
         length = float(np.linalg.norm(way))
         if length < 1e-6 or length + change <= 0:
             raise InputError(self.path, f"length of '{link}': {length:g} m from joint to joint cannot change by {change:g} m")
-        following = [f for f in k.frames.values() if f.parent == link]
-        foot = [] if following else self._foot(link)
+        following, foot = self._ends(k, link)
         shift = way / length * change
         for shape in foot:
             shift_pose(shape, shift)
@@ -128,21 +127,23 @@ class SdfRobot:
             self._place_links(k, {f.child for f in following}, link, shift)
         self.moved = True
 
-    def way(self, link: str) -> Array:
-        """From a link's joint to the next, of several to their mean, of a last link to its foot: (3,) [m], in its frame."""
-        return self._way(Kinematics.from_text(self.text(), self.path), link)
-
-    def _way(self, k: Kinematics, link: str) -> Array:
+    def way(self, k: Kinematics, link: str) -> Array:
+        """From a link's joint to the next, of several to their mean, of a last link to its foot: (3,) [m], in its frame.
+        k: of this robot."""
         joint = k.parent_joint[link]
         if joint is None:
             raise InputError(self.path, f"length of '{link}': the root link has no joint; expected a link that hangs on one")
         carrier = k.frames[joint]
-        following = [f for f in k.frames.values() if f.parent == link]
-        foot = [] if following else self._foot(link)
+        following, foot = self._ends(k, link)
         ends = [f.X_PF_p for f in following] or [numbers(s.find("pose"), 6)[:3] for s in foot if s.tag == "collision"]
         if not ends:
             raise InputError(self.path, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
         return np.asarray(np.mean(ends, axis=0) + carrier.X_MB_R.T @ carrier.X_MB_p, dtype=float)
+
+    def _ends(self, k: Kinematics, link: str) -> tuple[list[JointFrame], list[Element]]:
+        """Joints that hang on a link; of one that carries none, its foot's shapes."""
+        following = [f for f in k.frames.values() if f.parent == link]
+        return following, [] if following else self._foot(link)
 
     def _place_links(self, k: Kinematics, carried: set[str], link: str, shift: Array) -> None:
         """Writes where each link stands, from the root, and each joint, from its child, so that nothing moves but by intent:

@@ -161,6 +161,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
     start_known = not any(e.start_is_free for e in evidence)
+    sdf = SdfRobot(model.path)
     out: list[Candidate] = []
     for effect in known_effects().values():
         if effect.layer == "measurement" or (effect.layer == "ground" and not free and effect.name != "ground_tilt"):
@@ -177,7 +178,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
                 continue  # a late start and a delay of all joints are the same
             candidate = Candidate.of(effect, where, *_at_rest(effect, model, where, neutral))
             if effect.name == "link_length":
-                candidate = replace(candidate, reach=LENGTH * float(np.linalg.norm(SdfRobot(model.path).way(where[0]))))
+                candidate = replace(candidate, reach=LENGTH * float(np.linalg.norm(sdf.way(model.kinematics, where[0]))))
             out.append(candidate)
     return out
 

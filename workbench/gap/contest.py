@@ -22,10 +22,10 @@ The second where walks tell: fits of the same effect that begin elsewhere end so
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
-STEPS = 4
-"""Of a fit: names that differ by little are told apart at their best alone."""
 BETTER = 30.0
 """Of the same: a rival that does better by this much takes an effect's place."""
+STEPS = 4
+"""Of a fit: names that differ by little are told apart at their best alone."""
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))

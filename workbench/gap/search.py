@@ -166,7 +166,7 @@ class Search:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
         cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
         tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
-        seen = [self._finely(fit, fit.x)]
+        seen = self._finely(fit, fit.x)
         if not fit.slopes or not np.isfinite(fit.covariance).any():
             return seen[0]
         move = np.zeros(len(fit.x))
@@ -176,7 +176,7 @@ class Search:
             move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         low, high = fit.bounds()
         for share in (1.0, 0.4):
-            seen.append(self._finely(fit, np.clip(fit.x + share * move, low, high)))
+            seen += self._finely(fit, np.clip(fit.x + share * move, low, high))
             if seen[-1].cost["fit"] < seen[0].cost["fit"]:
                 break
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
@@ -189,15 +189,15 @@ class Search:
         """Refined fits with number n far on both sides of the best, and at the bottom of the parabola through what was seen."""
         best = min(seen, key=lambda f: f.cost["fit"])
 
-        def at(value: float) -> Fit:
+        def at(value: float) -> Array:
             x = best.x.copy()
             x[n] = value
-            return self._finely(best, np.clip(x, *bounds))
+            return np.clip(x, *bounds)
 
-        there = [at(best.x[n] * (1 + WIDE)), at(best.x[n] / (1 + WIDE))]
+        there = self._finely(best, at(best.x[n] * (1 + WIDE)), at(best.x[n] / (1 + WIDE)))
         known = [(f.x[[n]], f.cost["fit"]) for f in (best, *there)]
         bottom = lowest(known, bounds[0][[n]], bounds[1][[n]])
-        return there if bottom is None else [*there, at(float(bottom[0]))]
+        return there if bottom is None else [*there, *self._finely(best, at(float(bottom[0])))]
 
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
@@ -212,9 +212,10 @@ class Search:
         walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
         return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
 
-    def _finely(self, fit: Fit, x: Array) -> Fit:
-        residuals = self.jury.residuals([Question(with_effects(self.nominal, fit.sizes(x)), self.takes, FINE)])[0]
-        return replace(fit, x=x, cost=self._cost(residuals), residuals=residuals)
+    def _finely(self, fit: Fit, *points: Array) -> list[Fit]:
+        """The fit with other sizes, as FINE steps judge it."""
+        asked = [Question(with_effects(self.nominal, fit.sizes(x)), self.takes, FINE) for x in points]
+        return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.jury.residuals(asked))]
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
         return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}

@@ -24,8 +24,8 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
     pose and its base's origin at rest where the recorded one stood, as in `take_from_recording`; and the path of each asset
     that has a pivot, in the capture's axes. Before the simulation's first instant the robot stands still; after its last, NaN.
 
-    Bodies are where the take's `links` are, else where the model's kinematics has them. Where they do not follow the model, or
-    stand free, so that they may lean at rest, or an asset's frame is turned, joint angles are read off the bodies just as from a
+    Bodies are where the take's `links` are, else where the model's kinematics has them. Where they do not follow the model, the
+    robot stands free and may lean at rest, or an asset's frame is turned, joint angles are read off the bodies just as from a
     recording; joints between bodies that are not tracked keep the rollout's own angle, and have NaN off the axis.
     """
     m = measurement
