@@ -2,14 +2,15 @@
 
 import hashlib
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from studies.concealed_effects.catalogue import CATALOGUE, TIES, draw, possible
+from studies.concealed_effects.catalogue import CATALOGUE, TIES, crowded, draw, possible
 from studies.concealed_effects.conceal import Bench, conceal
 from studies.concealed_effects.generator import make, write_session
-from studies.concealed_effects.plan import MAKERS, SessionPlan, plan_sessions
+from studies.concealed_effects.plan import MAKERS, SessionPlan, dealt_again, plan_sessions
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import logged_takes
 from studies.other_engine.hidden import OUTSIDE
@@ -43,6 +44,16 @@ def test_no_joint_is_dealt_two_effects(seed):
         joints = {"rig": 1, "arm": 2}.get(p.robot, 15)
         in_a_joint = [e for e in p.effects if draw(e, np.random.default_rng(0), MAKERS[p.robot](np.random.default_rng(0))).where]
         assert len([e for e in in_a_joint if e != "payload"]) <= joints, p
+
+
+def test_what_cannot_be_hidden_is_dealt_again_as_many_and_by_the_same_rules():
+    for p in plan_sessions(7):
+        again = dealt_again(p, np.random.default_rng(p.seed))
+        assert len(again.effects) == len(p.effects)
+        assert [e for e in again.effects if e in OUTSIDE] == [e for e in p.effects if e in OUTSIDE]
+        assert not crowded(MAKERS[p.robot](np.random.default_rng(0)), again.effects)
+        assert replace(again, effects=p.effects) == p
+        assert again == dealt_again(p, np.random.default_rng(p.seed))
 
 
 @pytest.mark.parametrize("kind", sorted(MAKERS))

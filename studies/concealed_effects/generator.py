@@ -19,7 +19,7 @@ import numpy as np
 import yaml
 
 from studies.concealed_effects.conceal import Bench, NoneFoundError, conceal
-from studies.concealed_effects.plan import MAKERS, SessionPlan, plan_sessions
+from studies.concealed_effects.plan import MAKERS, SessionPlan, dealt_again, plan_sessions
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import LogPlan, filmed_takes, is_logged, log_csv, log_rows, logged_takes, play_log
 from studies.concealed_effects.visible import FINE
@@ -29,7 +29,8 @@ from studies.other_engine.motive_file import motive_csv
 from workbench.robot import EffectSpec, RobotModel
 
 Files = dict[str, str]
-REDRAWS = 100
+REDRAWS, STUBBORN = 100, 12
+"""Robots that are drawn for a session, and after how many of them in vain other effects are dealt."""
 
 
 def generate(out: Path, vault: Vault, workers: int = 1, say: Callable[[str], None] = print) -> None:
@@ -76,7 +77,9 @@ def is_what_was_sealed(vault: Vault, name: str) -> bool:
 def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
     """What a user would send, and what is sealed, as files by name. `folder` gets the robot's SDF."""
     rng = np.random.default_rng(plan.seed)
-    for _ in range(REDRAWS):  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
+    for n in range(REDRAWS):  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
+        if n and n % STUBBORN == 0:
+            plan = dealt_again(plan, rng)
         robot = MAKERS[plan.robot](rng)
         (folder / "robot.sdf").unlink(missing_ok=True)
         model = robot.model(folder / "robot.sdf")

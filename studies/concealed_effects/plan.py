@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -55,6 +55,14 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
         effects += _deal(named, MAKERS[robot](np.random.default_rng(0)), effects, wanted, False, masked)
         plans.append(SessionPlan(f"s{order[k]:03d}", robot, tuple(effects), masked, int(rng.integers(2**62))))
     return sorted(plans, key=lambda p: p.name)
+
+
+def dealt_again(plan: SessionPlan, rng: np.random.Generator) -> SessionPlan:
+    """The same session with other named effects, as many: some never show together, or cannot mask each other."""
+    stay = [e for e in plan.effects if e in OUTSIDE]
+    robot = MAKERS[plan.robot](np.random.default_rng(0))
+    hand = _deal(_deck(VOCABULARY, rng), robot, stay, len(plan.effects) - len(stay), False, plan.masked)
+    return replace(plan, effects=(*stay, *hand))
 
 
 def _deck(names: tuple[str, ...], rng: np.random.Generator) -> Iterator[list[str]]:

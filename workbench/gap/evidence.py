@@ -29,6 +29,9 @@ GAIN_SPAN = 0.25
 BLOCK = 0.4
 """Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
 USES = ("fit", "choose", "fit", "validate")
+PART = 0.1
+"""With the base held, what is neither fitted nor validated is every third part [s] of what does not validate: a joint forgets
+within one, and may meet its stop but once."""
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
@@ -214,8 +217,11 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
-    block = np.floor((t.recorded.time - t.measurement.starts_at) / BLOCK).astype(int)
-    role = np.array(USES)[np.mod(block, len(USES))]
+    since = t.recorded.time - t.measurement.starts_at
+    role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
+    if t.spec.base == "fixed":
+        part = np.mod(np.floor(since / PART).astype(int), 3)
+        role = np.where(role == "validate", role, np.where(part == 1, "choose", "fit"))
     if t.spec.use == "validate":
         role[:] = "validate"
     elif not alone:
