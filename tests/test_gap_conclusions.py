@@ -1,11 +1,19 @@
 """Intervals of numbers, in the contract's units."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidates import Candidate
-from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates
+from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected
+from workbench.gap.contest import Rival, Standing
+from workbench.gap.search import Fit
+
+FRAME = {0: np.ones((1, 1))}
+EVERY = np.ones(1, dtype=bool)
+SEEN = [SimpleNamespace(joints=("knee",), channels=("knee",), sigma=np.ones(1), uses={"fit": EVERY, "validate": EVERY})]
 
 
 def test_where_a_mass_is_errs_with_its_moment_and_with_the_mass_together():
@@ -26,3 +34,21 @@ def test_no_number_is_known_better_than_a_share_of_what_it_differs_from_neutral_
     c = Candidate.of(known_effects()["clock_rate"], (), (1.0,))
     told = estimates(c, np.array([1.0]), np.zeros((1, 1)))["ratio"]
     assert told.high - told.value == pytest.approx(Z90 * LEAST_RELATIVE * abs(told.value - 1.0), rel=1e-6)
+
+
+def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_effects_stay_alternatives():
+    def length(link):
+        return Candidate.of(known_effects()["link_length"], (link,), (0.0,))
+
+    x = np.array([1.0])
+    cost = dict.fromkeys(("fit", "choose", "validate"), 0.0)
+    fit = Fit((length("thigh"),), x, np.eye(1), cost, FRAME)
+    other = Candidate.of(known_effects()["zero_offset"], ("knee",), (0.0,))
+    rivals = [Rival(length("shank"), x, 10.0, 0.3, fit), Rival(other, x, 20.0, 0.2, fit), Rival(length("hip"), x, 90.0, 0.01, fit)]
+    standing = Standing(0.45, tuple(rivals))
+    told = finding(SEEN, fit, 0, standing, FRAME, FRAME)
+    assert told.where == ("thigh", "shank")
+    assert told.confidence == pytest.approx(0.75)
+    assert [(a.effect, a.where) for a in told.alternatives] == [("zero_offset", ("knee",))]
+    lost = {(r.effect, r.where) for r in rejected(SEEN, fit, (), [standing], FRAME)}
+    assert lost == {("zero_offset", ("knee",)), ("link_length", ("hip",))}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.contest import Standing
+from workbench.gap.contest import Rival, Standing
 from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
@@ -25,6 +25,8 @@ WIDER = 1.5
 engine, or the world, is not ours."""
 LEAST_RELATIVE = 0.015
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
+SAME_ELSEWHERE = 0.1
+"""Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
@@ -38,16 +40,24 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplaine
 
 def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals
             ) -> Finding:
-    """Effect i of a fit. before, after: residuals by take of the nominal and the fitted model."""
+    """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
+    the nominal and the fitted model."""
     c, x = fit.sizes()[i]
-    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals[:1]
-                         if r.probability >= 0.01)
+    elsewhere = _elsewhere(c, standing)
+    where = (*c.where, *(place for r in elsewhere for place in r.candidate.where))
+    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
+                         if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
     numbers = estimates(c, x, WIDER**2 * fit.covariance[own, own])
     return Finding(
-        effect=c.name, where=c.where, confidence=standing.probability, parameters=numbers,
-        alternatives=alternatives, fit=change(evidence, c.where, before, after, "fit"),
-        validation=change(evidence, c.where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
+        effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
+        alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
+        validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
+
+
+def _elsewhere(c: Candidate, standing: Standing) -> list[Rival]:
+    """The same effect where the data cannot tell it from this place."""
+    return [r for r in standing.rivals if r.candidate.name == c.name and r.probability >= SAME_ELSEWHERE * standing.probability]
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
@@ -89,7 +99,7 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
 def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
              ) -> tuple[Rejected, ...]:
     """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
-    kept = {c.key for c in fit.effects}
+    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, standings) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
     for c, standing in zip(fit.effects, standings):
         for rival in standing.rivals:

@@ -19,6 +19,8 @@ Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
 TEMPER, TEMPER_WALKING = 4.0, 60.0
 """Neighbouring frames err alike, and engines differ: what chi squared differences are divided by when they become probabilities.
 The second where walks tell: fits of the same effect that begin elsewhere end some hundreds apart there."""
+ROUGH = 0.005
+"""The same as a share of an effect's gain: where that is more, walks leave more open."""
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
@@ -77,7 +79,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
     taken = seats[fit.effects[i].key][1]
     walked = taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(fit.effects[i])
-    temper = TEMPER_WALKING if walked else TEMPER
+    temper = max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) if walked else TEMPER
     temper *= max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
     cost = np.array([fit.cost["choose"], *(r.cost["choose"] for r in rivals)])
     weight = np.exp(-0.5 * (cost - cost.min()) / temper)
@@ -99,9 +101,12 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate) -> list[Tria
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
-    """The fit with a rival in effect i's place and its numbers fitted there."""
+    """The fit with a rival in effect i's place and its numbers fitted there; the same effect elsewhere begins at the size that
+    the other has, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
-    there = search.evaluated([*others, (rival.candidate, rival.x)])
+    own, size = fit.sizes()[i]
+    starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if rival.candidate.name == own.name else [rival.x]
+    there = min((search.evaluated([*others, (rival.candidate, x)]) for x in starts), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
     takes = search.held if search.is_settled(fit.effects[i]) else search.fitted

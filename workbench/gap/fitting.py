@@ -23,7 +23,7 @@ T = TypeVar("T")
 HELD, WALKING, NEAR = 0.15, 0.4, 0.08
 """Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
 WIDE = 0.35
-"""Share of a number by which it is moved where slopes led nowhere, and all that was seen lies closer."""
+"""Share of a number by which it is moved where slopes led nowhere or hardly anywhere, and all that was seen lies closer."""
 TINY = 1e-6
 """Of a number, below which a move tells nothing of slopes."""
 SETTLED = 3e-3
@@ -113,12 +113,17 @@ class _Block:
         both ways, and then takes the bottom of the parabola through what it saw for the short one."""
         if not self.open:
             return self.x, self.x
-        if self.rough and self.missed and len(self.x) == 1 and np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]):
+        if self.missed and self._near_sighted:
             return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
                          for k, extra in ((1, 0.0), (30, 0.3)))
         bottom = lowest(self.known, self.low, self.high) if self.missed else None
         return first, second if bottom is None else bottom
+
+    @property
+    def _near_sighted(self) -> bool:
+        """Whether a walk's slopes may be noise and all that was seen of the one number lies close."""
+        return self.rough and len(self.x) == 1 and bool(np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]))
 
     def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
         """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
@@ -137,8 +142,9 @@ class _Block:
         way = there - self.x
         if way @ way > TINY**2:
             self.J = self.J + np.outer(left_there - self.r - self.J @ way, way) / (way @ way)
-        self.updated, self.missed = True, False
-        self.open = before - costs[best] > SETTLED * before
+        settled = before - costs[best] <= SETTLED * before
+        self.updated, self.missed = True, settled and self._near_sighted
+        self.open = self.missed or not settled
         self.damping = self.damping / 3 if best == 0 else min(self.damping * 10, 1.0)
         self.x, self.r = there, left_there
 

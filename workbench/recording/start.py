@@ -46,12 +46,13 @@ def lagged_reference(commands: Commands, rate: float = 1000.0, lead: float = 0.3
 
 
 def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, predicted: Take) -> StartEstimate:
-    """Aligns each measured joint q (N, n) [rad] (zero at rest) at `time` (N,) with `predicted` (zeroed, 0 = first command).
+    """Aligns each measured joint q (N, n) [rad] (zero at rest, unless a marker frame is turned) at `time` (N,) with `predicted` (zeroed, 0 = first command).
 
     First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each
     joint on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply
     each one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly).
     """
+    q = q - _turned(time, q, noise)
     columns = [(i, predicted.column(j)) for i, j in enumerate(joints) if j in predicted.joints]
     shift = predicted.starts_at
     tp = predicted.time - (0.0 if np.isnan(shift) else shift)
@@ -76,6 +77,19 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
     step = float(np.median(np.diff(tp)))  # a simulated command comes at a whole step
     sigma = float(np.hypot(max(1.25 * spread / np.sqrt(effective), float(np.sum(w**2) ** -0.5)), step / 2))
     return StartEstimate(middle, sigma, dict(zip(names, starts)))
+
+
+def _turned(time: Array, q: Array, noise: Array) -> Array:
+    """Where joints q (N, n) stand in the first frames (n,), if that is clearly not zero: a body's marker frame is turned. Zero
+    where they are on their way already, or unseen."""
+    first = q[time < time[0] + _STAYS]
+    half, out = len(first) // 2, np.zeros(q.shape[1])
+    for c in np.flatnonzero(np.isfinite(noise)):
+        before, after = (part[np.isfinite(part)] for part in (first[:half, c], first[half:, c]))
+        if len(before) and len(after) and abs(np.median(after) - np.median(before)) < 2 * noise[c]:
+            stands = float(np.median([*before, *after]))
+            out[c] = stands if abs(stands) > 2 * noise[c] else 0.0
+    return out
 
 
 def _onset(t: Array, q: Array) -> float | None:

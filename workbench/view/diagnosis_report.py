@@ -173,7 +173,7 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     """drawn: takes and joints that the page has a figure of; this section's is added."""
     said = sentence_of(finding)
     parts: list[Part] = [Text(said)]
-    if finding.evidence and finding.evidence != said:
+    if finding.evidence not in said:
         parts.append(Text(finding.evidence))
     sure = f"{100 * finding.confidence:.0f} %"
     for a in finding.alternatives:

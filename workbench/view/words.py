@@ -52,8 +52,8 @@ def rival_of(finding: Finding) -> Alternative | None:
 
 
 def title_of(effect: str, where: Sequence[str]) -> str:
-    """`joint_compliance`, ("flm",) -> "joint compliance at flm"."""
-    return name_of(effect) + (f" at {listed(where)}" if where else "")
+    """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, at which the data cannot tell."""
+    return name_of(effect) + (f" at {listed(where, 'or')}" if where else "")
 
 
 def name_of(effect: str) -> str:
@@ -68,8 +68,9 @@ def reason_of(text: str) -> str:
 
 def sentence_of(finding: Finding) -> str:
     """What is different about this robot, as the effect itself says it."""
-    return effect_named(finding.effect).sentence(
-        EffectSpec(finding.effect, finding.where, {name: e.value for name, e in finding.parameters.items()}))
+    numbers = {name: e.value for name, e in finding.parameters.items()}
+    said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
+    return said + (f" Or the same at {listed(finding.where[1:], 'or')}: these recordings do not say." if finding.where[1:] else "")
 
 
 def interval(estimate: Estimate) -> str:
@@ -180,9 +181,9 @@ def _odds(ratio: float) -> str:
     return f"{math.exp(ratio):.0f} to 1" if ratio < math.log(1000) else "more than 1000 to 1"
 
 
-def listed(words: Sequence[str]) -> str:
+def listed(words: Sequence[str], last: str = "and") -> str:
     """ "a, b and c". """
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
 def capital(text: str) -> str:
