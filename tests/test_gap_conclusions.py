@@ -44,7 +44,8 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     cost = dict.fromkeys(("fit", "choose", "validate"), 0.0)
     fit = Fit((length("thigh"),), x, np.eye(1), cost, FRAME)
     other = Candidate.of(known_effects()["zero_offset"], ("knee",), (0.0,))
-    rivals = [Rival(length("shank"), x, 10.0, 0.3, fit), Rival(other, x, 20.0, 0.2, fit), Rival(length("hip"), x, 90.0, 0.01, fit)]
+    rivals = [Rival(c, x, behind, p, fit)
+              for c, behind, p in ((length("shank"), 10.0, 0.3), (other, 20.0, 0.2), (length("hip"), 90.0, 0.01))]
     standing = Standing(0.45, tuple(rivals))
     told = finding(SEEN, fit, 0, standing, FRAME, FRAME)
     assert told.where == ("thigh", "shank")

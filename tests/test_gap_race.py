@@ -156,3 +156,14 @@ def test_one_number_looks_far_where_slopes_are_noise():
     fit = fit_blocks([np.array([1.0])], [left([1.0])], [(np.array([0.0]), np.array([9.0]))], 4, 0.08)
     (solved,) = together({0: fit}, lambda wanted: [[left(list(p)) for p in point] for _, point in wanted])[0]
     assert solved.x[0] == pytest.approx(1.6, abs=0.05)
+
+
+def test_one_number_looks_far_before_it_settles_on_a_little():
+    """A move that wins a thousandth is no end where slopes are noise."""
+    def left(x: list[float]) -> np.ndarray:
+        rough = 1.0 if x[0] == 1.0 else 0.9995 if x[0] < 1.0 else 3.0
+        return np.array([rough if abs(x[0] - 1.0) < 0.12 else abs(x[0] - 1.4) + 0.1])
+
+    fit = fit_blocks([np.array([1.0])], [left([1.0])], [(np.array([0.0]), np.array([9.0]))], 4, 0.08)
+    (solved,) = together({0: fit}, lambda wanted: [[left(list(p)) for p in point] for _, point in wanted])[0]
+    assert solved.x[0] == pytest.approx(1.4, abs=0.05)

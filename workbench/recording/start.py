@@ -46,7 +46,8 @@ def lagged_reference(commands: Commands, rate: float = 1000.0, lead: float = 0.3
 
 
 def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, predicted: Take) -> StartEstimate:
-    """Aligns each measured joint q (N, n) [rad] (zero at rest, unless a marker frame is turned) at `time` (N,) with `predicted` (zeroed, 0 = first command).
+    """Aligns each measured joint q (N, n) [rad] (zero at rest, unless a marker frame is turned) at `time` (N,) with `predicted`
+    (zeroed, 0 = first command).
 
     First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each
     joint on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply

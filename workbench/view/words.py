@@ -70,7 +70,8 @@ def sentence_of(finding: Finding) -> str:
     """What is different about this robot, as the effect itself says it."""
     numbers = {name: e.value for name, e in finding.parameters.items()}
     said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
-    return said + (f" Or the same at {listed(finding.where[1:], 'or')}: these recordings do not say." if finding.where[1:] else "")
+    others = listed(finding.where[1:], "or")
+    return said + (f" Or the same at {others}: these recordings do not say." if others else "")
 
 
 def interval(estimate: Estimate) -> str:
