@@ -74,7 +74,7 @@ def test_running_means_of_noise_stay_one_and_those_of_an_offset_grow():
 
 def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_its_size(worn):
     session, search, nominal = worn
-    names = {"coulomb_friction", "viscous_friction", "servo_gain", "dead_band"}
+    names = {"coulomb_friction", "viscous_friction", "servo_gain", "backlash"}  # a dead band does the same, to a hundredth
     pool = [c for c in candidates(session.model, search.jury.evidence) if c.name in names]
     groups = [[c for c in pool if c.name == name] for name in sorted(names)]
     assert all(len(g) == 3 for g in groups)

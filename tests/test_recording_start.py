@@ -35,3 +35,15 @@ def test_joints_that_a_turned_marker_frame_shows_off_zero_are_not_taken_for_movi
     found = find_start(time, JOINTS, q, np.full(3, noise), predicted)
     assert found.time == pytest.approx(0.613, abs=0.002)
     assert max(abs(s - 0.613) for s in found.by_joint.values()) < 0.004
+
+
+def test_where_speeds_are_not_those_predicted_joints_setting_out_tell_the_start():
+    """A slow joint laid over a fast one fits best far too late, and they all agree on that."""
+    goals = np.deg2rad([[0, 0, 0], [40, -40, 40], [0, 0, 0]])
+    commands = Commands(times=np.array([0.0, 1.0, 2.5]), joints=JOINTS, goals=goals, speeds=np.full((3, 3), 2.0),
+                        enabled=np.ones((3, 3), dtype=bool), end=4.0, poses=np.arange(3))
+    slow = lagged_reference(replace(commands, speeds=np.full((3, 3), 0.35)))
+    time = np.arange(0, 6.0, 1 / 120)
+    q = np.stack([np.interp(time - 0.613, slow.time, c) for c in slow.q.T], axis=1)
+    found = find_start(time, JOINTS, q, np.full(3, 1e-3), lagged_reference(commands))
+    assert found.time == pytest.approx(0.613, abs=0.03)

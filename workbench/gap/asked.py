@@ -11,7 +11,7 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL = 4, 2
+TIERS, TIERS_OF_ALL = 5, 3
 """On the ground the first are what moves the robot as a whole."""
 ILL = 0.25
 """Joints whose gap is this share of the worst joint's are asked about."""
@@ -76,16 +76,18 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
 
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
-    """With the base held, joints and the whole robot come first, then links. On the ground, what moves the robot as a whole by
-    one number, by several (for which a walk has to be looked at all around), then joints, then zero offsets and what is in
-    lighter links."""
+    """First how cameras saw the robot, which was read off. With the base held, joints and the whole robot come next, then links.
+    On the ground, what moves the robot as a whole by one number, by several (for which a walk has to be looked at all around),
+    then joints, then zero offsets and what is in lighter links."""
+    if c.effect.layer == "measurement":
+        return 0
     if not grounded:
-        return 1 if "link" in c.effect.places else 0
+        return 2 if "link" in c.effect.places else 1
     if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
-        return 3
+        return 4
     if c.joint is not None:
-        return 2
-    return 1 if c.size > 1 else 0
+        return 3
+    return 2 if c.size > 1 else 1
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:

@@ -35,6 +35,8 @@ within one, and may meet its stop but once."""
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
+LATE = 0.05
+"""By how much every model may shift an estimated start [s]."""
 LOOP = 2e-3
 """Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that."""
 ACROSS = "~"
@@ -115,7 +117,7 @@ class TakeEvidence:
             if not told.any():
                 return shifted
             by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
-            most = 0.03 if self.start_is_free else LOOP
+            most = LATE if self.start_is_free else LOOP
             late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[told])), -most, most))
             shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
         return np.where(np.isfinite(simulated), shifted, np.nan)

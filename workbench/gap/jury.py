@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.registry import known_effects
 from workbench.gap.evidence import BLOCK, TakeEvidence
-from workbench.gap.ledger import GAP_RATIO
+from workbench.gap.ledger import GAP_RATIO, channel_gaps
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
@@ -110,14 +110,13 @@ class Jury:
 
     def beyond(self, residuals: dict[int, Array], use: str) -> float:
         """Chi squared beyond what is expected of a right model, of the channels that have a gap."""
-        cost, expected = self._by_channel(residuals, use)
-        return float(np.sum((cost - expected)[cost > GAP_RATIO**2 * expected]))
+        cost, expected, most = self._by_channel(residuals, use)
+        return float(np.sum((cost - expected)[cost > most]))
 
     def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
         """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
-        cost, expected = self._by_channel(before, use, joint)
-        left, _ = self._by_channel(after, use, joint)
-        most = GAP_RATIO**2 * expected
+        cost, _, most = self._by_channel(before, use, joint)
+        left, *_ = self._by_channel(after, use, joint)
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
@@ -136,16 +135,20 @@ class Jury:
         frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
         return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
 
-    def _by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
-        """Chi squared of each take's each channel, and what is expected of it."""
-        cost, expected = [np.empty(0)], [np.empty(0)]
+    def _by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array, Array]:
+        """Chi squared of each take's each channel, what is expected of it, and what it may be without a gap: of a held robot no
+        more than expected, where running means alone show one."""
+        cost, expected, most = [np.empty(0)], [np.empty(0)], [np.empty(0)]
         for i, r in sorted(residuals.items()):
             e = self.evidence[i]
             columns = e.columns(joint)
             rows = r[e.uses[use]][:, columns]
             cost.append(np.nansum(np.square(rows), axis=0) * e.weight[columns])
             expected.append(np.isfinite(rows).sum(axis=0) * e.weight[columns])
-        return np.concatenate(cost), np.concatenate(expected)
+            gaps = channel_gaps(e, r) if e.take.spec.base == "fixed" else {}
+            slight = np.array([e.channels[c] in gaps for c in columns], dtype=bool) & (cost[-1] <= GAP_RATIO**2 * expected[-1])
+            most.append(expected[-1] * np.where(slight, 1.0, GAP_RATIO**2))
+        return np.concatenate(cost), np.concatenate(expected), np.concatenate(most)
 
     def _length(self, take: int) -> float:
         """Of a rollout, about as it takes time."""

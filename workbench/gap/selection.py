@@ -144,9 +144,14 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             left += sum(jury.beyond({i: current.residuals[i]}, use) for use in ("fit", "choose")) / 3  # a third chooses
-    brought = sum(t.gain["choose"] for r in rounds for t in r.accepted if t.joint is None)
+    brought = sum(t.gain["choose"] for t in _taken(rounds) if t.joint is None)
     least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (LEAST_GAIN, LEAST_SHARE)
     return left < max(least, share * brought)
+
+
+def _taken(rounds: Sequence[Round]) -> list[Trial]:
+    """What was taken of physics; engines do not differ in how cameras saw the robot."""
+    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer != "measurement"]
 
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
@@ -169,7 +174,7 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
 def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> bool:
     """Whether an effect that was fitted brings enough."""
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    brought = sum(a.gain["choose"] for r in rounds for a in r.accepted if t.joint is None or a.joint in (None, t.joint))
+    brought = sum(a.gain["choose"] for a in _taken(rounds) if t.joint is None or a.joint in (None, t.joint))
     least = LEAST_WALKING if t.joint is None and search.jury.walks(takes) else LEAST_GAIN * max(1, t.candidate.size)
     return not t.foretold and gain > max(least, LEAST_SHARE * brought)
 

@@ -20,6 +20,7 @@ _FINE = 0.06  # [s] how far a joint may differ from the common start
 _LEAST = np.deg2rad(1.0)  # a joint that moves less in its window says nothing
 _STAYS = 0.05  # [s] for which a joint that has begun to move is away from rest
 _FIRST = 0.08  # [s] how far the start may be from where first motions meet: some joints set out late
+_ASTRAY = 0.03  # [s] further from when joints set out, their speeds are not those predicted, and tell nothing
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
 
     First all joints together on a coarse grid of starts, each joint's misfit bounded, so that none decides alone; then each
     joint on its own around its first motion, to a fraction of a frame; then the median over joints, weighted by how sharply
-    each one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly).
+    each one tells (a bad joint, or one that starts late, moves a mean by milliseconds, the median hardly). Where that is far from
+    when joints set out, they do not go at the speeds predicted, and setting out decides.
     """
     q = q - _turned(time, q, noise)
     columns = [(i, predicted.column(j)) for i, j in enumerate(joints) if j in predicted.joints]
@@ -61,7 +63,8 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
     moving = [m for m in moving if np.isfinite(q[:, m[0]]).sum() > 10]
     if not moving:
         raise InputError(predicted.name, "start: no joint that was seen is moved by the commands; give starts_at")
-    coarse = _coarse(time, q, tp, predicted.q, moving)
+    setting_out = _setting_out(time, q, tp, predicted.q, [(i, c) for i, c, _ in moving])
+    coarse = _coarse(time, q, tp, predicted.q, moving, setting_out)
     starts, weights, names = [], [], []
     for i, c, onset in moving:
         fine = _fine(time, q[:, i], tp, predicted.q[:, c], onset, coarse, max(float(noise[i]), 1e-5))
@@ -70,9 +73,11 @@ def find_start(time: Array, joints: tuple[str, ...], q: Array, noise: Array, pre
             weights.append(fine[1])
             names.append(joints[i])
     if not starts:
-        return StartEstimate(coarse, _FINE / 2, {})
+        return StartEstimate(*(setting_out or (coarse, _FINE / 2)), {})
     s, w = np.array(starts), np.sqrt(np.array(weights))
     middle = weighted_median(s, w)
+    if setting_out is not None and abs(middle - setting_out[0]) > _ASTRAY + setting_out[1]:
+        return StartEstimate(*setting_out, dict(zip(names, starts)))
     spread = 1.4826 * weighted_median(np.abs(s - middle), w)
     effective = float(w.sum() ** 2 / np.sum(w**2))
     step = float(np.median(np.diff(tp)))  # a simulated command comes at a whole step
@@ -103,15 +108,15 @@ def _onset(t: Array, q: Array) -> float | None:
     return start if np.ptp(q[window]) > _LEAST else None
 
 
-def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int, int, float]]) -> float:
-    """Start [s] on the grid of frames at which most joints agree over the first second; not far from where recorded and predicted
-    first motions meet, where both are seen: a robot that rests at the end agrees with one that has not begun."""
+def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int, int, float]],
+            setting_out: tuple[float, float] | None) -> float:
+    """Start [s] on the grid of frames at which most joints agree over the first second of motion; not far from where joints set
+    out, where that is seen: a robot that rests at the end agrees with one that has not begun."""
     step = float(np.median(np.diff(time)))
-    horizon = min(1.0, float(tp[-1]))
+    horizon = min(1.0 + min(onset for *_, onset in moving), float(tp[-1]))
     candidates = np.arange(time[0], max(time[-1] - 0.3 * horizon, time[0] + step), step)
-    first, told = _first_motion(time, q[:, [i for i, *_ in moving]]), _first_motion(tp, qp[:, [c for _, c, _ in moving]])
-    if first is not None and told is not None:
-        near = np.abs(candidates - (first - told)) < _FIRST
+    if setting_out is not None:
+        near = np.abs(candidates - setting_out[0]) < _FIRST
         candidates = candidates[near] if near.any() else candidates
     offsets = np.arange(-0.2, horizon, 2 * step)
     total = np.zeros(len(candidates))
@@ -126,13 +131,33 @@ def _coarse(time: Array, q: Array, tp: Array, qp: Array, moving: list[tuple[int,
     return float(candidates[np.argmin(total)])
 
 
-def _first_motion(t: Array, q: Array) -> float | None:
-    """When two of the joints q (N, n) (or one, of few) have left rest to stay away; None where they never rest before."""
-    away = np.sum(np.abs(np.nan_to_num(q)) > _LEAST, axis=1) >= min(2, q.shape[1])
+def _setting_out(time: Array, q: Array, tp: Array, qp: Array, pairs: list[tuple[int, int]]) -> tuple[float, float] | None:
+    """Start [s], and how far it is known [s], from when joints leave rest, recorded (columns q) against predicted (qp), whatever
+    their speeds are then: the median over joints; None where fewer than two (or one, of few) are seen to."""
+    told = [(_leaves_rest(time, q[:, i]), _leaves_rest(tp, qp[:, c])) for i, c in pairs]
+    late = np.array([seen - said for seen, said in told if seen is not None and said is not None])
+    if len(late) < min(2, len(pairs)):
+        return None
+    middle = float(np.median(late))
+    return middle, float(1.4826 * np.median(np.abs(late - middle)) / np.sqrt(len(late)) + np.median(np.diff(time)) / 2)
+
+
+def _leaves_rest(t: Array, q: Array) -> float | None:
+    """When a joint q (N,) leaves rest to stay away: where a line through its first degrees meets rest. None where it does not, or
+    never rests before."""
     frames = max(1, round(_STAYS / float(np.median(np.diff(t)))))
+    away = np.abs(np.nan_to_num(q)) > _LEAST
     stays = np.convolve(away, np.ones(frames), mode="valid") == frames
     at = int(np.argmax(stays))
-    return float(t[at]) if stays.any() and at >= frames else None
+    if not stays.any() or at < frames:
+        return None
+    way = np.abs(q[at:at + 2 * frames]) * (np.sign(q[at:at + 2 * frames]) == np.sign(q[at]))
+    past = np.flatnonzero(way > 3 * _LEAST)
+    rows = slice(at, at + max(3, int(past[0]) + 1 if len(past) else 2 * frames))
+    seen = np.isfinite(q[rows])
+    rise, _ = np.polyfit(t[rows][seen] - t[at], np.abs(q[rows][seen]), 1) if seen.sum() > 2 else (0.0, 0.0)
+    mean_t, mean_q = float(np.mean(t[rows][seen])), float(np.mean(np.abs(q[rows][seen])))
+    return mean_t - mean_q / float(rise) if rise > 0 else float(t[at])
 
 
 def _fine(time: Array, q: Array, tp: Array, qp: Array, onset: float, coarse: float, noise: float) -> tuple[float, float] | None:
