@@ -28,7 +28,7 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.view.diagnosis_report import diagnosis_report, write_diagnosis
 from workbench.view.figures import encode
 from workbench.view.gap_figures import before_after, gap_map, robot_map, unseen_errors
-from workbench.view.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of
+from workbench.view.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of, title_of
 
 SIGMA = np.deg2rad(0.1)
 
@@ -236,3 +236,10 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, story: TakeSt
     assert "Afterwards all is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
+
+
+def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
+    told = replace(diagnosis(model).findings[0], where=("flm", "flb"))
+    assert title_of(told.effect, told.where).endswith("at flm or flb")
+    assert sentence_of(told).endswith("Or the same at flb: these recordings do not say.")
+    assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
