@@ -49,10 +49,10 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
         robot = str(rng.choice(walkers) if masked or rng.uniform() > 0.25 else rng.choice(["arm", "rig"]))
         effects: list[str] = []
         if kind == "outside":
-            effects = _deal(unnamed, MAKERS[robot](np.random.default_rng(0)), [], 1, True)
+            effects = _deal(unnamed, _some(robot), [], 1, True)
         wanted = {"one": 1, "two": 2, "three": 3, "outside": int(sum(p.effects[:1] != () and p.effects[0] in OUTSIDE
                                                                    for p in plans) % 3 == 0)}.get(kind, 0)
-        effects += _deal(named, MAKERS[robot](np.random.default_rng(0)), effects, wanted, False, masked)
+        effects += _deal(named, _some(robot), effects, wanted, False, masked)
         plans.append(SessionPlan(f"s{order[k]:03d}", robot, tuple(effects), masked, int(rng.integers(2**62))))
     return sorted(plans, key=lambda p: p.name)
 
@@ -60,9 +60,13 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
 def dealt_again(plan: SessionPlan, rng: np.random.Generator) -> SessionPlan:
     """The same session with other named effects, as many: some never show together, or cannot mask each other."""
     stay = [e for e in plan.effects if e in OUTSIDE]
-    robot = MAKERS[plan.robot](np.random.default_rng(0))
-    hand = _deal(_deck(VOCABULARY, rng), robot, stay, len(plan.effects) - len(stay), False, plan.masked)
+    hand = _deal(_deck(VOCABULARY, rng), _some(plan.robot), stay, len(plan.effects) - len(stay), False, plan.masked)
     return replace(plan, effects=(*stay, *hand))
+
+
+def _some(kind: str) -> Robot:
+    """Any robot of its kind: all of a kind can play the same cards."""
+    return MAKERS[kind](np.random.default_rng(0))
 
 
 def _deck(names: tuple[str, ...], rng: np.random.Generator) -> Iterator[list[str]]:

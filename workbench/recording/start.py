@@ -155,9 +155,8 @@ def _leaves_rest(t: Array, q: Array) -> float | None:
     past = np.flatnonzero(way > 3 * _LEAST)
     rows = slice(at, at + max(3, int(past[0]) + 1 if len(past) else 2 * frames))
     seen = np.isfinite(q[rows])
-    rise, _ = np.polyfit(t[rows][seen] - t[at], np.abs(q[rows][seen]), 1) if seen.sum() > 2 else (0.0, 0.0)
-    mean_t, mean_q = float(np.mean(t[rows][seen])), float(np.mean(np.abs(q[rows][seen])))
-    return mean_t - mean_q / float(rise) if rise > 0 else float(t[at])
+    rise, first = np.polyfit(t[rows][seen] - t[at], np.abs(q[rows][seen]), 1) if seen.sum() > 2 else (0.0, 0.0)
+    return float(t[at] - first / rise) if rise > 0 else float(t[at])
 
 
 def _fine(time: Array, q: Array, tp: Array, qp: Array, onset: float, coarse: float, noise: float) -> tuple[float, float] | None:
