@@ -15,12 +15,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="find the physics that a session's model left out",
         description="Locates where recordings and model differ, tries every known effect where it could act, fits what is "
         "likely, keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, "
-        "the "
-        "session's predictions and report.html. A run that was stopped goes on where it was.",
+        "the session's predictions and report.html. A run that was stopped goes on where it was.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml")
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--thorough", action="store_true",
+                        help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.set_defaults(run=run)
 
 
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
 
     session = load_session(args.session)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
-        told = diagnose_session(session, progress, args.jobs, memory)
+        told = diagnose_session(session, progress, args.jobs, memory, args.thorough)
         paths = write_diagnosis(told.diagnosis, told.stories, folder, str(args.session), progress)
         if told.motion is not None and told.diagnosis.next_experiment is not None:
             paths.append(folder / told.diagnosis.next_experiment.motion)
@@ -47,6 +48,8 @@ def run(args: argparse.Namespace) -> int:
             predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
     for name, reason in told.diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    if told.diagnosis.stopped:
+        print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {told.diagnosis.verdict}")
     for finding in told.diagnosis.findings:
         print(f"  {finding.evidence} (confidence {finding.confidence:.2f}; error on unseen stretches "

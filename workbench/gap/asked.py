@@ -59,11 +59,8 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
         elif (not settled(c)) if grounded else _could_show(search, c, joints):
             groups[c.key] = [c]
 
-    def on(c: Candidate) -> tuple[int, ...]:
-        walks_alone = c.joint is not None or c.effect.layer in ("ground", "inertia") or c.name == "link_length"
-        return grounded if grounded and walks_alone else takes
-
-    return list(groups.values()), {n: on(group[0]) for n, group in enumerate(groups.values())}
+    told = {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
+    return list(groups.values()), told
 
 
 def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
-from workbench.gap.race import Trial
+from workbench.gap.race import Part, Trial
 from workbench.gap.search import Fit, Report, Search
 from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
 
@@ -60,10 +61,10 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
     fit = chosen.fit
     seats: Seats = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
     for turn in range(len(fit.effects) + 1):
-        rivals: list[list[Fit]] = []
-        for i, c in enumerate(fit.effects):
-            report(f"rivals of {c}", i / len(fit.effects))
-            rivals.append([_put(search, fit, i, t) for t in _near(seats, fit.effects, c)])
+        near = [_near(seats, fit.effects, c) for c in fit.effects]
+        put = iter(search.side_by_side([_put(search, fit, i, t) for i, there in enumerate(near) for t in there],
+                                       partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
+        rivals = [[next(put) for _ in there] for there in near]
         challengers = [(r, c) for c, there in zip(fit.effects, rivals) for r in there]
         best, replaced = min(challengers, key=lambda pair: pair[0].cost["choose"], default=(fit, None))
         if replaced is None or turn == len(fit.effects) or fit.cost["choose"] - best.cost["choose"] < BETTER:
@@ -100,14 +101,14 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate) -> list[Tria
             and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
 
 
-def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Fit:
+def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     """The fit with a rival in effect i's place and its numbers fitted there; the same effect elsewhere begins at the size that
     the other has, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if rival.candidate.name == own.name else [rival.x]
-    there = min((search.evaluated([*others, (rival.candidate, x)]) for x in starts), key=lambda f: f.cost["fit"])
+    there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
     takes = search.held if search.is_settled(fit.effects[i]) else search.fitted
-    return search.refitted(there, takes, STEPS, free=[len(others)])
+    return (yield from search.refitting(there, takes, STEPS, free=[len(others)]))

@@ -46,9 +46,10 @@ class Told:
     motion: Motion | None = None
 
 
-def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None) -> Told:
+def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
+                     thorough: bool = False) -> Told:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
-    rollout's channels, so that a killed run resumes."""
+    rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes."""
     began = time.monotonic()
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
@@ -65,7 +66,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     jury, missed = with_missed(jury, session.model, nominal.residuals)
     search = Search(jury, session.model)
     pool = candidates(session.model, evidence) + special(session.model, evidence, nominal.residuals)
-    chosen = select(search, pool, progress)
+    chosen = select(search, pool, progress, thorough)
     fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit
@@ -83,7 +84,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         posterior=posterior(fit, missed),
         next_experiment=None if experiment is None else experiment.entry(MOTION),
         provenance=provenance(session.model, config, time.monotonic() - began) | {"seed": 0, "rollouts": search.jury.rollouts},
-        left_out=unreadable + unregistered)
+        stopped=chosen.stopped, left_out=unreadable + unregistered)
     stories = _stories(search.jury, evidence, unfitted, nominal, fit, diagnosis)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
 

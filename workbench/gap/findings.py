@@ -163,7 +163,8 @@ class NextExperiment:
 @dataclass(frozen=True)
 class Diagnosis:
     """All that a session says. model: nominal with the findings' effects; posterior: of their parameters. left_out: damaged
-    takes, (name, reason). provenance: workbench, drake, model_sha256, seed, seconds."""
+    takes, (name, reason). stopped: whether the search came to its limit of work. provenance: workbench, drake, model_sha256,
+    seed, seconds."""
 
     verdict: Verdict
     model: RobotModel
@@ -176,6 +177,7 @@ class Diagnosis:
     posterior: Posterior = field(default_factory=Posterior)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[tuple[str, str], ...] = ()
+    stopped: bool = False
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -190,6 +192,8 @@ class Diagnosis:
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_json(),
             "provenance": dict(self.provenance),
         }
+        if self.stopped:
+            out["stopped"] = True
         if self.left_out:
             out["left_out"] = [{"take": name, "reason": reason} for name, reason in self.left_out]
         return out

@@ -108,11 +108,13 @@ class _Block:
             self.J[:, i] = (r - self.r) / self.steps[i]
             self.differences.append((self.moved(i), r))
 
-    def trials(self) -> tuple[Array, Array]:
-        """Where to go: a damped step and a short one. Where steps led nowhere on a walk, slopes were noise: one number looks far
-        both ways, and then takes the bottom of the parabola through what it saw for the short one."""
+    def trials(self) -> tuple[Array, ...]:
+        """Where to go: a damped step, and on a walk a short one. Where steps led nowhere there, slopes were noise: one number
+        looks far both ways, and then takes the bottom of the parabola through what it saw for the short one."""
         if not self.open:
-            return self.x, self.x
+            return (self.x, self.x) if self.rough else (self.x,)
+        if not self.rough:
+            return (_step(self.x, self.r, self.J, self.damping, self.low, self.high),)
         if self.missed and self._near_sighted:
             return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)

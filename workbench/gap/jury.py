@@ -38,7 +38,7 @@ class Question:
 
 class Jury:
     """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
-    answers are the same with and without."""
+    answers are the same with and without. work: seconds of rollouts that were asked so far, at the search's step."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | None = None) -> None:
@@ -47,6 +47,7 @@ class Jury:
         self.n_jobs = n_jobs
         self.memory = memory
         self.rollouts = 0
+        self.work = 0.0
         self._known: dict[str, Array] = {}
 
     def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
@@ -56,7 +57,10 @@ class Jury:
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
             keys.append({i: self._key(model, i, q.step) for i, model in felt.items()})
-            new |= {key: (q, i, felt[i]) for i, key in keys[-1].items() if not self._recalled(key)}
+            asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
+            self.work += sum(self._length(i) for _, i, _ in asked.values()) / q.step
+            new |= asked
+        new = {key: what for key, what in new.items() if not self._recalled(key)}
         order = sorted(new, key=lambda key: -self._length(new[key][1]))  # the longest first, so that no core waits at the end
         jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step))
                 for q, i, model in (new[k] for k in order)]
@@ -71,8 +75,13 @@ class Jury:
     def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
         """A jury on other takes of the same robot."""
         other = Jury(evidence, self.config, self.n_jobs, self.memory)
-        other.rollouts = self.rollouts
+        other.rollouts, other.work = self.rollouts, self.work
         return other
+
+    @property
+    def seconds(self) -> float:
+        """A rollout of every take is this much work."""
+        return sum(self._length(i) for i in range(len(self.evidence)))
 
     def walks(self, takes: Sequence[int]) -> bool:
         """Whether the base is free in any of these takes."""
@@ -159,7 +168,7 @@ class Jury:
         return np.where(np.concatenate(slight) & (cost <= most), expected, most)
 
     def _length(self, take: int) -> float:
-        """Of a rollout, about as it takes time."""
+        """Of a rollout [s], a walk counting more as it takes longer."""
         e = self.evidence[take]
         return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)
 

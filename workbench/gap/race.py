@@ -26,6 +26,8 @@ WORTH = 0.3
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
+REMEMBERED = 0.15
+"""Share of the best gain, as signatures of a race beside fewer effects foretell it, from which on an effect is looked at."""
 MOST_FITTED = 5
 """Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
 STEPS, STEPS_WALKING = 3, 2
@@ -49,13 +51,16 @@ class Trial:
 
 
 Asking = Part[list[Trial]]
+Signatures = dict[tuple[object, ...], tuple[list[Array], list[list[Array]]]]
+"""By group and takes: sizes at which it was looked at, and what each did to what is fitted, by block."""
 
 
 @dataclass(frozen=True)
 class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that signatures foretell and that a first step
-    reached, by joint; wide: what is foretold of each that is judged by all channels."""
+    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
+    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge."""
 
+    remembered: dict[str | None, float] = field(default_factory=dict)
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: list[float] = field(default_factory=list)
@@ -65,24 +70,29 @@ class Trying:
     """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
-    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take.
+    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. signatures: of earlier
+    races; this one's are added.
     """
 
     def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
-                 group: Sequence[Candidate], race: Race, apart: bool) -> None:
-        self.jury, self.group, self.race = jury, group, race
+                 group: Sequence[Candidate], race: Race, apart: bool, signatures: Signatures) -> None:
+        self.jury, self.group, self.race, self.signatures = jury, group, race, signatures
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
         self.walking = jury.walks(tuple(base))
         self.base, self.takes = base, tuple(base)
         self.coarse = self.walking and all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
+        self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
+        self.looked_at = (max(base, key=lambda i: self.power[i]),) if self.coarse else self.takes  # walks are expensive
         self.without: dict[int, Array] = {}
+        self._name = (*(c.key for c in group), self.looked_at)
 
     def run(self) -> Asking:
         """Trials of all in the group."""
-        starts, gains = yield from self._looked_at()
-        alive = yield from self._worth_fitting(gains)
+        past = yield from self._past()
+        starts, gains = past or (yield from self._looked_at())
+        alive = [] if past else (yield from self._worth_fitting(gains))
         out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
@@ -91,22 +101,36 @@ class Trying:
         (final,) = yield [self._question(alive, sizes)]
         return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
 
+    def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
+        """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
+        known = self.signatures.get(self._name) if self.walking else None
+        guesses = None if known is None else self._guessed(*known)
+        if guesses is not None:
+            _tell(self.race.remembered, self.joints, guesses[1])
+        yield []  # until all have said what they remember
+        if guesses is None or guesses[1][0] >= REMEMBERED * _best(self.race.remembered, None):
+            return None
+        return guesses
+
     def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
         sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
         probes = _scan(c, sizes, self.walking)
-        power = {i: self.jury.cost({i: r}, "fit") for i, r in self.base.items()}
-        looked_at = (max(power, key=lambda i: power[i]),) if self.coarse else self.takes  # walks are expensive
-        asked = [replace(self._question(everyone, [p] * len(everyone)), takes=looked_at, step=COARSE) for p in probes]
+        asked = [replace(self._question(everyone, [p] * len(everyone)), takes=self.looked_at, step=COARSE) for p in probes]
         plainly = replace(self._question([], []), step=COARSE)
         self.without, *answers = yield [plainly, *asked]
-        r0, plain = (self._left({i: r[i] for i in looked_at}) for r in (self.base, self.without))
-        seen = [[r + v - w for r, v, w in zip(r0, self._left(a), plain)] for a in answers]
+        plain = self._left({i: self.without[i] for i in self.looked_at})
+        self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), plain)] for a in answers]
+        return self._guessed(*self.signatures[self._name])
+
+    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
+        """Sizes to start from and what they gain, on all takes as on those that were looked at."""
+        r0 = self._left({i: self.base[i] for i in self.looked_at})
         far = FAR_WALKING if self.walking else FAR
-        guesses = [_guess(c, r0[b], probes, [v[b] for v in seen], far) for b, c in enumerate(self.group)]
-        share = sum(power[i] for i in looked_at) / max(sum(power.values()), 1e-9)
+        guesses = [_guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
+        share = sum(self.power[i] for i in self.looked_at) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:

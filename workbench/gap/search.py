@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,11 @@ from workbench.gap.candidates import Candidate, with_effects
 from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, Solved, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question, take_of
 from workbench.gap.metrics import rms
-from workbench.gap.race import Race, Trial, Trying
+from workbench.gap.race import Part, Race, Signatures, Trial, Trying
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 Report = Callable[[str, float | None], None]
 SEEN_ELSEWHERE = ("zero_offset",)
 """What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
@@ -88,10 +90,18 @@ class Search:
         self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
         self.held = tuple(i for i in self.fitted if not jury.walks((i,)))
         self.settled: Fit | None = None
+        self.signatures: Signatures = {}
 
     def is_settled(self, c: Candidate) -> bool:
         """Whether held takes told its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
+
+    def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
+        """Of these takes, those that tell numbers of effects: where some walk these alone, unless an effect is of the whole robot
+        or of the cameras; what held takes show of a joint or a link has been asked before."""
+        grounded = tuple(i for i in takes if i not in self.held)
+        alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
+        return grounded if grounded and alone else takes
 
     def resettled(self, current: Fit, *more: Candidate) -> Fit:
         """`current` with those that are settled, and `more`, fitted anew on held takes: for when one went or another came."""
@@ -103,28 +113,45 @@ class Search:
 
     def evaluated(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
         """Effects as they are, on all takes."""
-        residuals = self.jury.residuals([Question(with_effects(self.nominal, effects), self.takes)])[0]
-        x = np.concatenate([np.empty(0), *(x for _, x in effects)])
-        return Fit(tuple(c for c, _ in effects), x, np.full((len(x), len(x)), np.inf), self._cost(residuals), residuals)
+        return self.side_by_side([self.evaluating(effects)])[0][0]
+
+    def evaluating(self, *lists: Sequence[tuple[Candidate, Array]]) -> Part[list[Fit]]:
+        """Several lists of effects as they are, on all takes, as part of something that goes on beside others."""
+        answers = yield [Question(with_effects(self.nominal, effects), self.takes) for effects in lists]
+        out = []
+        for effects, residuals in zip(lists, answers):
+            x = np.concatenate([np.empty(0), *(x for _, x in effects)])
+            out.append(Fit(tuple(c for c, _ in effects), x, np.full((len(x), len(x)), np.inf), self._cost(residuals), residuals))
+        return out
+
+    def side_by_side(self, parts: Sequence[Part[T]], report: Callable[[float], None] = lambda share: None) -> list[T]:
+        """What several parts return; their rollouts share batches."""
+        done = together(dict(enumerate(parts)), lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
+        return [done[n] for n in range(len(parts))]
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
               report: Callable[[float], None], ahead: float = 0.0) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
         at several joints, each judged by its own joint's channels. takes: on which, by group.
         ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels."""
-        race, asking = Race({None: ahead}, {None: ahead}), {}
+        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}), []
         for n, group in enumerate(groups):
             apart = group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE and not self.jury.walks(takes[n])
             base = {i: current.residuals[i] for i in takes[n]}
-            asking[n] = Trying(self.jury, self.nominal, current.sizes(), base, group, race, apart).run()
-        done = together(asking, lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
-        return [trial for n in range(len(groups)) for trial in done[n]]
+            asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, apart, self.signatures).run())
+        return [trial for trials in self.side_by_side(asking, report) for trial in trials]
 
     def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
         """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
-        moving = current.numbers([i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else free)
+        return self.side_by_side([self.refitting(current, takes, iterations, free)])[0]
+
+    def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Part[Fit]:
+        """The same as part of something that goes on beside others."""
+        moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
+        moving = current.numbers(moved)
         if not len(moving):
             return self._told_held(current)
+        takes = self.telling([current.effects[i] for i in moved], takes)
         low, high = (ends[moving] for ends in current.bounds())
 
         def question(point: Sequence[Array]) -> Question:
@@ -138,15 +165,15 @@ class Search:
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
         fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, stride)
         asking = through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
-        (solved,) = together({0: asking}, lambda wanted: self.jury.residuals([q for _, q in wanted]))[0]
+        (solved,) = yield from asking
         x = current.x.copy()
         x[moving] = solved.x
         covariance = np.full((len(x), len(x)), np.inf)
         stretches = self.jury.stretches(takes, "fit")
         spread = ENGINES * np.abs(solved.x) * self._walked(solved, stretches)
         covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
-        fitted = replace(self.evaluated(current.sizes(x)), covariance=covariance, slopes=(Slopes(moving, takes, solved.J),))
-        return self._told_held(fitted)
+        (there,) = yield from self.evaluating(current.sizes(x))
+        return self._told_held(replace(there, covariance=covariance, slopes=(Slopes(moving, takes, solved.J),)))
 
     def _told_held(self, fit: Fit) -> Fit:
         """With covariance and slopes of those that are settled."""
@@ -166,38 +193,28 @@ class Search:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
         cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
         tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
-        seen = self._finely(fit, fit.x)
         if not fit.slopes or not np.isfinite(fit.covariance).any():
-            return seen[0]
+            return self._finely(fit, self.takes, fit.x)[0]
+        walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
+        alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
+        takes = self.takes if len(walked) else self.held or self.takes
+        seen = self._finely(fit, takes, *([fit.x] if alone is None else _around(fit, alone)))
         move = np.zeros(len(fit.x))
         for s in fit.slopes:
             r = self.jury.vector({i: seen[0].residuals[i] for i in s.takes}, "fit")
             H = s.J.T @ s.J
             move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         low, high = fit.bounds()
-        for share in (1.0, 0.4):
-            seen += self._finely(fit, np.clip(fit.x + share * move, low, high))
+        start = fit.x
+        if alone is not None:
+            start, move[alone] = start.copy(), 0.0
+            start[alone] = _bottom(seen, alone, (low[alone], high[alone]))
+        for share in (1.0, 0.4) if alone is None else (1.0,):
+            seen += self._finely(fit, takes, np.clip(start + share * move, low, high))
             if seen[-1].cost["fit"] < seen[0].cost["fit"]:
                 break
-        walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
-        if len(walked) == 1 and self.held != self.fitted:
-            seen += self._far_and_between(seen, int(walked[0]), (low, high))
-        best = min(seen, key=lambda f: f.cost["fit"])
+        (best,) = self._finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
-
-    def _far_and_between(self, seen: Sequence[Fit], n: int, bounds: tuple[Array, Array]) -> list[Fit]:
-        """Refined fits with number n far on both sides of the best, and at the bottom of the parabola through what was seen."""
-        best = min(seen, key=lambda f: f.cost["fit"])
-
-        def at(value: float) -> Array:
-            x = best.x.copy()
-            x[n] = value
-            return np.clip(x, *bounds)
-
-        there = self._finely(best, at(best.x[n] * (1 + WIDE)), at(best.x[n] / (1 + WIDE)))
-        known = [(f.x[[n]], f.cost["fit"]) for f in (best, *there)]
-        bottom = lowest(known, bounds[0][[n]], bounds[1][[n]])
-        return there if bottom is None else [*there, *self._finely(best, at(float(bottom[0])))]
 
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
@@ -212,13 +229,27 @@ class Search:
         walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
         return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
 
-    def _finely(self, fit: Fit, *points: Array) -> list[Fit]:
+    def _finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
-        asked = [Question(with_effects(self.nominal, fit.sizes(x)), self.takes, FINE) for x in points]
+        asked = [Question(with_effects(self.nominal, fit.sizes(x)), takes, FINE) for x in points]
         return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.jury.residuals(asked))]
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
         return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
+
+
+def _around(fit: Fit, n: int) -> list[Array]:
+    """The fit's sizes, and those with number n far on both sides."""
+    low, high = fit.bounds()
+    x = np.array([fit.x] * 3)
+    x[1:, n] *= 1 + WIDE, 1 / (1 + WIDE)
+    return list(np.clip(x, low, high))
+
+
+def _bottom(seen: Sequence[Fit], n: int, ends: tuple[float, float]) -> float:
+    """Of number n, the bottom of the parabola through three fits, or where the best of them has it."""
+    bottom = lowest([(f.x[[n]], f.cost["fit"]) for f in seen], *(np.array([end]) for end in ends))
+    return float(min(seen, key=lambda f: f.cost["fit"]).x[n] if bottom is None else bottom[0])
 
 
 def _covariance(solved: Solved, stretches: NDArray[np.int_]) -> Array:

@@ -6,17 +6,22 @@ First what held takes show, where nothing but the servos moves the robot; then, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+
+import numpy as np
 
 from workbench.gap.asked import TIERS, TIERS_OF_ALL, asked
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
-from workbench.gap.race import Trial
+from workbench.gap.race import Part, Trial
 from workbench.gap.search import Fit, Report, Search
 
 MOST_EFFECTS = 6
+MOST_WORK, MOST_ROLLOUTS = 2500.0, 60.0
+"""Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
+recording."""
 LEAST_GAIN = 150.0
 """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
 is half its noise: engines, and a robot and its model, differ by as much."""
@@ -36,8 +41,8 @@ CLEARLY = 5.0
 ENOUGH, NEARLY_ALL = 0.6, 0.9
 """Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
 like the ground's, before joints are asked."""
-MOST_STEPS = 5
-"""Of a fit of all effects, when one was added; it ends where little changes."""
+MOST_STEPS, LAST_STEPS = 5, 3
+"""Of a fit of all effects, when one was added, and when one was dropped at the end; it ends where little changes."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
@@ -61,30 +66,34 @@ class Round:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The effects that stay, fitted together, and how they were found."""
+    """The effects that stay, fitted together, and how they were found. stopped: by the limit of work."""
 
     fit: Fit
     rounds: tuple[Round, ...]
+    stopped: bool = False
 
 
-def select(search: Search, pool: Sequence[Candidate], report: Report) -> Chosen:
-    """The effects that stay."""
+def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False) -> Chosen:
+    """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
+    most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
+    stopped = False
     if search.held:
-        current = _phase(search, pool, nominal, current, search.held, rounds, report)
+        current, stopped = _phase(search, pool, nominal, current, search.held, rounds, report, most)
     if search.held != search.fitted:
         search.settled = current
         astray = _part_answered(search, nominal, current)
-        current = _phase(search, pool, nominal, current, search.fitted, rounds, report, astray)
+        current, stopped = _phase(search, pool, nominal, current, search.fitted, rounds, report, most, astray)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
             kept = search.resettled(kept)
-        kept = search.refitted(kept, search.fitted, 3)
-    return Chosen(kept, tuple(rounds))
+        if kept is not current:
+            kept = search.refitted(kept, search.fitted, LAST_STEPS)
+    return Chosen(kept, tuple(rounds), stopped)
 
 
 def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
@@ -107,8 +116,10 @@ def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
 
 
 def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...],
-           rounds: list[Round], report: Report, astray: bool = False) -> Fit:
-    while len(current.effects) < MOST_EFFECTS:
+           rounds: list[Round], report: Report, most_work: float, astray: bool = False) -> tuple[Fit, bool]:
+    """What was chosen in the end, and whether the limit of work ended it."""
+    stopped = False
+    while len(current.effects) < MOST_EFFECTS and not stopped:
         beyond = _remaining(search, current, nominal, takes)
         if not beyond or _too_little_left(search, current, takes, rounds):
             break
@@ -116,6 +127,9 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         trials: list[Trial] = []
         for tier in range(TIERS_OF_ALL if astray else TIERS):
+            stopped = search.jury.work > most_work
+            if stopped:
+                break
             groups, on = asked(search, pool, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead)
@@ -124,18 +138,21 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
                 break
         least = LAST_CLOSED if astray else LEAST_CLOSED
         worth = [t for t in trials if t.closed > least and _worthwhile(search, t, takes, rounds)]
-        fits = [(_with(search, current, accepted, takes), accepted) for accepted in _accepted(worth)]
-        after, accepted = min(fits, key=lambda f: f[0].cost["choose"], default=(current, []))
-        rounds.append(Round(current, tuple(trials), tuple(accepted)))
+        choices = _accepted(worth)
+        fits = search.side_by_side([_with(search, current, accepted, takes) for accepted in choices])
+        after, accepted = min(zip(fits, choices), key=lambda f: f[0].cost["choose"], default=(current, []))
+        sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
+        rounds.append(Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted)))
         if not accepted:
             break
         current = after
-    return current
+    return current, stopped
 
 
-def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Fit:
+def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Part[Fit]:
     """All effects fitted together, when some were added."""
-    return search.refitted(search.evaluated([*current.sizes(), *((t.candidate, t.x) for t in accepted)]), takes, MOST_STEPS)
+    (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
+    return (yield from search.refitting(start, takes, MOST_STEPS))
 
 
 def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:

@@ -109,6 +109,8 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
         what.append(f"Judged on stretches of {listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    if diagnosis.stopped:
+        what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)
 
 
