@@ -11,7 +11,7 @@ from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
 from workbench.gap.fitting import Solved, fit_blocks, lowest, together
 from workbench.gap.jury import Jury, Question
-from workbench.gap.race import FAR_WALKING, Race, _best, _guess, _scan, _tell
+from workbench.gap.race import FAR_WALKING, Race, Trying, _best, _guess, _scan, _tell
 from workbench.gap.search import Search, _covariance
 from workbench.robot import EffectSpec
 
@@ -48,6 +48,30 @@ def test_rivals_know_the_best_at_their_joint_and_of_all():
     _tell(race.reached, ["flm", None], [3.0, 8.0])
     _tell(race.reached, ["flm", "frm"], [5.0, -1.0])
     assert (_best(race.reached, "flm"), _best(race.reached, "frm"), _best(race.reached, None)) == (5.0, 0.0, 8.0)
+
+
+def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(quiet):
+    class Walking(Jury):
+        def walks(self, takes):
+            return True
+
+    session, evidence = quiet
+    search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
+    current = search.evaluated([])
+    power = {i: search.jury.cost({i: r}, "fit") for i, r in current.residuals.items()}
+    c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
+    r0 = search.jury.vector(current.residuals, "fit")
+    assert power[0] > 0
+    trials, asked = {}, []
+    for best in (0.0, 1e9):  # of what rivals remember
+        search.signatures[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]]
+        race = Race({None: best})
+        parts = {0: Trying(search.jury, session.model, [], current.residuals, [c], race, False, search.signatures).run()}
+        asked.clear()
+        trials[best] = together(parts, lambda wanted: asked.extend(wanted) or search.jury.residuals([q for _, q in wanted]))[0]
+        assert bool(asked) == (best == 0.0)
+    assert trials[1e9][0].foretold
+    assert search.telling([c], (0,)) == (0,)  # the one take is held
 
 
 def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_again():

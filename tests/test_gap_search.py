@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import record_arm
-from workbench.gap.candidates import candidates
+from workbench.effects.registry import known_effects
+from workbench.gap import selection
+from workbench.gap.candidates import Candidate, candidates
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
@@ -48,6 +50,28 @@ def test_stretches_for_fitting_choosing_and_validating_do_not_meet(worn):
     uses = worn[1].jury.evidence[0].uses
     assert all(m.any() for m in uses.values())
     assert (sum(m.astype(int) for m in uses.values()) <= 1).all()
+
+
+def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
+    session, search, _ = worn
+    pool = [c for c in candidates(session.model, search.jury.evidence) if c.name == "viscous_friction"]
+    monkeypatch.setattr(selection, "MOST_WORK", 0.0)
+    monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
+    chosen = selection.select(search, pool, lambda what, share: None)
+    assert chosen.stopped
+    assert not chosen.fit.effects
+    assert not selection.select(search, pool, lambda what, share: None, thorough=True).stopped
+
+
+def test_only_walks_tell_what_held_takes_were_asked_before(worn):
+    _, search, _ = worn
+    effects = known_effects()
+    friction = Candidate.of(effects["coulomb_friction"], ("three",), (0.0,))
+    supply = Candidate.of(effects["supply_voltage"], (), (11.1,))
+    both = (*search.takes, 7)  # take 7 walks, as it is not held
+    assert search.telling([friction], both) == (7,)
+    assert search.telling([friction, supply], both) == both
+    assert search.telling([friction], search.takes) == search.takes
 
 
 def test_the_ledger_books_the_worn_joint_alone_before_any_fit(worn):
