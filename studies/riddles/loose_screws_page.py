@@ -54,9 +54,10 @@ def answer(r: Result, model: RobotModel) -> Answer:
     drifts = [r.drift(n) for n in LOOSE]
     headline = (
         f"A screw that is loose by {PLAY:g} deg shows as rotation that the joint's servo does not turn, "
-        f"{times(min(off.values()))} to {times(max(off.values()))} sigma in that joint alone, where every rival stays at noise "
-        f"(at most {times(max(rivals.values()))}). The drift itself decides nothing: the same play turns the walk by "
-        f"{sign(min(drifts), 0)} to {sign(max(drifts), 0)} deg (positive: left), depending on which screw it is.")
+        f"{times(min(off.values()))} to {times(max(off.values()))} sigma in that joint alone; its rivals show at most "
+        f"{times(max(rivals.values()))} ({max(rivals, key=lambda n: rivals[n])}). The drift itself decides nothing: the same "
+        f"play turns the walk by {sign(min(drifts), 0)} to {sign(max(drifts), 0)} deg (positive: left), depending on which "
+        "screw it is.")
     question = (
         "The thesis (8.1) saw its robot drift to the left where the simulation drifted slightly to the right, found loose "
         "screws in the front left leg, and took them for the cause. What would a recording show of loose screws, and what of "
@@ -110,6 +111,11 @@ def _least(r: Result) -> str:
     return f"{min(seen):g} deg" if seen else f"{PLAY:g} deg"
 
 
+def _off_too(r: Result) -> list[str]:
+    """Rivals that show off an axis, too."""
+    return [f"{n} ({times(off_axis(r, n))})" for n in RIVALS if off_axis(r, n) > BOUND]
+
+
 def _decides(r: Result) -> str:
     there, back = r.turned_round["there"], r.turned_round["back"]
     angle = {n: r.found[n].sigma(r.found[n].worst()) for n in RIVALS}
@@ -118,8 +124,9 @@ def _decides(r: Result) -> str:
     named = listed([f"{n} ({r.found[n].worst()}, {times(angle[n])} sigma)" for n in known])
     return (
         "**The rotation across the servo's axis.** The cameras record each rigid body's whole rotation, so this is in the "
-        "thesis's own recordings; its animation plays it back (gimbal joints), its simulation leaves it out. Only a loose mount "
-        f"moves it, in its own joint, from {_least(r)} of play on.\n\n"
+        "thesis's own recordings; its animation plays it back (gimbal joints), its simulation leaves it out. A loose "
+        f"mount moves it in its own joint, from {_least(r)} of play on; of the rivals {listed(_off_too(r)) or 'none'} beyond "
+        f"{BOUND} sigma.\n\n"
         f"**The rivals by other channels.** {named or 'No rival'} change a joint's angle by more than {BOUND}; "
         f"{listed(unknown) or 'none'} leave every angle within it. A tilted floor: walk there and back. Over 1 deg the robot "
         f"ends {sign(there[1])} cm to the right with the slope falling to its left, {sign(back[1])} cm with the slope falling "
