@@ -45,6 +45,13 @@ def test_halves_round_away_from_zero_as_in_matlab() -> None:
     assert PoseTable.from_angles(("a", "b"), np.array([0, 1.0]), half).goals.tolist() == [[513, 511]]
 
 
+def test_a_dwell_below_a_half_in_its_file_is_rounded_down() -> None:
+    times = np.array([0, 0.2409, 0.3334])  # 92.49999999999997 ms, as every program that reads the file has it
+    still = np.zeros((3, 1))
+    assert PoseTable.from_angles(("a",), times, still).dwells_ms.tolist() == [241, 92]
+    assert PoseTable.from_angles(("a",), np.array([0, 0.0925]), still[:2]).dwells_ms.tolist() == [93]
+
+
 @pytest.mark.parametrize(("angle", "time", "message"), [
     (150.0, 1.0, "pose 1, joint flm: goal position 1024 is outside 0 to 1023"),
     (-150.3, 1.0, "pose 1, joint flm: goal position -1 is outside"),

@@ -25,6 +25,8 @@ recording."""
 LEAST_GAIN = 150.0
 """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
 is half its noise: engines, and a robot and its model, differ by as much."""
+ALL_CLOSED = 0.5
+"""Share of that, for what closes all of a joint's gap: it is small, and its shape is right."""
 LEAST_WALKING = 600.0
 """The same of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 LEAST_SHARE = 0.05
@@ -162,7 +164,7 @@ def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], round
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             left += sum(jury.beyond({i: current.residuals[i]}, use) for use in ("fit", "choose")) / 3  # a third chooses
     brought = sum(t.gain["choose"] for t in _taken(rounds) if t.joint is None)
-    least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (LEAST_GAIN, LEAST_SHARE)
+    least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (ALL_CLOSED * LEAST_GAIN, LEAST_SHARE)
     return left < max(least, share * brought)
 
 
@@ -193,6 +195,8 @@ def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     brought = sum(a.gain["choose"] for a in _taken(rounds) if t.joint is None or a.joint in (None, t.joint))
     least = LEAST_WALKING if t.joint is None and search.jury.walks(takes) else LEAST_GAIN * max(1, t.candidate.size)
+    if t.joint is not None and t.closed > NEARLY_ALL:
+        least *= ALL_CLOSED
     return not t.foretold and gain > max(least, LEAST_SHARE * brought)
 
 
@@ -215,7 +219,7 @@ def without_idle(search: Search, current: Fit) -> Fit:
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
             break
-        least = LEAST_GAIN * max(1, current.effects[i].size)
+        least = LEAST_GAIN * max(1, current.effects[i].size) * (ALL_CLOSED if search.is_settled(current.effects[i]) else 1.0)
         rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
         if rest.cost["choose"] - current.cost["choose"] < CLEARLY * least:
             free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None

@@ -68,7 +68,7 @@ class PoseTable:
             joints,
             goals=CENTRE + _nearest(degrees[1:] * LARGEST / 300),
             speeds=_nearest(rpm * LARGEST / 114),
-            dwells_ms=_nearest(elapsed * 1000),
+            dwells_ms=_nearest(elapsed * 1000, lost=0.0),  # in the file's own unit: what lies below a half stays below
             source=source,
         )
 
@@ -101,6 +101,7 @@ class PoseTable:
         return Motion(self.source, times, self.joints, np.vstack([angles[-1:], angles]), self.source)
 
 
-def _nearest(x: Array) -> Counts:
-    """Nearest integers, halves away from zero as MATLAB rounds, with halves that were lost to the change of units."""
-    return np.asarray(np.sign(x) * np.floor(np.abs(x) + 0.5 + 1e-9), dtype=np.int64)
+def _nearest(x: Array, lost: float = 1e-9) -> Counts:
+    """Nearest integers, halves away from zero as MATLAB rounds, with halves that were lost, by at most so much, to the change of
+    units."""
+    return np.asarray(np.sign(x) * np.floor(np.abs(x) + 0.5 + lost), dtype=np.int64)
