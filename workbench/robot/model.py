@@ -19,6 +19,8 @@ from workbench.robot.resources import resolve_model
 from workbench.robot.servo_constants import ServoConstants
 
 PUPPY = "package://puppy/puppy.sdf"
+FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+"""Writes the same text either way."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,8 @@ class RobotModel:
     def sha256(self) -> str:
         """Hash of the description's content and of everything said about it."""
         digest = hashlib.sha256(self.path.read_bytes())
-        digest.update(yaml.safe_dump(self.as_dict() | {"description": self.path.name}, sort_keys=True).encode())
+        said = self.as_dict() | {"description": self.path.name}
+        digest.update(yaml.dump(said, Dumper=FAST_YAML, sort_keys=True).encode())
         return digest.hexdigest()
 
     def as_dict(self) -> dict[str, Any]:
