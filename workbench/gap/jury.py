@@ -61,7 +61,8 @@ class Jury:
             self.work += sum(self._length(i) for _, i, _ in asked.values()) / q.step
             new |= asked
         new = {key: what for key, what in new.items() if not self._recalled(key)}
-        order = sorted(new, key=lambda key: -self._length(new[key][1]))  # the longest first, so that no core waits at the end
+        # the longest first, so that no core waits at the end
+        order = sorted(new, key=lambda key: -self._length(new[key][1]) / new[key][0].step)
         jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step))
                 for q, i, model in (new[k] for k in order)]
         rollouts = simulate_batch(jobs, self.n_jobs)
