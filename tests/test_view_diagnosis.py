@@ -238,6 +238,14 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, story: TakeSt
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
 
 
+def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, story: TakeStory) -> None:
+    whole, stopped = diagnosis(model), replace(diagnosis(model), stopped=True)
+    assert "limit of work" not in diagnosis_report(whole, [story], "Session small").html()
+    assert "limit of work" in diagnosis_report(stopped, [story], "Session small").html()
+    assert "stopped" not in whole.to_json()
+    assert stopped.to_json()["stopped"] is True
+
+
 def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     told = replace(diagnosis(model).findings[0], where=("flm", "flb"))
     assert title_of(told.effect, told.where).endswith("at flm or flb")
