@@ -27,7 +27,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
-    grounded = tuple(i for i in takes if i not in search.held)
+    grounded = search.grounded(takes)
     moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current)
 
@@ -59,8 +59,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
         elif (not settled(c)) if grounded else _could_show(search, c, joints):
             groups[c.key] = [c]
 
-    told = {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
-    return list(groups.values()), told
+    return list(groups.values()), {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
 
 
 def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:

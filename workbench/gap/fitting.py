@@ -111,10 +111,10 @@ class _Block:
     def trials(self) -> tuple[Array, ...]:
         """Where to go: a damped step, and on a walk a short one. Where steps led nowhere there, slopes were noise: one number
         looks far both ways, and then takes the bottom of the parabola through what it saw for the short one."""
-        if not self.open:
-            return (self.x, self.x) if self.rough else (self.x,)
         if not self.rough:
-            return (_step(self.x, self.r, self.J, self.damping, self.low, self.high),)
+            return (_step(self.x, self.r, self.J, self.damping, self.low, self.high) if self.open else self.x,)
+        if not self.open:
+            return self.x, self.x
         if self.missed and self._near_sighted:
             return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)

@@ -96,10 +96,14 @@ class Search:
         """Whether held takes told its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
 
+    def grounded(self, takes: tuple[int, ...]) -> tuple[int, ...]:
+        """Of these takes, those whose base is not held."""
+        return tuple(i for i in takes if i not in self.held)
+
     def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
         """Of these takes, those that tell numbers of effects: where some walk these alone, unless an effect is of the whole robot
         or of the cameras; what held takes show of a joint or a link has been asked before."""
-        grounded = tuple(i for i in takes if i not in self.held)
+        grounded = self.grounded(takes)
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
         return grounded if grounded and alone else takes
 
@@ -164,8 +168,7 @@ class Search:
         stride = near if self.jury.walks(takes) else HELD
         r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
         fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, stride)
-        asking = through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
-        (solved,) = yield from asking
+        (solved,) = yield from through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
         x = current.x.copy()
         x[moving] = solved.x
         covariance = np.full((len(x), len(x)), np.inf)
@@ -199,15 +202,10 @@ class Search:
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
         takes = self.takes if len(walked) else self.held or self.takes
         seen = self._finely(fit, takes, *([fit.x] if alone is None else _around(fit, alone)))
-        move = np.zeros(len(fit.x))
-        for s in fit.slopes:
-            r = self.jury.vector({i: seen[0].residuals[i] for i in s.takes}, "fit")
-            H = s.J.T @ s.J
-            move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
+        move, start = self._newton(seen[0]), fit.x.copy()
         low, high = fit.bounds()
-        start = fit.x
         if alone is not None:
-            start, move[alone] = start.copy(), 0.0
+            move[alone] = 0.0
             start[alone] = _bottom(seen, alone, (low[alone], high[alone]))
         for share in (1.0, 0.4) if alone is None else (1.0,):
             seen += self._finely(fit, takes, np.clip(start + share * move, low, high))
@@ -215,6 +213,15 @@ class Search:
                 break
         (best,) = self._finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
+
+    def _newton(self, seen: Fit) -> Array:
+        """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
+        move = np.zeros(len(seen.x))
+        for s in seen.slopes:
+            r = self.jury.vector({i: seen.residuals[i] for i in s.takes}, "fit")
+            H = s.J.T @ s.J
+            move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
+        return move
 
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""

@@ -25,10 +25,10 @@ recording."""
 LEAST_GAIN = 150.0
 """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
 is half its noise: engines, and a robot and its model, differ by as much."""
-ALL_CLOSED = 0.5
-"""Share of that, for what closes all of a joint's gap: it is small, and its shape is right."""
 LEAST_WALKING = 600.0
 """The same of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
+ALL_CLOSED = 0.5
+"""Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
 LEAST_SHARE = 0.05
 """Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
@@ -54,11 +54,13 @@ ALIKE = 0.25
 
 @dataclass(frozen=True)
 class Round:
-    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken."""
+    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
+    limit of work, before all that could be asked was."""
 
     before: Fit
     trials: tuple[Trial, ...]
     accepted: tuple[Trial, ...]
+    stopped: bool = False
 
     def rivals(self, trial: Trial) -> list[Trial]:
         """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
@@ -68,11 +70,15 @@ class Round:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The effects that stay, fitted together, and how they were found. stopped: by the limit of work."""
+    """The effects that stay, fitted together, and how they were found."""
 
     fit: Fit
     rounds: tuple[Round, ...]
-    stopped: bool = False
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the limit of work ended the search."""
+        return any(r.stopped for r in self.rounds)
 
 
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False) -> Chosen:
@@ -80,13 +86,12 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
-    stopped = False
     if search.held:
-        current, stopped = _phase(search, pool, nominal, current, search.held, rounds, report, most)
+        current = _phase(search, pool, nominal, current, search.held, rounds, report, most)
     if search.held != search.fitted:
         search.settled = current
         astray = _part_answered(search, nominal, current)
-        current, stopped = _phase(search, pool, nominal, current, search.fitted, rounds, report, most, astray)
+        current = _phase(search, pool, nominal, current, search.fitted, rounds, report, most, astray)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -95,7 +100,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
             kept = search.resettled(kept)
         if kept is not current:
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(kept, tuple(rounds), stopped)
+    return Chosen(kept, tuple(rounds))
 
 
 def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
@@ -118,8 +123,7 @@ def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
 
 
 def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...],
-           rounds: list[Round], report: Report, most_work: float, astray: bool = False) -> tuple[Fit, bool]:
-    """What was chosen in the end, and whether the limit of work ended it."""
+           rounds: list[Round], report: Report, most_work: float, astray: bool = False) -> Fit:
     stopped = False
     while len(current.effects) < MOST_EFFECTS and not stopped:
         beyond = _remaining(search, current, nominal, takes)
@@ -144,11 +148,12 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
         fits = search.side_by_side([_with(search, current, accepted, takes) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: f[0].cost["choose"], default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
-        rounds.append(Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted)))
+        rounds.append(Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted),
+                            stopped))
         if not accepted:
             break
         current = after
-    return current, stopped
+    return current
 
 
 def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Part[Fit]:
