@@ -11,7 +11,7 @@ from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
 from workbench.gap.fitting import Solved, fit_blocks, lowest, together
 from workbench.gap.jury import Jury, Question
-from workbench.gap.race import FAR_WALKING, Race, Trying, _best, _guess, _scan, _tell
+from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _guess, _scan, _tell
 from workbench.gap.search import Search, _covariance
 from workbench.robot import EffectSpec
 
@@ -64,7 +64,7 @@ def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(qu
     assert power[0] > 0
     trials, asked = {}, []
     for best in (0.0, 1e9):  # of what rivals remember
-        search.signatures[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]]
+        search.signatures[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]], np.inf
         race = Race({None: best})
         parts = {0: Trying(search.jury, session.model, [], current.residuals, [c], race, False, search.signatures).run()}
         asked.clear()
@@ -72,6 +72,40 @@ def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(qu
         assert bool(asked) == (best == 0.0)
     assert trials[1e9][0].foretold
     assert search.telling([c], (0,)) == (0,)  # the one take is held
+
+
+def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(quiet):
+    session, evidence = quiet
+    jury = Jury(evidence, CONFIG, n_jobs=1)
+    whole, brief = (r[0] for r in jury.residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)]))
+    assert jury.work == pytest.approx(evidence[0].take.recorded.time[-1] + 1.5)
+    since = evidence[0].take.recorded.time - evidence[0].take.measurement.starts_at
+    known = np.isfinite(brief).any(axis=1)
+    assert since[known].max() == pytest.approx(1.5, abs=0.02)
+    assert np.isfinite(whole[since > 1.6]).any()
+    assert not np.isfinite(brief[since > 1.5]).any()
+    cut = jury.early({0: whole}, 1.5)[0]
+    both = np.isfinite(cut) & np.isfinite(brief)
+    assert both.sum() > 0.9 * np.isfinite(cut).sum()
+    assert np.sqrt(np.mean((cut - brief)[both] ** 2)) < 0.1  # of noise: both are shifted by what they show of the clock
+
+
+def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monkeypatch):
+    class Walking(Jury):
+        def walks(self, takes):
+            return True
+
+    session, evidence = quiet
+    jury = Walking(evidence, CONFIG, n_jobs=1)
+    since = evidence[0].take.recorded.time - evidence[0].take.measurement.starts_at
+    c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
+    monkeypatch.setattr("workbench.gap.race.LOOKED", 0.8)  # these takes are short
+    for begins, most in ((0.0, 0.8), (1.2, 2.0)):
+        missing = np.where(since[:, None] >= begins, 5.0, 0.1) * np.isfinite(evidence[0].recorded)
+        t = Trying(jury, session.model, [], {0: missing}, [c], Race(), False, {})
+        assert begins < t.until <= most
+        shown = jury.cost(jury.early({0: missing}, t.until), "fit") / jury.cost({0: missing}, "fit")
+        assert shown >= LOOKED_SHARE
 
 
 def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_again():

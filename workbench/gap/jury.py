@@ -29,11 +29,13 @@ REST = 0.1
 
 @dataclass(frozen=True)
 class Question:
-    """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone."""
+    """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone. until: how long after
+    the first command [s]; frames after that are NaN."""
 
     model: RobotModel
     takes: tuple[int, ...]
     step: float = 1.0
+    until: float = np.inf
 
 
 class Jury:
@@ -56,20 +58,20 @@ class Jury:
         new: dict[str, tuple[Question, int, RobotModel]] = {}
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
-            keys.append({i: self._key(model, i, q.step) for i, model in felt.items()})
+            keys.append({i: self._key(model, i, q) for i, model in felt.items()})
             asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
-            self.work += sum(self._length(i) for _, i, _ in asked.values()) / q.step
+            self.work += sum(self._length(i, q.until) for _, i, _ in asked.values()) / q.step
             new |= asked
         new = {key: what for key, what in new.items() if not self._recalled(key)}
         # the longest first, so that no core waits at the end
-        order = sorted(new, key=lambda key: -self._length(new[key][1]) / new[key][0].step)
-        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step))
+        order = sorted(new, key=lambda key: -self._length(new[key][1], new[key][0].until) / new[key][0].step)
+        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), q.until)
                 for q, i, model in (new[k] for k in order)]
         rollouts = simulate_batch(jobs, self.n_jobs)
         self.rollouts += len(order)
         for key, rollout in zip(order, rollouts):
             q, i, _ = new[key]
-            self._keep(key, self.evidence[i].simulated(rollout, q.model))
+            self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, q.until)[i])
         return [{i: self.evidence[i].residual(self._known[key], corrected=q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
@@ -94,13 +96,17 @@ class Jury:
         rollouts = simulate_batch([self.job(model, i, config) for i in everywhere], self.n_jobs)
         return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
 
-    def job(self, model: RobotModel, take: int, config: SimulationConfig) -> Job:
+    def early(self, residuals: dict[int, Array], until: float) -> dict[int, Array]:
+        """Residuals, or channels, as a question with this `until` would have them."""
+        return {i: np.where(self._since(i)[:, None] <= until, r, np.nan) for i, r in residuals.items()}
+
+    def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
         """One rollout; each take's own servo changes apply."""
         e = self.evidence[take]
         spec = e.take.spec
-        frames = e.take.recorded.time - e.take.measurement.starts_at
-        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[frames >= 0]])
-        duration = float(frames[-1]) + 2e-3
+        frames = self._since(take)
+        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
+        duration = float(times[-1]) + 2e-3
         return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
                    name=spec.name, times=times, start=e.take.start_state())
 
@@ -136,8 +142,7 @@ class Jury:
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            since = e.take.recorded.time[e.uses[use]] - e.take.measurement.starts_at
-            stretch = i * STRETCHES + np.floor(since / BLOCK).astype(int)
+            stretch = i * STRETCHES + np.floor(self._since(i)[e.uses[use]] / BLOCK).astype(int)
             parts.append(np.repeat(stretch, len(e.channels)))
         return np.concatenate(parts)
 
@@ -168,10 +173,15 @@ class Jury:
             slight.append(np.array([e.channels[c] in gaps for c in e.columns(joint)], dtype=bool))
         return np.where(np.concatenate(slight) & (cost <= most), expected, most)
 
-    def _length(self, take: int) -> float:
+    def _since(self, take: int) -> Array:
+        """Time of each frame after the first command [s]."""
+        e = self.evidence[take]
+        return e.take.recorded.time - e.take.measurement.starts_at
+
+    def _length(self, take: int, until: float = np.inf) -> float:
         """Of a rollout [s], a walk counting more as it takes longer."""
         e = self.evidence[take]
-        return float(e.take.recorded.time[-1]) * (1.5 if e.take.spec.base == "free" else 1.0)
+        return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0)
 
     def _felt(self, model: RobotModel, take: int) -> RobotModel:
         """The model as this take can tell it: where the base is held, no floor and no mass of the base is felt."""
@@ -180,10 +190,11 @@ class Jury:
         felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
         return model if len(felt) == len(model.effects) else replace(model, effects=felt)
 
-    def _key(self, felt: RobotModel, take: int, step: float) -> str:
+    def _key(self, felt: RobotModel, take: int, q: Question) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
-        return f"{felt.sha256[:20]}-{take}-{goals}-{step:g}"
+        until = "" if np.isinf(q.until) else f"-until{q.until:.6g}"
+        return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}{until}"
 
     def _recalled(self, key: str) -> bool:
         """Whether an answer is known, now or from a run before."""

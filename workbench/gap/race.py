@@ -22,6 +22,9 @@ SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
 and those of several numbers at the last, beyond what a walk makes of anything small."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
+LOOKED, LOOKED_SHARE = 2.5, 0.3
+"""How long [s] a walk is looked at, for an effect of one number, and the share of what is missing that must show by then; else
+longer. Walks are expensive, and late in them small differences have grown into others."""
 WORTH = 0.3
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 BEHIND = 0.6
@@ -51,8 +54,10 @@ class Trial:
 
 
 Asking = Part[list[Trial]]
-Signatures = dict[tuple[object, ...], tuple[list[Array], list[list[Array]]]]
-"""By group and takes: sizes at which it was looked at, and what each did to what is fitted, by block."""
+Seen = tuple[list[Array], list[list[Array]], float]
+"""Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
+Signatures = dict[tuple[object, ...], Seen]
+"""By group and takes."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +90,7 @@ class Trying:
         self.r0 = self._left(base)
         self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if self.coarse else self.takes  # walks are expensive
+        self.until = self._shown() if self.coarse else np.inf
         self.without: dict[int, Array] = {}
         self._name = (*(c.key for c in group), self.looked_at)
 
@@ -118,20 +124,30 @@ class Trying:
         c = self.group[0]
         sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
         probes = _scan(c, sizes, self.walking)
-        asked = [replace(self._question(everyone, [p] * len(everyone)), takes=self.looked_at, step=COARSE) for p in probes]
         plainly = replace(self._question([], []), step=COARSE)
-        self.without, *answers = yield [plainly, *asked]
-        plain = self._left({i: self.without[i] for i in self.looked_at})
-        self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), plain)] for a in answers]
+        asked = [replace(self._question(which, [p] * len(which)), takes=self.looked_at, step=COARSE, until=self.until)
+                 for which, p in (([], probes[0]), *((everyone, p) for p in probes))]
+        self.without, plain, *answers = yield [plainly, *asked]
+        before = self._left(plain)
+        self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), before)] for a in answers], self.until
         return self._guessed(*self.signatures[self._name])
 
-    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
-        """Sizes to start from and what they gain, on all takes as on those that were looked at."""
-        r0 = self._left({i: self.base[i] for i in self.looked_at})
+    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
+                 ) -> tuple[list[Array], list[float]]:
+        """Sizes to start from and what they gain, on all takes as on what was looked at."""
+        looked_at = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
+        r0 = self._left(looked_at)
         far = FAR_WALKING if self.walking else FAR
         guesses = [_guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
-        share = sum(self.power[i] for i in self.looked_at) / max(sum(self.power.values()), 1e-9)
+        share = max(self.jury.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
+
+    def _shown(self) -> float:
+        """How long a walk is looked at [s]."""
+        seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
+        while self.jury.cost(self.jury.early(seen, until), "fit") < LOOKED_SHARE * self.jury.cost(seen, "fit"):
+            until += LOOKED / 2
+        return until
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
         """Of the group, those that are not told to be far behind a rival."""
