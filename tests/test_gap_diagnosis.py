@@ -53,8 +53,13 @@ def test_what_was_worked_out_stays_while_a_run_is_not_done(tmp_path):
     assert not folder.exists()
     content = yaml.safe_load((tmp_path / "session.yaml").read_text())
     content["takes"][0]["cycles"] = 1
+    killed(tmp_path / "out", session)
+    elsewhere = killed(tmp_path / "out2", session)
     with rollout_memory(tmp_path / "out", load_session(write_session(tmp_path, content))) as other:
         assert other != folder
+        assert folder.exists()
+    assert not folder.exists()  # what another version had worked out is of no use any more
+    assert elsewhere.exists()
 
 
 @pytest.mark.slow

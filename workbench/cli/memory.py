@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import os
 import shutil
@@ -18,12 +19,15 @@ STAYS = 16
 
 @contextmanager
 def rollout_memory(out: Path, session: Session) -> Iterator[Path]:
-    """A folder beside `out` for rollouts of this session, the same for the same files and versions; gone once the block ends
-    well, left where it is interrupted or fails."""
-    folder = Path(os.path.abspath(out)).parent / f".{Path(os.path.abspath(out)).name}.resume-{_digest(session)}"
+    """A folder beside `out` for rollouts of this session, the same for the same files and versions; left where the block is
+    interrupted or fails, gone once it ends well, and with it what other versions left there."""
+    beside = Path(os.path.abspath(out))
+    kept = f".{beside.name}.resume-"
+    folder = beside.parent / f"{kept}{_digest(session)}"
     folder.mkdir(parents=True, exist_ok=True)
     yield folder
-    shutil.rmtree(folder, ignore_errors=True)
+    for done in beside.parent.glob(f"{glob.escape(kept)}*"):
+        shutil.rmtree(done, ignore_errors=True)
 
 
 def _digest(session: Session) -> str:
