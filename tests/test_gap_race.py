@@ -14,6 +14,7 @@ from workbench.gap.jury import Jury, Question
 from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _guess, _scan, _tell
 from workbench.gap.search import Search, _covariance
 from workbench.robot import EffectSpec
+from workbench.simulation.batch import simulate_stream
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +89,19 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
     both = np.isfinite(cut) & np.isfinite(brief)
     assert both.sum() > 0.9 * np.isfinite(cut).sum()
     assert np.sqrt(np.mean((cut - brief)[both] ** 2)) < 0.1  # of noise: both are shifted by what they show of the clock
+
+
+def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypatch):
+    session, evidence = quiet
+
+    def killed(jobs, n_jobs):
+        yield next(iter(simulate_stream(jobs, n_jobs)))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("workbench.gap.jury.simulate_stream", killed)
+    with pytest.raises(KeyboardInterrupt):
+        Jury(evidence, CONFIG, 1, tmp_path).residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)])
+    assert len(list(tmp_path.glob("*.npy"))) == 1
 
 
 def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monkeypatch):

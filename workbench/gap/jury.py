@@ -16,7 +16,7 @@ from workbench.gap.ledger import GAP_RATIO, channel_gaps
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
-from workbench.simulation.batch import Job, simulate_batch
+from workbench.simulation.batch import Job, simulate_batch, simulate_stream
 
 Array = NDArray[np.float64]
 COARSE, FINE = 2.0, 0.25
@@ -67,9 +67,8 @@ class Jury:
         order = sorted(new, key=lambda key: -self._length(new[key][1], new[key][0].until) / new[key][0].step)
         jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), q.until)
                 for q, i, model in (new[k] for k in order)]
-        rollouts = simulate_batch(jobs, self.n_jobs)
         self.rollouts += len(order)
-        for key, rollout in zip(order, rollouts):
+        for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
             q, i, _ = new[key]
             self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, q.until)[i])
         return [{i: self.evidence[i].residual(self._known[key], corrected=q.step >= 1) for i, key in by_take.items()}

@@ -43,14 +43,15 @@ def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int
     client's cluster. progress: called with (done, all).
     """
     takes: list[Take] = []
-    for take in _stream(jobs, n_jobs):
+    for take in simulate_stream(jobs, n_jobs):
         takes.append(take)
         if progress:
             progress(len(takes), len(jobs))
     return takes
 
 
-def _stream(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
+def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
+    """The same takes one by one, each as soon as it and those before it are there; the others go on meanwhile."""
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
     return _in_processes(jobs, n_jobs)
