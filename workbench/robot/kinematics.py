@@ -51,7 +51,8 @@ class Kinematics:
     @staticmethod
     def from_file(path: Path) -> Kinematics:
         """Parses an SDF or URDF; InputError if Drake cannot."""
-        return _parse(Path(path))
+        path = Path(path)
+        return _parse(path, written=path.read_bytes() if path.is_file() else None)
 
     @staticmethod
     def from_text(text: str, path: Path) -> Kinematics:
@@ -114,7 +115,8 @@ def rotation_about(axis: Array, angle: Array) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _parse(path: Path, text: str | None = None) -> Kinematics:
+def _parse(path: Path, text: str | None = None, written: bytes | None = None) -> Kinematics:
+    """written: what the file holds, so that one that was written anew is read anew."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import RevoluteJoint, WeldJoint
