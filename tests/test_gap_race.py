@@ -17,6 +17,11 @@ from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
 
 
+class Walking(Jury):
+    def walks(self, takes):
+        return True
+
+
 @pytest.fixture(scope="module")
 def quiet(tmp_path_factory):
     return gathered(tmp_path_factory.mktemp("quiet"), 0.06)
@@ -52,10 +57,6 @@ def test_rivals_know_the_best_at_their_joint_and_of_all():
 
 
 def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(quiet):
-    class Walking(Jury):
-        def walks(self, takes):
-            return True
-
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
     current = search.evaluated([])
@@ -80,7 +81,7 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
     jury = Jury(evidence, CONFIG, n_jobs=1)
     whole, brief = (r[0] for r in jury.residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)]))
     assert jury.work == pytest.approx(evidence[0].take.recorded.time[-1] + 1.5)
-    since = evidence[0].take.recorded.time - evidence[0].take.measurement.starts_at
+    since = evidence[0].since
     known = np.isfinite(brief).any(axis=1)
     assert since[known].max() == pytest.approx(1.5, abs=0.02)
     assert np.isfinite(whole[since > 1.6]).any()
@@ -105,13 +106,9 @@ def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypa
 
 
 def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monkeypatch):
-    class Walking(Jury):
-        def walks(self, takes):
-            return True
-
     session, evidence = quiet
     jury = Walking(evidence, CONFIG, n_jobs=1)
-    since = evidence[0].take.recorded.time - evidence[0].take.measurement.starts_at
+    since = evidence[0].since
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
     monkeypatch.setattr("workbench.gap.race.LOOKED", 0.8)  # these takes are short
     for begins, most in ((0.0, 0.8), (1.2, 2.0)):

@@ -83,9 +83,14 @@ class TakeEvidence:
         return float(np.median(np.diff(self.take.recorded.time)))
 
     @property
+    def since(self) -> Array:
+        """Time of each frame after the first command [s]."""
+        return self.take.recorded.since_start
+
+    @property
     def moving(self) -> Mask:
         """Frames after the first command."""
-        return self.take.recorded.time >= self.take.measurement.starts_at
+        return np.asarray(self.since >= 0.0)
 
     def columns(self, joint: str | None = None) -> NDArray[np.int_]:
         """Of one joint's channels; of all."""
@@ -219,7 +224,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
-    since = t.recorded.time - t.measurement.starts_at
+    since = t.recorded.since_start
     role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
     if t.spec.base == "fixed":
         part = np.mod(np.floor(since / PART).astype(int), 3)

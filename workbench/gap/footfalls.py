@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from workbench.recording.take import Take
 from workbench.robot import FEET, RobotModel
+from workbench.robot.files import cached_by_content
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
     return out
 
 
-@lru_cache(maxsize=16)
+@cached_by_content(maxsize=16)
 def foot_points(path: Path) -> dict[str, tuple[Array, Array]]:
     """Points (M, 3) [m] on each foot's link that may touch the ground, with radii (M,), by the knee's joint.
 

@@ -97,13 +97,13 @@ class Jury:
 
     def early(self, residuals: dict[int, Array], until: float) -> dict[int, Array]:
         """Residuals, or channels, as a question with this `until` would have them."""
-        return {i: np.where(self._since(i)[:, None] <= until, r, np.nan) for i, r in residuals.items()}
+        return {i: np.where(self.evidence[i].since[:, None] <= until, r, np.nan) for i, r in residuals.items()}
 
     def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
         """One rollout; each take's own servo changes apply."""
         e = self.evidence[take]
         spec = e.take.spec
-        frames = self._since(take)
+        frames = e.since
         times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
         duration = float(times[-1]) + 2e-3
         return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
@@ -141,7 +141,7 @@ class Jury:
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            stretch = i * STRETCHES + np.floor(self._since(i)[e.uses[use]] / BLOCK).astype(int)
+            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / BLOCK).astype(int)
             parts.append(np.repeat(stretch, len(e.channels)))
         return np.concatenate(parts)
 
@@ -171,11 +171,6 @@ class Jury:
             gaps = channel_gaps(e, r) if e.take.spec.base == "fixed" else {}
             slight.append(np.array([e.channels[c] in gaps for c in e.columns(joint)], dtype=bool))
         return np.where(np.concatenate(slight) & (cost <= most), expected, most)
-
-    def _since(self, take: int) -> Array:
-        """Time of each frame after the first command [s]."""
-        e = self.evidence[take]
-        return e.take.recorded.time - e.take.measurement.starts_at
 
     def _length(self, take: int, until: float = np.inf) -> float:
         """Of a rollout [s], a walk counting more as it takes longer."""

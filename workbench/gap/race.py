@@ -124,10 +124,8 @@ class Trying:
         c = self.group[0]
         sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
         probes = _scan(c, sizes, self.walking)
-        plainly = replace(self._question([], []), step=COARSE)
-        asked = [replace(self._question(which, [p] * len(which)), takes=self.looked_at, step=COARSE, until=self.until)
-                 for which, p in (([], probes[0]), *((everyone, p) for p in probes))]
-        self.without, plain, *answers = yield [plainly, *asked]
+        looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
+        plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
         before = self._left(plain)
         self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), before)] for a in answers], self.until
         return self._guessed(*self.signatures[self._name])
@@ -145,7 +143,8 @@ class Trying:
     def _shown(self) -> float:
         """How long a walk is looked at [s]."""
         seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
-        while self.jury.cost(self.jury.early(seen, until), "fit") < LOOKED_SHARE * self.jury.cost(seen, "fit"):
+        least = LOOKED_SHARE * sum(self.power[i] for i in self.looked_at)
+        while self.jury.cost(self.jury.early(seen, until), "fit") < least:
             until += LOOKED / 2
         return until
 
@@ -163,7 +162,8 @@ class Trying:
         """Sizes after one step, and after all steps where the group is not behind by then."""
         bounds = [self.group[b].bounds() for b in alive]
         points = [[share * x for x in starts] for share in ((1.0, 0.5) if self.walking else (1.0,))]
-        firsts = [self._left(self._told(a)) for a in (yield [self._question(alive, p) for p in points])]
+        self.without, *answers = yield [self._question([], []), *(self._question(alive, p) for p in points)]
+        firsts = [self._left(self._told(a)) for a in answers]
         nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
 
         def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None

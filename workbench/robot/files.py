@@ -3,11 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import lru_cache, wraps
 from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar
 
 from workbench.robot.errors import InputError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], T]], Callable[Concatenate[Path, P], T]]:
+    """`lru_cache` for functions of a file (its path comes first): one that was written anew is read anew."""
+
+    def decorate(read: Callable[Concatenate[Path, P], T]) -> Callable[Concatenate[Path, P], T]:
+        @lru_cache(maxsize=maxsize)
+        def known(path: Path, content: bytes | None, *args: P.args, **kwargs: P.kwargs) -> T:
+            return read(path, *args, **kwargs)
+
+        @wraps(read)
+        def cached(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
+            content = None
+            with suppress(OSError):  # `read` says what is wrong
+                content = path.read_bytes()
+            return known(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
+
+        return cached
+
+    return decorate
 
 
 def read_text(path: str | Path) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot.errors import InputError
+from workbench.robot.files import cached_by_content
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,7 @@ class Kinematics:
     @staticmethod
     def from_file(path: Path) -> Kinematics:
         """Parses an SDF or URDF; InputError if Drake cannot."""
-        path = Path(path)
-        return _parse(path, written=path.read_bytes() if path.is_file() else None)
+        return _parse(Path(path))
 
     @staticmethod
     def from_text(text: str, path: Path) -> Kinematics:
@@ -114,9 +113,8 @@ def rotation_about(axis: Array, angle: Array) -> Array:
     return np.asarray(np.eye(3) + s * K + (1 - c) * (K @ K), dtype=float)
 
 
-@lru_cache(maxsize=32)
-def _parse(path: Path, text: str | None = None, written: bytes | None = None) -> Kinematics:
-    """written: what the file holds, so that one that was written anew is read anew."""
+@cached_by_content(maxsize=32)
+def _parse(path: Path, text: str | None = None) -> Kinematics:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import RevoluteJoint, WeldJoint
