@@ -49,6 +49,18 @@ def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     assert _guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
 
 
+def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_not_scaled():
+    c = Candidate.of(known_effects()["stribeck_friction"], ("flm",), (0.0, 20.0))
+    probes = _scan(c, (1.0, 4.0), False)
+    assert sorted({round(c.values(p)[1]) for p in probes}) == [5, 20, 80]
+    assert {p[1] for p in _scan(c, (1.0,), True)} == {0.0}  # walks are expensive
+    r0 = np.linspace(-1.0, 1.0, 20)
+    fades = [r0 * (1 - 0.3 * p[0]) if p[1] == 2.0 else r0 + 0.01 * p[0] for p in probes]
+    x, gain = _guess(c, r0, probes, fades, 5.0)
+    assert x == pytest.approx([1 / 0.3, 2.0])
+    assert gain == pytest.approx(r0 @ r0)
+
+
 def test_rivals_know_the_best_at_their_joint_and_of_all():
     race = Race()
     _tell(race.reached, ["flm", None], [3.0, 8.0])

@@ -81,6 +81,12 @@ class Candidate:
         """How many numbers are fitted."""
         return self.held.count(False)
 
+    @property
+    def shapes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those of numbers that only shape the effect."""
+        fitted = [(n, t) for n, t, held in zip(self.neutral, self.typical, self.held) if not held]
+        return np.array([n == t for n, t in fitted], dtype=bool)
+
     def values(self, x: Sequence[float] | Array) -> list[float]:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
         x = np.asarray(x, dtype=float)

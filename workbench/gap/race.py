@@ -20,6 +20,8 @@ T = TypeVar("T")
 SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
 """Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two sizes,
 and those of several numbers at the last, beyond what a walk makes of anything small."""
+SHAPED = (0.0, 2.0, -2.0)
+"""Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 LOOKED, LOOKED_SHARE = 2.5, 0.3
@@ -220,7 +222,8 @@ def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
         return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
     lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
     ways = (1.0, -1.0) if lifts else (1.0,)
-    points = [np.clip(w * s * probes[0], low, high) for s in sizes for w in ways]
+    shapes = SHAPED if c.shapes.any() and not walking else (0.0,)
+    points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
@@ -230,15 +233,16 @@ def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Arra
     if not c.size:
         return np.empty(0), whole - float(seen[0] @ seen[0])
     low, high = c.bounds()
-    if np.linalg.matrix_rank(np.array(probes)) > 1:  # several numbers, not one at several sizes
+    if np.linalg.matrix_rank(np.array(probes)[:, ~c.shapes]) > 1:  # several numbers, not one at several sizes
         return _bent_guess(r0, np.array(probes), np.array(seen), (low, high), 2 * far)
     best = (probes[0], -np.inf)
     for p, v in zip(probes, seen):
         S = v - r0
         power = float(S @ S)
         size = float(np.clip(-(S @ r0) / power, -far, far)) if power > 1e-9 else 0.0
-        x = np.clip(size * p, low, high)
-        gain = whole - float(np.sum((r0 + S * float(x @ p / max(float(p @ p), 1e-9))) ** 2))
+        x = np.clip(np.where(c.shapes, p, size * p), low, high)
+        size = float(x[~c.shapes] @ p[~c.shapes] / max(float(p[~c.shapes] @ p[~c.shapes]), 1e-9))
+        gain = whole - float(np.sum((r0 + S * size) ** 2))
         if gain > best[1]:
             best = (x, gain)
     return best

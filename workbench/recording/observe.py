@@ -24,9 +24,9 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
     pose and its base's origin at rest where the recorded one stood, as in `take_from_recording`; and the path of each asset
     that has a pivot, in the capture's axes. Before the simulation's first instant the robot stands still; after its last, NaN.
 
-    Bodies are where the take's `links` are, else where the model's kinematics has them. Where they do not follow the model, the
-    robot stands free and may lean at rest, or an asset's frame is turned, joint angles are read off the bodies just as from a
-    recording; joints between bodies that are not tracked keep the rollout's own angle, and have NaN off the axis.
+    Bodies are where the take's `links` are, else where the model's kinematics has them. Joint angles are read off the bodies just
+    as from a recording, as a robot that leans or droops at rest turns about axes that lean; joints between bodies that are not
+    tracked keep the rollout's own angle, and have NaN off the axis.
     """
     m = measurement
     start = 0.0 if np.isnan(take.starts_at) else take.starts_at
@@ -47,7 +47,7 @@ def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array
         off_axis=None if seen.off_axis is None else seen.off_axis - _rest_off_axis(take),
         bodies={a: BodyTrack(turned(b.p - [m.origin[0], m.origin[1], 0.0], -m.yaw), turned_quaternion(b.quat, -m.yaw))
                 for a, b in bodies.items()})
-    if bodies and (take.links or m.frames or take.base == "free"):  # a robot that leans at rest turns about leaning axes
+    if bodies:
         zeroed = _as_bodies_say(zeroed, bodies, m, model)
     return zeroed, {a: BodyTrack(capture_axes(b.p), np.concatenate([b.quat[:, :1], capture_axes(b.quat[:, 1:])], axis=1))
                     for a, b in bodies.items()}
