@@ -1,10 +1,11 @@
 """Rivals in each other's place: the better one takes it, whoever was taken first."""
 
+import numpy as np
 import pytest
 
 from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import contest
+from workbench.gap.contest import Rival, Standing, contest, doubted
 from workbench.gap.jury import Jury
 from workbench.gap.search import Search
 from workbench.gap.selection import Chosen, Round
@@ -33,6 +34,20 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
     assert fit.cost["choose"] < first.cost["choose"]
     assert standings[0].probability > 0.5
     assert [r.candidate.name for r in standings[0].rivals] in ([], ["viscous_friction"])
+
+
+def test_what_leaves_much_at_its_place_is_less_sure(worn):
+    session, search = worn
+    friction = next(c for c in candidates(session.model, search.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
+    right = search.refitted(search.evaluated([(friction, np.array([1.0]))]), (0,), 3)
+    far = search.evaluated([(friction, 3.0 * right.x)])
+    standings = [Standing(0.9, (Rival(friction, right.x, 10.0, 0.08),))]
+    floors = {0: np.zeros(len(search.jury.evidence[0].channels))}
+    assert doubted(search, right, standings, floors) == standings
+    (less,) = doubted(search, far, standings, floors)
+    assert less.probability < 0.5
+    assert less.rivals[0].probability == pytest.approx(0.08 / 0.9 * less.probability)
+    assert doubted(search, far, standings, {0: 100 + floors[0]}) == standings  # all below the fit's own floor
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

@@ -104,7 +104,8 @@ def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round]
     for c, standing in zip(fit.effects, standings):
         for rival in standing.rivals:
             if rival.candidate.key not in kept and rival.fit is not None:
-                reason = f"in place of {c} it leaves {rival.behind:.0f} more of chi squared on stretches that no fit saw"
+                more = f"{rival.behind:.0f} more" if rival.behind >= 0 else f"only {-rival.behind:.0f} less"
+                reason = f"in place of {c} it leaves {more} of chi squared on stretches that no fit saw"
                 left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate")
                 out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where, reason, left)
     for r in rounds:

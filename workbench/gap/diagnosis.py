@@ -12,7 +12,7 @@ import numpy as np
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
 from workbench.gap.conclusions import finding, posterior, rejected, unexplained, verdict_of
-from workbench.gap.contest import Standing, contest
+from workbench.gap.contest import Standing, contest, doubted
 from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis
@@ -70,11 +70,12 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit
+    floors = search.floors(fit) if fit.effects else {}
+    standings = doubted(search, fit, standings, floors)
     model = fit.model(session.model)
     model = replace(model, effects=(*model.effects, *(m.spec for m in missed)))
     findings = tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, fit.residuals) for i in range(len(fit.effects)))
-    floors = search.floors(fit) if fit.effects else {}
     left = unexplained(evidence, fit.residuals, floors) if gap else ()
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)
