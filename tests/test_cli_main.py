@@ -39,7 +39,8 @@ def test_help_comes_at_once_and_loads_no_heavy_module() -> None:
     assert float(seconds) < 0.5
 
 
-@pytest.mark.parametrize("arguments", [[], ["dance"], ["inspect"], ["inspect", "a", "b"], ["inspect", "--jason", "a"]])
+@pytest.mark.parametrize("arguments", [[], ["dance"], ["inspect"], ["inspect", "a", "b"], ["inspect", "--jason", "a"],
+                                       ["diagnose", "session.yaml", "--out", ""]])
 def test_wrong_arguments_are_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(arguments)

@@ -25,6 +25,14 @@ def test_a_quiet_robot_has_no_gap_and_a_damaged_take_is_named_and_left_out(tmp_p
     assert [name for name, _ in told.diagnosis.left_out] == ["torn"]
 
 
+def test_what_is_too_slight_for_a_name_and_does_not_show_on_unseen_stretches_is_no_gap_but_booked(tmp_path):
+    record_arm(tmp_path, friction=0.084)
+    said = diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1).diagnosis
+    assert [(g.where, g.take) for g in said.gap] == [(("three",), "wave")]
+    assert said.findings == said.unexplained == ()
+    assert said.verdict == "no_gap"
+
+
 def test_a_take_too_short_to_conclude_from_says_so(tmp_path):
     path = record_arm(tmp_path)
     lines = path.read_text().splitlines(keepends=True)

@@ -24,8 +24,15 @@ def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None
     """--out: the folder for results."""
     said = "; is made if need be, other files in it stay"
     parser.add_argument(
-        "--out", metavar="DIR", type=Path, required=default is None, default=default and Path(default),
+        "--out", metavar="DIR", type=_folder, required=default is None, default=default and Path(default),
         help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))
+
+
+def _folder(text: str) -> Path:
+    """A folder's path, for argparse; empty is a shell variable that nobody set, not here."""
+    if not text:
+        raise argparse.ArgumentTypeError("expected a folder")
+    return Path(text)
 
 
 def load_model(name: str) -> RobotModel:

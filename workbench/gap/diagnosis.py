@@ -21,7 +21,7 @@ from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
 from workbench.gap.registered import Progress, no_progress, read_takes, register_takes
 from workbench.gap.search import Fit, Search
-from workbench.gap.selection import select
+from workbench.gap.selection import select, too_little_left
 from workbench.gap.session import Base, Session
 from workbench.gap.special import special
 from workbench.gap.story import TakeStory
@@ -77,10 +77,13 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     findings = tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, fit.residuals) for i in range(len(fit.effects)))
     left = unexplained(evidence, fit.residuals, floors) if gap else ()
+    # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
+    slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
+    verdict = verdict_of(bool(gap) and not slight, findings, left)
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
-        verdict=verdict_of(bool(gap), findings, left), model=model, nominal=session.model, gap=gap, findings=findings,
+        verdict=verdict, model=model, nominal=session.model, gap=gap, findings=findings,
         rejected=rejected(evidence, fit, chosen.rounds, standings, nominal.residuals), unexplained=left,
         posterior=posterior(fit, missed),
         next_experiment=None if experiment is None else experiment.entry(MOTION),

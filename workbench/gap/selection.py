@@ -127,7 +127,7 @@ def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit
     stopped = False
     while len(current.effects) < MOST_EFFECTS and not stopped:
         beyond = _remaining(search, current, nominal, takes)
-        if not beyond or _too_little_left(search, current, takes, rounds):
+        if not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
@@ -162,7 +162,7 @@ def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[
     return (yield from search.refitting(start, takes, MOST_STEPS))
 
 
-def _too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
+def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect, beside those of the whole robot."""
     jury, left = search.jury, 0.0
     for i in takes:
