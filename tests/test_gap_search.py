@@ -129,7 +129,7 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
             continue
         neutral = c.values(np.zeros(c.size))
         assert all(v == n or (n == np.inf and v == p.high) for v, n, p in zip(neutral, c.neutral, c.parameters)), str(c)
-        ones = [2 * n if n == t else t for t, n in zip(c.typical, c.neutral)]
+        ones = [2 * n if p.shapes else t for t, n, p in zip(c.typical, c.neutral, c.parameters)]
         assert c.values(np.ones(c.size)) == pytest.approx(ones)
         low, high = c.bounds()
         assert (low <= 0).all()
@@ -137,6 +137,16 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
         held = replace(c, held=(True,) * len(c.neutral))
         assert held.size == 0
         assert held.values(np.empty(0)) == pytest.approx(c.typical)
+
+
+@pytest.mark.parametrize(("name", "own"), [("ground_friction", 0.4), ("foot_friction", 0.31), ("supply_voltage", 10.0)])
+def test_a_robot_whose_own_value_is_the_typical_one_is_asked_about_another(name, own):
+    c = Candidate.of(known_effects()[name], (), (own,))
+    probed, = c.values(c.probes()[0])
+    assert abs(probed - own) == pytest.approx(0.2 * own)
+    np.testing.assert_allclose([c.values(end) for end in c.bounds()], [[c.parameters[0].high], [c.parameters[0].low]])
+    far = Candidate.of(known_effects()[name], (), (1.5 * own,))
+    assert far.values(far.probes()[0]) == [far.parameters[0].typical]
 
 
 def test_blocks_are_fitted_apart_in_common_points_and_within_bounds():

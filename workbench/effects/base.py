@@ -29,11 +29,17 @@ Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
 
+DEGREE = math.pi / 180
+NEAR, BEYOND = 0.08, 0.8
+"""Shares of the robot's own value within which the typical one is too near to it, and the one taken instead."""
+
 
 @dataclass(frozen=True)
 class Parameter:
     """A number of an effect, in the contract's unit; `si` times it is SI. low, high: what is physically possible. typical: where
-    it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them."""
+    it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them. shapes: it
+    only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it takes the place of a
+    value that the nominal robot has, which is then neutral."""
 
     name: str
     unit: str
@@ -42,9 +48,13 @@ class Parameter:
     typical: float
     si: float = 1.0
     vector: bool = False
+    shapes: bool = False
+    replaces: bool = False
 
-
-DEGREE = math.pi / 180
+    def typical_beside(self, neutral: float) -> float:
+        """The typical value, or where the robot's own lies so near that the step between them would show nothing, one beyond."""
+        near = self.replaces and abs(self.typical - neutral) < NEAR * abs(neutral)
+        return BEYOND * neutral if near else self.typical
 
 
 class Effect:
@@ -63,7 +73,7 @@ class Effect:
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         """The values, in the contract's units, at which the effect vanishes: infinity for a stiffness or a ceiling, the
-        typical value for a number that only shapes the effect."""
+        typical value for a number that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:

@@ -14,7 +14,7 @@ class FootFriction(Effect):
     name = "foot_friction"
     layer = "ground"
     places = ("foot",)
-    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3),)
+    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Friction of foot {', '.join(spec.where)} on the floor is {spec.parameters['friction']:.2f}."

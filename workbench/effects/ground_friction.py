@@ -15,7 +15,7 @@ class GroundFriction(Effect):
     name = "ground_friction"
     layer = "ground"
     places = ("robot",)
-    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4),)
+    parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Friction of feet and floor is {spec.parameters['friction']:.2f}."

@@ -35,7 +35,9 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     layer = "actuator"
     places = ("joint",)
-    parameters = (Parameter("torque", "N m", 0.0, 1.5, 0.05), Parameter("speed", "deg/s", 0.5, 400.0, 20.0, si=DEGREE))
+    parameters = (
+        Parameter("torque", "N m", 0.0, 1.5, 0.05),
+        Parameter("speed", "deg/s", 0.5, 400.0, 20.0, si=DEGREE, shapes=True))
 
     def sentence(self, spec: EffectSpec) -> str:
         return (f"{', '.join(spec.where)} sticks: {scalar(spec, 'torque'):.3f} N m more dry friction at rest, "

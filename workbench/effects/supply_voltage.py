@@ -19,7 +19,7 @@ class SupplyVoltage(Effect):
     name = "supply_voltage"
     layer = "actuator"
     places = ("robot",)
-    parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0),)
+    parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The servos see {spec.parameters['voltage']:.1f} V."

@@ -35,7 +35,7 @@ ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
-    speed at which friction fades), whose neutral value is its typical one, x is the number of doublings. held: by number, whether
+    speed at which friction fades) x is the number of doublings. held: by number, whether
     it is no matter of fitting (an axis that was read off the recording)."""
 
     effect: Effect
@@ -49,7 +49,8 @@ class Candidate:
     def of(effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
            held: Sequence[bool] | None = None) -> Candidate:
         """typical: default the effect's own."""
-        own = tuple(p.typical for p in effect.parameters for _ in range(3 if p.vector else 1))
+        parameters = [p for p in effect.parameters for _ in range(3 if p.vector else 1)]
+        own = tuple(p.typical_beside(n) for p, n in zip(parameters, neutral))
         return Candidate(effect, where, tuple(neutral), tuple(typical or own), tuple(held or (False,) * len(own)))
 
     @property
@@ -84,8 +85,7 @@ class Candidate:
     @property
     def shapes(self) -> NDArray[np.bool_]:
         """Of the sizes, those of numbers that only shape the effect."""
-        fitted = [(n, t) for n, t, held in zip(self.neutral, self.typical, self.held) if not held]
-        return np.array([n == t for n, t in fitted], dtype=bool)
+        return np.array([p.shapes for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
@@ -101,7 +101,7 @@ class Candidate:
             elif math.isinf(n):
                 value = t / max(size, t / p.high)
             else:
-                value = n * 2.0**size if n == t else n + size * (t - n)
+                value = n * 2.0**size if p.shapes else n + size * (t - n)
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 
@@ -113,7 +113,7 @@ class Candidate:
                 continue
             if math.isinf(n):
                 ends = [0.0, t / p.low]
-            elif n == t:
+            elif p.shapes:
                 ends = [math.log2(end / n) if end > 0 else -10.0 for end in (p.low, p.high)]
             else:
                 ends = [(end - n) / (t - n) for end in (max(p.low, n - self.reach), min(p.high, n + self.reach))]
@@ -129,8 +129,8 @@ class Candidate:
         if self.point_mass:
             return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
         scalar = any(not p.vector for p in self.effect.parameters)
-        fitted = [(p, n, t) for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held) if not held]
-        shown = [i for i, (p, n, t) in enumerate(fitted) if n != t and not (scalar and p.vector)]
+        fitted = [p for p, held in zip(self.parameters, self.held) if not held]
+        shown = [i for i, p in enumerate(fitted) if not p.shapes and not (scalar and p.vector)]
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
 
     def around(self) -> list[Array]:

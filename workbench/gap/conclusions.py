@@ -71,7 +71,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
         half = Z90 * np.sqrt(np.diag(slopes @ covariance @ slopes.T))
         ends = np.array([values - half, values + half])
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
-    neutral = np.array([n if np.isfinite(n) and n != t else 0.0 for n, t in zip(c.neutral, c.typical)])
+    neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     unknown = np.array([True] * len(values))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
+from workbench.gap.evidence import joint_of, ratios
 from workbench.gap.race import Part, Trial
 from workbench.gap.search import Fit, Report, Search
 from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
@@ -88,11 +89,12 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array]) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place. floors: of the fit, by take."""
-    left = {i: fit.residuals[i] / np.hypot(1.0, floors[i]) for i in search.held if i in floors}
+    left = [(channel, r) for i in search.held if i in floors
+            for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out = []
     for c, s in zip(fit.effects, standings):
         told_held = search.is_settled(c) or search.held == search.fitted
-        worst = search.jury.worst(left, "choose", c.joint) if told_held else 0.0
+        worst = max((r for channel, r in left if told_held and c.joint in (None, joint_of(channel)) and r == r), default=0.0)
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out

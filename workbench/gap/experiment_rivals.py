@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,14 +59,16 @@ class Rival:
             neutral = iter(effect.neutral(self.model))
             for p in effect.parameters:
                 given = spec.parameters[p.name]
-                out += [_Number(float(v), p.low, p.high, p.typical, next(neutral), p.vector)
-                        for v in (given if isinstance(given, tuple) else (given,))]
+                for v in given if isinstance(given, tuple) else (given,):
+                    n = next(neutral)
+                    out.append(_Number(float(v), p.low, p.high, p.typical_beside(n), math.inf if p.shapes else n, p.vector))
         return out
 
 
 @dataclass(frozen=True)
 class _Number:
-    """One number of an effect and its bounds; neutral: where the effect vanishes; part: of a vector."""
+    """One number of an effect and its bounds; neutral: where the effect vanishes, infinite of one that only shapes it; part: of
+    a vector."""
 
     value: float
     low: float
@@ -77,7 +80,7 @@ class _Number:
     @property
     def felt(self) -> float:
         """What there is of it: its distance from neutral, where that is finite, and no less than a fifth of the typical one."""
-        if not np.isfinite(self.neutral) or self.neutral == self.typical:
+        if not np.isfinite(self.neutral):
             return abs(self.value)
         least = abs(self.typical - self.neutral)
         return max(abs(self.value - self.neutral), least if self.part else 0.2 * least)

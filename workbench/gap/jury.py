@@ -136,11 +136,6 @@ class Jury:
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
-    def worst(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
-        """The largest RMS over sigma of any channel; 0 of none."""
-        cost, expected = self._by_channel(residuals, use, joint)
-        return float(np.sqrt(np.max(cost / np.maximum(expected, 1e-9), initial=0.0)))
-
     def stretches(self, takes: Sequence[int], use: str) -> NDArray[np.int_]:
         """For each number of `vector`, which stretch of which take it is of."""
         parts = [np.empty(0, dtype=int)]

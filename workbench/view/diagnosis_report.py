@@ -142,13 +142,12 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
         over = list(dict.fromkeys(place for g in ledger for place in g.where))
         over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
         named = over if len(over) < 6 else [*over[:4], f"{len(over) - 4} more places"]
-        if diagnosis.verdict == "no_gap":
+        if over and diagnosis.verdict != "no_gap":
+            said = f"The recordings leave the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
+        else:
             said = "Nowhere do the recordings leave the nominal model by more than chance" + (
                 "; the table shows what comes nearest." if diagnosis.gap else ".")
-        else:
-            said = f"The recordings leave the nominal model at {listed(named)}. {layers_of(diagnosis)}" if over else (
-                "Nowhere do the recordings leave the nominal model by more than chance.")
-        parts.append(Text(said.strip()))
+        parts.append(Text(said))
         at_joints: dict[str, float] = {}
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
