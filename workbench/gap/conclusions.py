@@ -99,6 +99,7 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
 def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
              ) -> tuple[Rejected, ...]:
     """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
+    unseen = any(e.uses["validate"].any() for e in evidence)
     kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, standings) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
     for c, standing in zip(fit.effects, standings):
@@ -106,7 +107,7 @@ def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round]
             if rival.candidate.key not in kept and rival.fit is not None:
                 more = f"{rival.behind:.0f} more" if rival.behind >= 0 else f"only {-rival.behind:.0f} less"
                 reason = f"in place of {c} it leaves {more} of chi squared on stretches that no fit saw"
-                left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate")
+                left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
                 out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where, reason, left)
     for r in rounds:
         for t in r.trials:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,23 +11,24 @@ import numpy as np
 
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
-from workbench.gap.conclusions import finding, posterior, rejected, unexplained, verdict_of
+from workbench.gap.conclusions import Residuals, finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.contest import Standing, contest, doubted
 from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis
-from workbench.gap.jury import Jury
+from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
 from workbench.gap.registered import Progress, no_progress, read_takes, register_takes
 from workbench.gap.search import Fit, Search
 from workbench.gap.selection import select, too_little_left
 from workbench.gap.session import Base, Session
+from workbench.gap.share import floors_everywhere, searched, share_of
 from workbench.gap.special import special
 from workbench.gap.story import TakeStory
 from workbench.motion.motion import Motion
 from workbench.recording.take import Take
-from workbench.robot import InputError
+from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
 
 STEP = 2e-3
@@ -64,7 +65,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     nominal = Search(jury, session.model).evaluated([])
     gap = ledger(evidence, nominal.residuals)
     jury, missed = with_missed(jury, session.model, nominal.residuals)
-    search = Search(jury, session.model)
+    looked_at = searched(jury.evidence, nominal.residuals)
+    search = Search(jury.on(looked_at), session.model)
     pool = candidates(session.model, evidence) + special(session.model, evidence, nominal.residuals)
     chosen = select(search, pool, progress, thorough)
     fit, standings = contest(search, chosen, progress)
@@ -72,11 +74,16 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     fit = search.refined(fit) if fit.effects else fit
     floors = search.floors(fit) if fit.effects else {}
     standings = doubted(search, fit, standings, floors)
-    model = fit.model(session.model)
-    model = replace(model, effects=(*model.effects, *(m.spec for m in missed)))
+    fitted = fit.model(session.model)
+    model = replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed)))
+    after, rough = fit.residuals, floors
+    if share_of(looked_at):
+        progress("rolling out whole takes", None)
+        after = jury.residuals([Question(fitted, tuple(range(len(evidence))))])[0]
+        rough = floors_everywhere(looked_at, floors)
     findings = tuple(m.finding() for m in missed) + tuple(
-        finding(evidence, fit, i, standings[i], nominal.residuals, fit.residuals) for i in range(len(fit.effects)))
-    left = unexplained(evidence, fit.residuals, floors) if gap else ()
+        finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
+    left = unexplained(evidence, after, rough) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
     slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
     verdict = verdict_of(bool(gap) and not slight, findings, left)
@@ -84,12 +91,13 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
         verdict=verdict, model=model, nominal=session.model, gap=gap, findings=findings,
-        rejected=rejected(evidence, fit, chosen.rounds, standings, nominal.residuals), unexplained=left,
+        rejected=rejected(looked_at, fit, chosen.rounds, standings, nominal.residuals), unexplained=left,
         posterior=posterior(fit, missed),
         next_experiment=None if experiment is None else experiment.entry(MOTION),
-        provenance=provenance(session.model, config, time.monotonic() - began) | {"seed": 0, "rollouts": search.jury.rollouts},
+        provenance=provenance(session.model, config, time.monotonic() - began)
+        | {"seed": 0, "rollouts": search.jury.rollouts} | share_of(looked_at),
         stopped=chosen.stopped, left_out=unreadable + unregistered)
-    stories = _stories(search.jury, evidence, unfitted, nominal, fit, diagnosis)
+    stories = _stories(jury, unfitted, nominal.residuals, after, fitted if findings else None)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
 
 
@@ -117,14 +125,15 @@ def _experiment(session: Session, evidence: Sequence[TakeEvidence], fit: Fit, st
     return experiment if experiment.entry(MOTION) is not None else None
 
 
-def _stories(jury: Jury, evidence: Sequence[TakeEvidence], nominal: dict[str, Take], before: Fit, after: Fit, diagnosis: Diagnosis
+def _stories(jury: Jury, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
              ) -> tuple[TakeStory, ...]:
-    was = [e.take.observed(nominal[e.name]) for e in evidence]
-    now = jury.observed(after.model(diagnosis.nominal), jury.config) if diagnosis.findings else was
+    """What each take was and is. fitted: the model with its effects; None: nothing was found."""
+    was = [e.take.observed(nominal[e.name]) for e in jury.evidence]
+    now = was if fitted is None else jury.observed(fitted, jury.config)
     out = []
-    for i, e in enumerate(evidence):
-        ill = channel_gaps(e, before.residuals[i])
+    for i, e in enumerate(jury.evidence):
+        ill = channel_gaps(e, before[i])
         shown = [k for k, c in enumerate(e.channels) if ACROSS not in c or c in ill]  # across the axes there is mostly nothing
         out.append(TakeStory(replace(e.take.recorded, name=e.name), was[i], now[i], tuple(e.channels[k] for k in shown),
-                             before.residuals[i][:, shown], after.residuals[i][:, shown], e.uses["validate"]))
+                             before[i][:, shown], after[i][:, shown], e.uses["validate"]))
     return tuple(out)

@@ -57,7 +57,8 @@ class TakeEvidence:
     Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
     measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
     the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
-    the first command's time was estimated, so that every model may shift it; else by no more than LOOP.
+    the first command's time was estimated, so that every model may shift it; else by no more than LOOP. until: how long after the
+    first command models are asked about it [s]; 0: not at all.
     """
 
     take: RegisteredTake
@@ -68,6 +69,7 @@ class TakeEvidence:
     uses: Mapping[str, Mask]
     weight: Array
     start_is_free: bool
+    until: float = np.inf
 
     @property
     def name(self) -> str:

@@ -164,7 +164,7 @@ class NextExperiment:
 class Diagnosis:
     """All that a session says. model: nominal with the findings' effects; posterior: of their parameters. left_out: damaged
     takes, (name, reason). stopped: whether the search came to its limit of work. provenance: workbench, drake, model_sha256,
-    seed, seconds."""
+    seed, seconds; searched: of long sessions, the seconds by take that the search looked at."""
 
     verdict: Verdict
     model: RobotModel

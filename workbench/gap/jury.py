@@ -53,24 +53,26 @@ class Jury:
         self._known: dict[str, Array] = {}
 
     def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
-        """For each question, residuals (N, c) by take."""
+        """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
         keys: list[dict[int, str]] = []
         new: dict[str, tuple[Question, int, RobotModel]] = {}
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
             keys.append({i: self._key(model, i, q) for i, model in felt.items()})
             asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
-            self.work += sum(self._length(i, q.until) for _, i, _ in asked.values()) / q.step
+            self.work += sum(self._length(i, self._until(i, q)) for _, i, _ in asked.values()) / q.step
             new |= asked
+        self._known |= {key: np.full_like(self.evidence[i].recorded, np.nan)
+                        for key, (q, i, _) in new.items() if not self._until(i, q)}
         new = {key: what for key, what in new.items() if not self._recalled(key)}
         # the longest first, so that no core waits at the end
-        order = sorted(new, key=lambda key: -self._length(new[key][1], new[key][0].until) / new[key][0].step)
-        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), q.until)
+        order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
+        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), self._until(i, q))
                 for q, i, model in (new[k] for k in order)]
         self.rollouts += len(order)
         for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
             q, i, _ = new[key]
-            self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, q.until)[i])
+            self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, self._until(i, q))[i])
         return [{i: self.evidence[i].residual(self._known[key], corrected=q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
@@ -187,8 +189,12 @@ class Jury:
     def _key(self, felt: RobotModel, take: int, q: Question) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
-        until = "" if np.isinf(q.until) else f"-until{q.until:.6g}"
-        return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}{until}"
+        until = self._until(take, q)
+        return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}" + ("" if np.isinf(until) else f"-until{until:.6g}")
+
+    def _until(self, take: int, q: Question) -> float:
+        """How long a question looks at a take [s]."""
+        return min(q.until, self.evidence[take].until)
 
     def _recalled(self, key: str) -> bool:
         """Whether an answer is known, now or from a run before."""

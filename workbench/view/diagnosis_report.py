@@ -108,6 +108,8 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
     if stories:
         what.append(f"Judged on stretches of {listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
+    if seen := diagnosis.provenance.get("searched"):
+        what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")

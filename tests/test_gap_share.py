@@ -1,0 +1,104 @@
+"""Of long recordings a search looks at a share."""
+
+import numpy as np
+import pytest
+
+from tests.gap_sessions import record_arm, session_content, write_session
+from workbench.gap import share
+from workbench.gap.compare_session import roll_out, run_of
+from workbench.gap.diagnosis import diagnose_session
+from workbench.gap.evidence import gather
+from workbench.gap.jury import Jury, Question
+from workbench.gap.registered import read_takes, register_takes
+from workbench.gap.session import load_session
+from workbench.gap.share import floors_everywhere, searched, share_of
+from workbench.simulation import SimulationConfig
+
+CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
+
+
+def write_two_takes(folder, use=None):
+    """One with a stiff joint, one without."""
+    for k, (name, friction) in enumerate((("worn", 0.16), ("well", 0.06))):
+        record_arm(folder, name, friction, seed=k)
+    wave = session_content()["takes"][0]
+    takes = [wave | {"name": n, "recording": f"takes/{n}.csv"} | ({"use": use[n]} if use else {}) for n in ("worn", "well")]
+    return load_session(write_session(folder, session_content() | {"takes": takes}))
+
+
+def evidence_of(session):
+    takes, _ = read_takes(session)
+    rollouts = {t.spec.name: r for t, r in zip(takes, roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1))}
+    registered, _ = register_takes(session, takes, {n: r.nominal for n, r in rollouts.items()})
+    return gather(registered, rollouts)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    session = write_two_takes(tmp_path_factory.mktemp("two"))
+    evidence = evidence_of(session)
+    jury = Jury(evidence, CONFIG, n_jobs=1)
+    return session.model, jury, jury.residuals([Question(session.model, (0, 1))])[0]
+
+
+@pytest.fixture
+def shorter(monkeypatch):
+    """What counts as long."""
+    for name, seconds in (("LONG", 3.0), ("SEARCHED", 1.7), ("PIECE", 0.8)):
+        monkeypatch.setattr(share, name, seconds)
+
+
+def test_short_sessions_are_looked_at_whole(two):
+    _, jury, residuals = two
+    assert searched(jury.evidence, residuals) == list(jury.evidence)
+    assert share_of(jury.evidence) == {}
+
+
+def test_what_is_looked_at_is_where_most_is_missing_and_no_more_than_asked(two, shorter):
+    _, jury, residuals = two
+    worn, well = searched(jury.evidence, residuals)
+    assert 0.8 <= worn.until <= 1.7
+    assert worn.until + well.until <= 1.7 + 1e-6
+    assert share_of([worn, well])["searched"]["worn"] == pytest.approx(worn.until, abs=0.05)
+    assert not any(mask[worn.since > worn.until].any() for mask in worn.uses.values())
+    assert worn.uses["fit"].any()
+    assert worn.uses["choose"].any()
+
+
+def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(two):
+    model, jury, residuals = two
+    early, never = (share._until(e, until) for e, until in zip(jury.evidence, (1.0, 0.0)))
+    other = jury.on([early, never])
+    told = other.residuals([Question(model, (0, 1))])[0]
+    assert other.rollouts - jury.rollouts == 1
+    assert np.isnan(told[1]).all()
+    assert np.isnan(told[0][early.since > 1.0]).all()
+    well_before = early.moving & (early.since < 0.9)
+    # the start shifts by what may be seen, which is less
+    np.testing.assert_allclose(told[0][well_before], residuals[0][well_before], atol=0.1)
+    floors = floors_everywhere([early, never], {0: np.ones(len(early.channels)), 1: np.zeros(len(never.channels))})
+    np.testing.assert_allclose(floors[1] * never.sigma, early.sigma)
+
+
+def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch):
+    monkeypatch.setattr(share, "LONG", 1.0)
+    session = write_two_takes(tmp_path, {"worn": "fit", "well": "validate"})
+    evidence = evidence_of(session)
+    residuals = Jury(evidence, CONFIG, n_jobs=1).residuals([Question(session.model, (0, 1))])[0]
+    assert [e.until > 0 for e in searched(evidence, residuals)] == [True, False]
+
+
+def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter, monkeypatch):
+    monkeypatch.setattr(share, "SEARCHED", 3.0)
+    for k, name in enumerate(("wave", "again")):
+        record_arm(tmp_path, name, 0.16, seed=k)
+    wave = session_content()["takes"][0]
+    takes = [wave | {"name": n, "recording": f"takes/{n}.csv"} for n in ("wave", "again")]
+    told = diagnose_session(load_session(write_session(tmp_path, session_content() | {"takes": takes})), n_jobs=1)
+    found, = told.diagnosis.findings
+    assert (found.effect, found.where) == ("coulomb_friction", ("three",))
+    assert told.diagnosis.verdict == "explained"
+    assert sum(told.diagnosis.provenance["searched"].values()) <= 3.0
+    for story in told.stories:  # of both takes, all is judged
+        assert np.isfinite(story.after[story.time > 2.0]).any()
+        assert max(story.ratios(story.after).values()) < 1.6
