@@ -80,12 +80,15 @@ def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(t
     np.testing.assert_allclose(floors[1] * never.sigma, early.sigma)
 
 
-def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch):
-    monkeypatch.setattr(share, "LONG", 1.0)
+@pytest.mark.parametrize("long", [1.0, 60.0])
+def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch, long):
+    monkeypatch.setattr(share, "LONG", long)
     session = write_two_takes(tmp_path, {"worn": "fit", "well": "validate"})
     evidence = evidence_of(session)
     residuals = Jury(evidence, CONFIG, n_jobs=1).residuals([Question(session.model, (0, 1))])[0]
-    assert [e.until > 0 for e in searched(evidence, residuals)] == [True, False]
+    looked_at = searched(evidence, residuals)
+    assert [e.until > 0 for e in looked_at] == [True, False]
+    assert ("searched" in share_of(looked_at)) is (long < 60)
 
 
 def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter, monkeypatch):

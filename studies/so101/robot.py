@@ -5,7 +5,7 @@ bam/feetech/actuator.py: 0.166 duty per radian and unit of the P register, found
 programmes (isaac-sim2real/sage, so101_lerobot_collector.py) writes P 16, I 0, D 32, and half the torque for the gripper.
 Which supply the arm had nobody says; 7.4 V is that of the published servo. What D does is not published and is not in the law.
 
-Zero and sign of the joints are the URDF's; `gravity.py` checks them against the recordings.
+Zero and sign of the joints are the URDF's; `zero.py` checks them against the recordings.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     fitted = fit.model(session.model)
     model = replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed)))
     after, rough = fit.residuals, floors
-    if share_of(looked_at):
+    if any(np.isfinite(e.until) for e in looked_at):
         progress("rolling out whole takes", None)
         after = jury.residuals([Question(fitted, tuple(range(len(evidence))))])[0]
         rough = floors_everywhere(looked_at, floors)

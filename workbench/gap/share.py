@@ -1,4 +1,4 @@
-"""Of long recordings, the share that a search looks at: it asks for hundreds of rollouts."""
+"""The share of recordings that a search looks at: it asks for hundreds of rollouts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ PIECE = 3 * len(USES) * BLOCK
 
 
 def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
-    """Takes as a search looks at them: of long sessions, each from its first command until what is missing there was seen, or not
-    at all, so that every channel's gap shows, in as many takes as it has. Takes that only validate are not looked at.
+    """Takes as a search looks at them: not those that only validate; of long sessions, each from its first command until what is
+    missing there was seen, or not at all, so that every channel's gap shows, in as many takes as it has.
 
     residuals (N, c): of the nominal robot, by take. Of what validates, nothing is used."""
     ends = [float(e.since[-1]) for e in evidence]
     fitted = [i for i, e in enumerate(evidence) if e.uses["fit"].any()]
     if sum(ends[i] for i in fitted) <= LONG:
-        return list(evidence)
+        return [e if i in fitted else _until(e, 0.0) for i, e in enumerate(evidence)]
     power = {i: _power(evidence[i], residuals[i]) for i in fitted}
     whole = np.sum([_by_name(evidence, i, p.sum(axis=0)) for i, p in power.items()], axis=0)
     shares = {i: _by_name(evidence, i, p) / np.maximum(whole, 1e-9) for i, p in power.items()}
@@ -70,8 +70,8 @@ def _until(e: TakeEvidence, until: float) -> TakeEvidence:
 
 
 def share_of(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
-    """What to say of a search that looked at a share: seconds by take that it looked at. Empty where it looked at everything."""
-    if all(np.isinf(e.until) for e in evidence):
+    """What to say of a search that looked at a share of what it might: seconds by take that it looked at; else empty."""
+    if all(np.isinf(e.until) for e in evidence if e.take.spec.use != "validate"):
         return {}
     return {"searched": {e.name: round(e.until, 1) for e in evidence if e.until > 0}}
 
