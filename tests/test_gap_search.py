@@ -203,6 +203,19 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
     assert alone.x == pytest.approx(search.settled.x)
 
 
+def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
+    session, search, _ = worn
+    (e,) = search.jury.evidence
+    effect = next(c for c in candidates(session.model, (e,)) if c.key == ("coulomb_friction", ("three",)))
+    alike = search.refitted(search.evaluated([(effect, np.array([2.0]))]), (0,), 2)
+    assert not e.contact.any()
+    moved = search.evaluated([(effect, alike.x + 0.5)]).residuals[0] - alike.residuals[0]
+    differing = Search(search.jury.on([replace(e, contact=np.nan_to_num(moved) * e.sigma)]), session.model)
+    unsure = differing.refitted(differing.evaluated([(effect, np.array([2.0]))]), (0,), 2)
+    assert unsure.x == pytest.approx(alike.x)
+    assert np.sqrt(unsure.covariance[0, 0] - alike.covariance[0, 0]) == pytest.approx(0.5, rel=0.15)
+
+
 def test_what_is_well_hides_no_gap_and_closes_none(worn):
     jury = worn[1].jury
     e = jury.evidence[0]

@@ -57,8 +57,9 @@ class TakeEvidence:
     Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
     measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
     the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
-    the first command's time was estimated, so that every model may shift it; else by no more than LOOP. until: how long after the
-    first command models are asked about it [s]; 0: not at all.
+    the first command's time was estimated, so that every model may shift it; else by no more than LOOP. contact (N, c): the
+    nominal robot with the other contact model less that with this one. until: how long after the first command models are asked
+    about it [s]; 0: not at all.
     """
 
     take: RegisteredTake
@@ -69,6 +70,7 @@ class TakeEvidence:
     uses: Mapping[str, Mask]
     weight: Array
     start_is_free: bool
+    contact: Array
     until: float = np.inf
 
     @property
@@ -203,7 +205,8 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     finer = [channels_of(t.observed(f), names) for f in r.finer]
     finest = finer[-1] if finer else nominal
     floor = _apart(finest, finer[:-1] or [nominal], moving)
-    spread = _apart(nominal, [channels_of(t.observed(o), names) for o in r.other_contact], moving)
+    others = [channels_of(t.observed(o), names) for o in r.other_contact]
+    spread = _apart(nominal, others, moving)
     noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
     resting = recorded[t.recorded.resting]
     noise = np.where(np.isnan(noise), [t.measurement.noise.get(c, np.nan) for c in names], noise)
@@ -220,9 +223,10 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
         sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
         weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
     sigma = np.maximum(sigma, 1e-6)
-    offset = np.where(np.isfinite(finest - nominal), finest - nominal, 0.0)
-    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset,
-                        _uses(t, moving, alone), weight, t.recorded.zeroed and t.spec.starts_at is None)
+    offset = np.nan_to_num(finest - nominal)
+    contact = np.nan_to_num(others[0] - nominal) if others else np.zeros_like(nominal)
+    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
+                        t.recorded.zeroed and t.spec.starts_at is None, contact)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:

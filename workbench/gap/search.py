@@ -173,7 +173,7 @@ class Search:
         x[moving] = solved.x
         covariance = np.full((len(x), len(x)), np.inf)
         stretches = self.jury.stretches(takes, "fit")
-        spread = ENGINES * np.abs(solved.x) * self._walked(solved, stretches)
+        spread = np.hypot(ENGINES * np.abs(solved.x) * self._walked(solved, stretches), self._bent_by_contact(solved, takes))
         covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
         (there,) = yield from self.evaluating(current.sizes(x))
         return self._told_held(replace(there, covariance=covariance, slopes=(Slopes(moving, takes, solved.J),)))
@@ -235,6 +235,12 @@ class Search:
         told = np.sum(solved.J**2, axis=0)
         walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
         return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
+
+    def _bent_by_contact(self, solved: Solved, takes: Sequence[int]) -> Array:
+        """By how much the other contact model would move each number: it is as right as this one, in every stretch alike."""
+        other = self.jury.vector({i: self.jury.evidence[i].contact / self.jury.evidence[i].sigma for i in takes}, "fit")
+        scale = np.sqrt(np.sum(solved.J**2, axis=0)) + 1e-9
+        return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
     def _finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
