@@ -9,10 +9,11 @@ from tests.test_gap_search import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
+from workbench.gap.covariance import _scattered
 from workbench.gap.fitting import Solved, fit_blocks, lowest, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _guess, _scan, _tell
-from workbench.gap.search import Search, _covariance
+from workbench.gap.search import Search
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
 
@@ -164,11 +165,11 @@ def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_toget
     J = -np.ones((2000, 1))
     means = [np.mean(np.repeat(rng.normal(size=40), 50)) for _ in range(200)]  # of what is the same over a stretch
     r = np.repeat(rng.normal(size=40), 50)
-    told = np.sqrt(_covariance(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
+    told = np.sqrt(_scattered(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
     assert told == pytest.approx(np.std(means), rel=0.3)
     white = rng.normal(size=2000)
-    assert np.sqrt(_covariance(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
-    assert np.isinf(_covariance(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
+    assert np.sqrt(_scattered(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
+    assert np.isinf(_scattered(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
 
 
 def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):

@@ -203,6 +203,21 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
     assert alone.x == pytest.approx(search.settled.x)
 
 
+def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
+    session, search, _ = worn
+    pool = {c.key: c for c in candidates(session.model, search.jury.evidence)}
+    first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
+    zero = Candidate.of(known_effects()["zero_offset"], ("one",), (0.0,))
+    before = search.jury.rollouts
+    fit = search.refitted(search.evaluated([(first, np.array([1.3])), (second, np.array([0.2]))]), (0,), 1)
+    assert search.jury.rollouts - before == 3  # as they are, both moved, where that leads
+    assert [(s.joint, s.numbers.tolist()) for s in fit.slopes] == [("three", [0]), ("two", [1])]
+    assert np.isfinite(np.diag(fit.covariance)).all()
+    assert 0.06 + first.values(fit.x[:1])[0] == pytest.approx(HIDDEN, rel=0.1)
+    mixed = search.refitted(search.evaluated([(first, fit.x[:1]), (zero, np.array([0.1]))]), (0,), 1)
+    assert [s.joint for s in mixed.slopes] == [None]  # its own joint does not show it
+
+
 def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
     session, search, _ = worn
     (e,) = search.jury.evidence

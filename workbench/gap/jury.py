@@ -138,13 +138,13 @@ class Jury:
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
-    def stretches(self, takes: Sequence[int], use: str) -> NDArray[np.int_]:
+    def stretches(self, takes: Sequence[int], use: str, joint: str | None = None) -> NDArray[np.int_]:
         """For each number of `vector`, which stretch of which take it is of."""
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
             stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / BLOCK).astype(int)
-            parts.append(np.repeat(stretch, len(e.channels)))
+            parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 
     def expected(self, takes: Sequence[int], use: str) -> float:

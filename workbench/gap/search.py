@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate, with_effects
-from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, Solved, fit_blocks, lowest, through, together
-from workbench.gap.jury import FINE, Jury, Question, take_of
+from workbench.gap.covariance import covariance_of
+from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.gap.jury import FINE, Jury, Question
 from workbench.gap.metrics import rms
 from workbench.gap.race import Part, Race, Signatures, Trial, Trying
 from workbench.robot import RobotModel
@@ -25,17 +26,17 @@ SEEN_ELSEWHERE = ("zero_offset",)
 
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
-ENGINES = 0.06
-"""Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step."""
+    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step. joint: whose
+    channels alone, None for all."""
 
     numbers: NDArray[np.int_]
     takes: tuple[int, ...]
     J: Array
+    joint: str | None = None
 
 
 @dataclass(frozen=True)
@@ -140,9 +141,9 @@ class Search:
         ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels."""
         race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}), []
         for n, group in enumerate(groups):
-            apart = group[0].joint is not None and group[0].name not in SEEN_ELSEWHERE and not self.jury.walks(takes[n])
             base = {i: current.residuals[i] for i in takes[n]}
-            asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, apart, self.signatures).run())
+            asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, self.apart(group[0], takes[n]),
+                                 self.signatures).run())
         return [trial for trials in self.side_by_side(asking, report) for trial in trials]
 
     def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
@@ -156,27 +157,43 @@ class Search:
         if not len(moving):
             return self._told_held(current)
         takes = self.telling([current.effects[i] for i in moved], takes)
-        low, high = (ends[moving] for ends in current.bounds())
+        blocks = self._blocks(current, moved, takes)
+        low, high = current.bounds()
 
-        def question(point: Sequence[Array]) -> Question:
+        def sizes(point: Sequence[Array]) -> Array:
             x = current.x.copy()
-            x[moving] = point[0]
-            return Question(with_effects(self.nominal, current.sizes(x)), takes)
+            for numbers, there in zip(blocks.values(), point):
+                x[numbers] = there
+            return x
+
+        def told(answer: dict[int, Array]) -> list[Array]:
+            return [self.jury.vector(answer, "fit", joint) for joint in blocks]
 
         # several numbers share what a walk shows: a short move of one drowns
         near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
-        stride = near if self.jury.walks(takes) else HELD
-        r0 = self.jury.vector({i: current.residuals[i] for i in takes}, "fit")
-        fit = fit_blocks([current.x[moving]], [r0], [(low, high)], iterations, stride)
-        (solved,) = yield from through(fit, question, lambda answer: [self.jury.vector(answer, "fit")])
-        x = current.x.copy()
-        x[moving] = solved.x
+        fit = fit_blocks([current.x[n] for n in blocks.values()], told({i: current.residuals[i] for i in takes}),
+                         [(low[n], high[n]) for n in blocks.values()], iterations, near if self.jury.walks(takes) else HELD)
+        solved = yield from through(
+            fit, lambda point: Question(with_effects(self.nominal, current.sizes(sizes(point))), takes), told)
+        x = sizes([s.x for s in solved])
         covariance = np.full((len(x), len(x)), np.inf)
-        stretches = self.jury.stretches(takes, "fit")
-        spread = np.hypot(ENGINES * np.abs(solved.x) * self._walked(solved, stretches), self._bent_by_contact(solved, takes))
-        covariance[np.ix_(moving, moving)] = _covariance(solved, stretches) + np.diag(spread**2)
+        for s, (joint, numbers) in zip(solved, blocks.items()):
+            covariance[np.ix_(numbers, numbers)] = covariance_of(self.jury, s, takes, joint)
+        slopes = tuple(Slopes(numbers, takes, s.J, joint) for s, (joint, numbers) in zip(solved, blocks.items()))
         (there,) = yield from self.evaluating(current.sizes(x))
-        return self._told_held(replace(there, covariance=covariance, slopes=(Slopes(moving, takes, solved.J),)))
+        return self._told_held(replace(there, covariance=covariance, slopes=slopes))
+
+    def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
+        """Whether an effect shows in the channels of its own joint alone, on these takes."""
+        return c.joint is not None and c.name not in SEEN_ELSEWHERE and not self.jury.walks(takes)
+
+    def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
+        """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves
+        all blocks."""
+        if not all(self.apart(current.effects[i], takes) for i in moved):
+            return {None: current.numbers(moved)}
+        joints = dict.fromkeys(current.effects[i].joint for i in moved)
+        return {j: current.numbers(i for i in moved if current.effects[i].joint == j) for j in joints}
 
     def _told_held(self, fit: Fit) -> Fit:
         """With covariance and slopes of those that are settled."""
@@ -188,7 +205,11 @@ class Search:
         covariance = fit.covariance.copy()
         covariance[here], covariance[:, here] = np.inf, np.inf
         covariance[np.ix_(here, here)] = self.settled.covariance[np.ix_(there, there)]
-        slopes = [Slopes(here, s.takes, s.J[:, [s.numbers.tolist().index(n) for n in there]]) for s in self.settled.slopes]
+        slopes = []
+        for s in self.settled.slopes:
+            known = [(n, s.numbers.tolist().index(k)) for n, k in zip(here, there) if k in s.numbers]
+            if known:
+                slopes.append(replace(s, numbers=np.array([n for n, _ in known]), J=s.J[:, [k for _, k in known]]))
         others = [s for s in fit.slopes if not np.isin(s.numbers, here).any()]
         return replace(fit, covariance=covariance, slopes=(*others, *slopes))
 
@@ -218,7 +239,7 @@ class Search:
         """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
         move = np.zeros(len(seen.x))
         for s in seen.slopes:
-            r = self.jury.vector({i: seen.residuals[i] for i in s.takes}, "fit")
+            r = self.jury.vector({i: seen.residuals[i] for i in s.takes}, "fit", s.joint)
             H = s.J.T @ s.J
             move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         return move
@@ -228,19 +249,6 @@ class Search:
         model = with_effects(self.nominal, fit.sizes())
         longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
-
-    def _walked(self, solved: Solved, stretches: NDArray[np.int_]) -> Array:
-        """Share of what is known of each number that walks tell."""
-        free = [i for i in self.takes if self.jury.walks((i,))]
-        told = np.sum(solved.J**2, axis=0)
-        walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
-        return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
-
-    def _bent_by_contact(self, solved: Solved, takes: Sequence[int]) -> Array:
-        """By how much the other contact model would move each number: it is as right as this one, in every stretch alike."""
-        other = self.jury.vector({i: self.jury.evidence[i].contact / self.jury.evidence[i].sigma for i in takes}, "fit")
-        scale = np.sqrt(np.sum(solved.J**2, axis=0)) + 1e-9
-        return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
     def _finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
@@ -263,27 +271,3 @@ def _bottom(seen: Sequence[Fit], n: int, ends: tuple[float, float]) -> float:
     """Of number n, the bottom of the parabola through three fits, or where the best of them has it."""
     bottom = lowest([(f.x[[n]], f.cost["fit"]) for f in seen], *(np.array([end]) for end in ends))
     return float(min(seen, key=lambda f: f.cost["fit"]).x[n] if bottom is None else bottom[0])
-
-
-def _covariance(solved: Solved, stretches: NDArray[np.int_]) -> Array:
-    """Of a block's sizes: what the scatter between stretches says, as neighbouring frames and joints err together (clustered
-    sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), at least what that between frames does; infinite where nothing
-    depends on them."""
-    H = solved.J.T @ solved.J
-    known = np.diag(H) > 1e-9
-    out = np.full(H.shape, np.inf)
-    if not known.any():
-        return out
-    scale = np.sqrt(np.diag(H)[known])
-    values, vectors = np.linalg.eigh(H[np.ix_(known, known)] / np.outer(scale, scale))
-    inverse = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale)
-    samples = max(1, int(np.count_nonzero(solved.r)))
-    frames = inverse * max(1.0, solved.cost / samples)
-    _, which = np.unique(stretches, return_inverse=True)
-    count = int(which.max()) + 1
-    scores = np.zeros((count, int(known.sum())))
-    np.add.at(scores, which, solved.J[:, known] * solved.r[:, None])
-    between = inverse @ (scores.T @ scores) @ inverse * count / max(1, count - 1)
-    wider = np.sqrt(np.maximum(1.0, np.diag(frames) / np.maximum(np.diag(between), 1e-30)))
-    out[np.ix_(known, known)] = between * np.outer(wider, wider)
-    return out
