@@ -127,13 +127,13 @@ class Jury:
 
     def beyond(self, residuals: dict[int, Array], use: str) -> float:
         """Chi squared beyond what is expected of a right model, of the channels that have a gap."""
-        cost, expected = self._by_channel(residuals, use)
+        cost, expected = self.by_channel(residuals, use)
         return float(np.sum((cost - expected)[cost > self._without_gap(residuals, cost, expected)]))
 
     def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
         """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
-        cost, expected = self._by_channel(before, use, joint)
-        left, _ = self._by_channel(after, use, joint)
+        cost, expected = self.by_channel(before, use, joint)
+        left, _ = self.by_channel(after, use, joint)
         most = self._without_gap(before, cost, expected, joint)
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
@@ -152,7 +152,7 @@ class Jury:
         frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
         return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
 
-    def _by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
+    def by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
         """Chi squared of each take's each channel, and what is expected of it."""
         cost, expected = [np.empty(0)], [np.empty(0)]
         for i, r in sorted(residuals.items()):
@@ -164,7 +164,7 @@ class Jury:
         return np.concatenate(cost), np.concatenate(expected)
 
     def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
-        """What chi squared of each channel, in the order of `_by_channel`, may be without a gap: of a held robot no more than
+        """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a held robot no more than
         expected, where running means alone show one."""
         most = GAP_RATIO**2 * expected
         slight = [np.empty(0, dtype=bool)]

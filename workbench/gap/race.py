@@ -43,8 +43,9 @@ Part = Generator[list[Question], list[dict[int, Array]], T]
 
 @dataclass(frozen=True)
 class Trial:
-    """A candidate fitted beside the effects there were. gain: of chi squared by use; closed: share of what was beyond noise on
-    the choosing stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
+    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
+    `Jury.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the choosing
+    stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
     much less of it than of a rival that no fit was made."""
 
     candidate: Candidate
@@ -53,6 +54,7 @@ class Trial:
     joint: str | None
     foretold: bool = False
     closed: float = 0.0
+    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
 
 Asking = Part[list[Trial]]
@@ -186,7 +188,9 @@ class Trying:
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
         joint = self.joints[b]
         off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
-        return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint))
+        before, after = (self.jury.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
+        return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint),
+                     by_channel=before - after)
 
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
         """The robot with those of the group at these sizes, beside what there is already."""

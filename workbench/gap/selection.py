@@ -197,12 +197,28 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
 
 def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> bool:
     """Whether an effect that was fitted brings enough."""
-    gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    brought = sum(a.gain["choose"] for a in _taken(rounds) if t.joint is None or a.joint in (None, t.joint))
+    if t.foretold:
+        return False
+    brought = sum(a.gain["choose"] for a in _taken(rounds)
+                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
     least = LEAST_WALKING if t.joint is None and search.jury.walks(takes) else LEAST_GAIN * max(1, t.candidate.size)
     if t.joint is not None and t.closed > NEARLY_ALL:
         least *= ALL_CLOSED
-    return not t.foretold and gain > max(least, LEAST_SHARE * brought)
+    gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
+    return min(gain, _beyond_settled(search, t, takes, rounds)) > max(least, LEAST_SHARE * brought)
+
+
+def _beyond_settled(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> float:
+    """An effect's gain less what those that held takes told may err by, channel by channel: a strong effect in one joint must not
+    hide what moves all others."""
+    settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in _taken([r]))]
+    if search.settled is None or not settled:
+        return t.gain["choose"]
+    here = search.telling([t.candidate], tuple(takes))
+    was, now = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose")[0]
+                for fit in (settled[0].before, search.settled))
+    may_err = ROUGH_SHARE * np.maximum(was - now, 0.0)
+    return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
 
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
