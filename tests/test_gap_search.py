@@ -14,8 +14,10 @@ from workbench.gap.evidence import gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
+from workbench.gap.race import Trial
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Search
+from workbench.gap.selection import Round
 from workbench.gap.session import load_session
 from workbench.simulation import SimulationConfig
 
@@ -229,6 +231,27 @@ def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
     unsure = differing.refitted(differing.evaluated([(effect, np.array([2.0]))]), (0,), 2)
     assert unsure.x == pytest.approx(alike.x)
     assert np.sqrt(unsure.covariance[0, 0] - alike.covariance[0, 0]) == pytest.approx(0.5, rel=0.15)
+
+
+def test_what_settled_effects_may_err_by_counts_where_they_act_and_hides_nothing_elsewhere(worn):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    taken = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
+    names = whole.jury.evidence[0].channels
+    n = names.index("three")
+    residual = nominal.residuals[0].copy()
+    residual[:, n] *= 30
+    before = replace(nominal, residuals={0: residual})
+    search.settled = replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals)
+    first = Round(before, (), (Trial(taken, np.array([2.6]), {"fit": 1e6, "choose": 1e6}, "three"),))
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+
+    def trial(channel):
+        gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
+        return Trial(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
+
+    assert selection._worthwhile(search, trial("two"), (0,), [first])
+    assert not selection._worthwhile(search, trial("three"), (0,), [first])
 
 
 def test_what_is_well_hides_no_gap_and_closes_none(worn):

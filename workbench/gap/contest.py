@@ -39,7 +39,7 @@ SUREST = 0.98
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
 """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the last.
 True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in part."""
-LEFT = ((1.7, 1.0), (3.0, 0.85), (6.0, 0.45))
+LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
 """RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
 gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
 LEAST = 0.2
