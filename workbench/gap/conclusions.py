@@ -74,7 +74,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
-    unknown = np.array([True] * len(values))
+    unknown = np.ones(len(values), dtype=bool)
     unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
