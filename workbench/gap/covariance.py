@@ -15,10 +15,11 @@ ENGINES = 0.06
 """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
 
-def covariance_of(jury: Jury, solved: Solved, takes: tuple[int, ...], joint: str | None = None) -> Array:
-    """Of a block's numbers; joint: whose channels tell them, None for all. Infinite where nothing depends on a number."""
+def covariance_of(jury: Jury, solved: Solved, takes: tuple[int, ...], joint: str | None = None, bent: bool = True) -> Array:
+    """Of a block's numbers; joint: whose channels tell them, None for all; bent: whether contact bends what walks tell. Infinite
+    where nothing depends on a number."""
     stretches = jury.stretches(takes, "fit", joint)
-    engines = ENGINES * np.abs(solved.x) * _walked(jury, solved, takes, stretches)
+    engines = bent * ENGINES * np.abs(solved.x) * _walked(jury, solved, takes, stretches)
     contact = _bent_by_contact(jury, solved, takes, joint)
     return np.asarray(_scattered(solved, stretches) + np.diag(engines**2 + contact**2))
 

@@ -116,6 +116,20 @@ class Search:
         told = {c.key: x for c, x in self.settled.sizes()}
         return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
+    def retimed(self, current: Fit) -> Fit:
+        """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come."""
+        timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
+        if not timing or not self.grounded(self.fitted):
+            return current
+        fit = self.refitted(current, self.fitted, RESETTLING, timing)
+        numbers = fit.numbers(timing)
+        covariance = current.covariance.copy()
+        covariance[numbers], covariance[:, numbers] = np.inf, np.inf
+        covariance[np.ix_(numbers, numbers)] = fit.covariance[np.ix_(numbers, numbers)]
+        others = [(s, ~np.isin(s.numbers, numbers)) for s in current.slopes]
+        kept = [replace(s, numbers=s.numbers[other], J=s.J[:, other]) for s, other in others if other.any()]
+        return replace(fit, covariance=covariance, slopes=(*kept, *fit.slopes))
+
     def evaluated(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
         """Effects as they are, on all takes."""
         return self.side_by_side([self.evaluating(effects)])[0][0]
@@ -177,8 +191,9 @@ class Search:
             fit, lambda point: Question(with_effects(self.nominal, current.sizes(sizes(point))), takes), told)
         x = sizes([s.x for s in solved])
         covariance = np.full((len(x), len(x)), np.inf)
+        bent = any(current.effects[i].effect.layer != "timing" for i in moved)
         for s, (joint, numbers) in zip(solved, blocks.items()):
-            covariance[np.ix_(numbers, numbers)] = covariance_of(self.jury, s, takes, joint)
+            covariance[np.ix_(numbers, numbers)] = covariance_of(self.jury, s, takes, joint, bent)
         slopes = tuple(Slopes(numbers, takes, s.J, joint) for s, (joint, numbers) in zip(solved, blocks.items()))
         (there,) = yield from self.evaluating(current.sizes(x))
         return self._told_held(replace(there, covariance=covariance, slopes=slopes))
@@ -221,7 +236,8 @@ class Search:
             return self._finely(fit, self.takes, fit.x)[0]
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
-        takes = self.takes if len(walked) else self.held or self.takes
+        told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
+        takes = self.held if told_held and self.held else self.takes
         seen = self._finely(fit, takes, *([fit.x] if alone is None else _around(fit, alone)))
         move, start = self._newton(seen[0]), fit.x.copy()
         low, high = fit.bounds()

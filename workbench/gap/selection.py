@@ -89,7 +89,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     if search.held:
         current = _phase(search, pool, nominal, current, search.held, rounds, report, most)
     if search.held != search.fitted:
-        search.settled = current
+        search.settled = current = search.retimed(current)
         astray = _part_answered(search, nominal, current)
         current = _phase(search, pool, nominal, current, search.fitted, rounds, report, most, astray)
     kept = _without_part_answers(search, current, rounds)
