@@ -87,11 +87,11 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     rounds: list[Round] = []
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
-        current = _phase(search, pool, nominal, current, search.held, rounds, report, most)
+        current = _phase(search, pool, current, search.held, rounds, report, most)
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
         astray = _part_answered(search, nominal, current)
-        current = _phase(search, pool, nominal, current, search.fitted, rounds, report, most, astray)
+        current = _phase(search, pool, current, search.fitted, rounds, report, most, astray)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -103,13 +103,13 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     return Chosen(kept, tuple(rounds))
 
 
-def _remaining(search: Search, current: Fit, nominal: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
+def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
                ) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one, `share` of it where the base is held."""
+    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
     evidence = search.jury.evidence
     out: dict[str, float] = {}
     for i in takes:
-        was, now = channel_gaps(evidence[i], nominal.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
+        was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
         least = share if i in search.held else ROUGH_SHARE
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
     return out
@@ -122,11 +122,11 @@ def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
     return any(joint_of(c) in given for c in _remaining(search, current, nominal, search.held, ROUGH_SHARE))
 
 
-def _phase(search: Search, pool: Sequence[Candidate], nominal: Fit, current: Fit, takes: tuple[int, ...],
-           rounds: list[Round], report: Report, most_work: float, astray: bool = False) -> Fit:
+def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
+           most_work: float, astray: bool = False) -> Fit:
     stopped = False
     while len(current.effects) < MOST_EFFECTS and not stopped:
-        beyond = _remaining(search, current, nominal, takes)
+        beyond = _remaining(search, current, _before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
@@ -174,8 +174,13 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
 
 
 def _taken(rounds: Sequence[Round]) -> list[Trial]:
-    """What was taken of physics; engines do not differ in how cameras saw the robot."""
-    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer != "measurement"]
+    """What was taken of physics; engines do not differ in how cameras saw the robot, nor in when commands came."""
+    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer not in ("measurement", "timing")]
+
+
+def _before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
+    """What there was before the first effect whose hundredths engines play differently: timing they do not."""
+    return next((r.before for r in rounds if any(t.candidate.effect.layer != "timing" for t in r.accepted)), current)
 
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
