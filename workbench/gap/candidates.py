@@ -35,8 +35,8 @@ ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
-    speed at which friction fades) x is the number of doublings. held: by number, whether
-    it is no matter of fitting (an axis that was read off the recording)."""
+    speed at which friction fades) x is the number of doublings. held: by number,
+    whether it is no matter of fitting (an axis that was read off the recording)."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -49,8 +49,7 @@ class Candidate:
     def of(effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
            held: Sequence[bool] | None = None) -> Candidate:
         """typical: default the effect's own."""
-        parameters = [p for p in effect.parameters for _ in range(3 if p.vector else 1)]
-        own = tuple(p.typical_beside(n) for p, n in zip(parameters, neutral))
+        own = tuple(p.typical_beside(n) for p, n in zip(_by_number(effect), neutral))
         return Candidate(effect, where, tuple(neutral), tuple(typical or own), tuple(held or (False,) * len(own)))
 
     @property
@@ -75,7 +74,7 @@ class Candidate:
     @property
     def parameters(self) -> list[Parameter]:
         """The parameter behind each number; a vector has three."""
-        return [p for p in self.effect.parameters for _ in range(3 if p.vector else 1)]
+        return _by_number(self.effect)
 
     @property
     def size(self) -> int:
@@ -160,6 +159,11 @@ class Candidate:
 
     def __str__(self) -> str:
         return f"{self.effect.name}({','.join(self.where)})"
+
+
+def _by_number(effect: Effect) -> list[Parameter]:
+    """The parameter behind each number; a vector has three."""
+    return [p for p in effect.parameters for _ in range(3 if p.vector else 1)]
 
 
 def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:

@@ -77,9 +77,9 @@ class Jury:
                 for q, by_take in zip(questions, keys)]
 
     def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
-        """A jury on other takes of the same robot."""
+        """A jury on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
         other = Jury(evidence, self.config, self.n_jobs, self.memory)
-        other.rollouts, other.work = self.rollouts, self.work
+        other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
         return other
 
     @property

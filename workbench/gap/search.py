@@ -112,7 +112,7 @@ class Search:
         """`current` with those that are settled, and `more`, fitted anew on held takes: for when one went or another came."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         self.settled = None
-        self.settled = self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there)))
+        self.settled = self.retimed(self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there))))
         told = {c.key: x for c, x in self.settled.sizes()}
         return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
@@ -123,9 +123,7 @@ class Search:
             return current
         fit = self.refitted(current, self.fitted, RESETTLING, timing)
         numbers = fit.numbers(timing)
-        covariance = current.covariance.copy()
-        covariance[numbers], covariance[:, numbers] = np.inf, np.inf
-        covariance[np.ix_(numbers, numbers)] = fit.covariance[np.ix_(numbers, numbers)]
+        covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
         others = [(s, ~np.isin(s.numbers, numbers)) for s in current.slopes]
         kept = [replace(s, numbers=s.numbers[other], J=s.J[:, other]) for s, other in others if other.any()]
         return replace(fit, covariance=covariance, slopes=(*kept, *fit.slopes))
@@ -217,9 +215,7 @@ class Search:
         where = {c.key: i for i, c in enumerate(self.settled.effects)}
         both = [(i, where[c.key]) for i, c in enumerate(fit.effects) if c.key in where]
         here, there = fit.numbers(i for i, _ in both), self.settled.numbers(k for _, k in both)
-        covariance = fit.covariance.copy()
-        covariance[here], covariance[:, here] = np.inf, np.inf
-        covariance[np.ix_(here, here)] = self.settled.covariance[np.ix_(there, there)]
+        covariance = _with_block(fit.covariance, here, self.settled.covariance[np.ix_(there, there)])
         slopes = []
         for s in self.settled.slopes:
             known = [(n, s.numbers.tolist().index(k)) for n, k in zip(here, there) if k in s.numbers]
@@ -273,6 +269,14 @@ class Search:
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
         return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
+
+
+def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
+    """A covariance with that of some numbers put in; nothing is known of how they go with others."""
+    out = covariance.copy()
+    out[numbers], out[:, numbers] = np.inf, np.inf
+    out[np.ix_(numbers, numbers)] = block
+    return out
 
 
 def _around(fit: Fit, n: int) -> list[Array]:
