@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL = 5, 3
-"""On the ground the first are what moves the robot as a whole."""
+TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD = 6, 4, 2
+"""The first are what moves the robot as a whole: on the ground, and with the base held."""
+STANDS_OUT = 4.0
+"""Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
+lacks something, not the robot as a whole."""
 ILL = 0.25
 """Joints whose gap is this share of the worst joint's are asked about."""
 FEW = 2
@@ -30,6 +33,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     grounded = search.grounded(takes)
     moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current)
+    outstanding = standing_out(search, current, takes)
 
     def settled(c: Candidate) -> bool:
         """What servos lack at any load, and what hangs on their links, would show with the base held, too."""
@@ -46,7 +50,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:
             continue  # a point mass has that freedom
-        if c.key in used or _tier(c, bool(grounded), heavy) != tier:
+        if c.key in used or _tier(c, bool(grounded), heavy, outstanding) != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
@@ -62,6 +66,20 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     return list(groups.values()), {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
 
 
+def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[str]:
+    """Joints that err far more than all else on some take on the ground."""
+    out: set[str] = set()
+    for i in search.grounded(takes):
+        beyond: dict[str, float] = {}
+        for channel, size in channel_gaps(search.jury.evidence[i], current.residuals[i]).items():
+            place = channel if channel in BODY else joint_of(channel)
+            beyond[place] = max(beyond.get(place, 0.0), size**2 - 1)
+        *others, worst = sorted(beyond.items(), key=lambda b: b[1]) or [("", 0.0)]
+        if worst[0] in search.nominal.joints and worst[1] > STANDS_OUT * max((b for _, b in others), default=0.0):
+            out.add(worst[0])
+    return out
+
+
 def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     """Joints that moved while the base was held and went as the model has it; those that did not go so."""
     evidence = search.jury.evidence
@@ -71,19 +89,21 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     return moved - ill, ill
 
 
-def _tier(c: Candidate, grounded: bool, heavy: Sequence[str]) -> int:
-    """First how cameras saw the robot, which was read off. With the base held, joints and the whole robot come next, then links.
-    On the ground, what moves the robot as a whole by one number, by several (for which a walk has to be looked at all around),
-    then joints, then zero offsets and what is in lighter links."""
+def _tier(c: Candidate, grounded: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
+    """First how cameras saw the robot, which was read off. With the base held, the whole robot, joints, links. On the ground,
+    joints that stand out and their feet, what moves the robot as a whole by one number, by several (for which a walk has to be
+    looked at all around), then joints, then zero offsets and what is in lighter links."""
     if c.effect.layer == "measurement":
         return 0
     if not grounded:
-        return 2 if "link" in c.effect.places else 1
+        return 1 if not c.where else 2 if c.joint is not None else 3
     if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
-        return 4
+        return 5
+    if c.where and c.where[0] in outstanding:
+        return 1
     if c.joint is not None:
-        return 3
-    return 2 if c.size > 1 else 1
+        return 4
+    return 3 if c.size > 1 else 2
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:

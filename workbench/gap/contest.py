@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
+from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.evidence import joint_of, ratios
 from workbench.gap.race import Part, Trial
 from workbench.gap.search import Fit, Report, Search
@@ -18,9 +19,9 @@ from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
 Array = NDArray[np.float64]
 Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
 """By effect, when it was taken and on what."""
-TEMPER, TEMPER_WALKING = 4.0, 60.0
-"""Neighbouring frames err alike, and engines differ: what chi squared differences are divided by when they become probabilities.
-The second where walks tell: fits of the same effect that begin elsewhere end some hundreds apart there."""
+TEMPER = 4.0
+"""Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where walks do not
+tell."""
 ROUGH = 0.005
 """The same as a share of an effect's gain: where that is more, walks leave more open."""
 NEAR, NEAR_HELD = 400.0, 0.05

@@ -11,6 +11,9 @@ from workbench.gap.fitting import Solved
 from workbench.gap.jury import Jury, take_of
 
 Array = NDArray[np.float64]
+TEMPER_WALKING = 60.0
+"""What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of the
+same effect that begin elsewhere end some hundreds apart there."""
 ENGINES = 0.06
 """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
@@ -21,7 +24,8 @@ def covariance_of(jury: Jury, solved: Solved, takes: tuple[int, ...], joint: str
     stretches = jury.stretches(takes, "fit", joint)
     engines = bent * ENGINES * np.abs(solved.x) * _walked(jury, solved, takes, stretches)
     contact = _bent_by_contact(jury, solved, takes, joint)
-    return np.asarray(_scattered(solved, stretches) + np.diag(engines**2 + contact**2))
+    temper = TEMPER_WALKING if bent and jury.walks(takes) else 1.0
+    return np.asarray(_scattered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 
 def _walked(jury: Jury, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
@@ -39,10 +43,10 @@ def _bent_by_contact(jury: Jury, solved: Solved, takes: Sequence[int], joint: st
     return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
 
-def _scattered(solved: Solved, stretches: NDArray[np.int_]) -> Array:
+def _scattered(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
     """Of a block's sizes: what the scatter between stretches says, as neighbouring frames and joints err together (clustered
-    sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), at least what that between frames does; infinite where nothing
-    depends on them."""
+    sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), at least what that between frames does and what chi squared over
+    temper says; infinite where nothing depends on them."""
     H = solved.J.T @ solved.J
     known = np.diag(H) > 1e-9
     out = np.full(H.shape, np.inf)
@@ -52,7 +56,7 @@ def _scattered(solved: Solved, stretches: NDArray[np.int_]) -> Array:
     values, vectors = np.linalg.eigh(H[np.ix_(known, known)] / np.outer(scale, scale))
     inverse = (vectors / np.maximum(values, 1e-9)) @ vectors.T / np.outer(scale, scale)
     samples = max(1, int(np.count_nonzero(solved.r)))
-    frames = inverse * max(1.0, solved.cost / samples)
+    frames = inverse * max(temper, solved.cost / samples)
     _, which = np.unique(stretches, return_inverse=True)
     count = int(which.max()) + 1
     scores = np.zeros((count, int(known.sum())))

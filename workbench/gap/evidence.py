@@ -46,6 +46,10 @@ SMOOTHED = 0.065
 """Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
 
 
+PLAY = {"backlash": "gap", "loose_mount": "play"}
+"""Effects with free play, and the parameter that says how much [deg]."""
+
+
 def joint_of(channel: str) -> str:
     """The joint that a channel tells of; the channel's own name where it is the body's."""
     return channel.partition(ACROSS)[0]
@@ -102,8 +106,21 @@ class TakeEvidence:
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
     def simulated(self, rollout: Take, model: RobotModel) -> Array:
-        """A rollout's channels (N, c) as this take would have shown them."""
-        return channels_of(self.take.observed(rollout, model), self)
+        """A rollout's channels (N, c) as this take would have shown them.
+
+        A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
+        that it is put where the frames that are not kept for validation want it, within the play."""
+        out = channels_of(self.take.observed(rollout, model), self)
+        if not self.take.recorded.zeroed or self.take.spec.base != "fixed":
+            return out
+        used = self.uses["fit"] | self.uses["choose"]
+        for spec in (s for s in model.effects if s.effect in PLAY):
+            play = np.deg2rad(float(spec.parameters[PLAY[spec.effect]]))  # type: ignore[arg-type]
+            for i in (i for joint in spec.where for i in self.columns(joint)):
+                off = (self.recorded - out)[used, i]
+                if np.isfinite(off).any():
+                    out[:, i] += np.clip(np.nanmedian(off), -play, play)
+        return out
 
     def residual(self, simulated: Array, corrected: bool = True) -> Array:
         """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. corrected: for the search's

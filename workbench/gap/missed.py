@@ -22,6 +22,8 @@ LEAST_STEP = np.deg2rad(2.0)
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
+AT_END = np.deg2rad(0.6)
+"""How near the furthest that a joint ever went it stands there [rad]."""
 LEAST_CLOSED = 0.5
 """Share of a joint's gap that the poses taken for missed must explain."""
 
@@ -64,6 +66,8 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
         if not _credible(jury, {i: len(r[0]) for i, r in read.items()}) or count > 0.6 * of:
             continue
+        if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, r in read.items() for k in r[0]):
+            continue
         lost = {i: r[0] for i, r in read.items()}
         tried = replaced(jury, {i: _without(jury.evidence[i], joint, k) for i, k in lost.items() if k})
         after = tried.residuals([Question(nominal, tuple(range(len(jury.evidence))))])[0]
@@ -86,6 +90,32 @@ def _credible(jury: Jury, missed: Mapping[int, int]) -> bool:
     return sum(held) > 0 if held else sum(missed.values()) > 1
 
 
+def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
+    """Whether a pose that seems missed asks for more than the joint ever went, and the joint stands there: it may be stopped."""
+    e = evidence[i]
+    assert e.take.commands is not None
+    goal = float(e.take.commands.goals[k, e.take.commands.column(joint)])
+    seen = _seen(e, joint)
+    stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
+    way = 1.0 if goal > stood else -1.0
+    end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
+    return way * goal > end and way * stood > end - AT_END
+
+
+def _seen(e: TakeEvidence, joint: str) -> Array:
+    """Where a joint was [rad], the zero being the servo's."""
+    rest = float(e.take.measurement.rest_pose.get(joint, 0.0)) if e.take.recorded.zeroed else 0.0
+    return np.asarray(e.recorded[:, e.channels.index(joint)] + rest)
+
+
+def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
+    """The last frames before the next command comes."""
+    commands, time = e.take.commands, e.take.recorded.since_start
+    assert commands is not None
+    end = commands.times[k + 1] if k + 1 < len(commands.times) else commands.end
+    return np.asarray((time > end - 0.06) & (time <= end))
+
+
 def replaced(jury: Jury, evidence: Mapping[int, TakeEvidence]) -> Jury:
     """The same jury on some other takes."""
     return jury.on([evidence.get(i, e) for i, e in enumerate(jury.evidence)])
@@ -96,14 +126,12 @@ def _read(e: TakeEvidence, joint: str, residual: Array) -> tuple[list[int], list
     commands = e.take.commands
     assert commands is not None
     column, i = commands.column(joint), e.channels.index(joint)
-    rest = float(e.take.measurement.rest_pose.get(joint, 0.0)) if e.take.recorded.zeroed else 0.0
-    time, seen = e.take.recorded.since_start, e.recorded[:, i] + rest
+    seen = _seen(e, joint)
     said = seen - residual[:, i] * e.sigma[i]
-    ends = np.append(commands.times[1:], commands.end)
     at, missed, telling = 0.0, list[int](), list[int]()
     for k, goal in enumerate(commands.goals[:, column]):
         way = float(goal - at)
-        frames = (time > ends[k] - 0.06) & (time <= ends[k]) & np.isfinite(seen)
+        frames = _at_the_end_of(e, k) & np.isfinite(seen)
         if abs(way) < LEAST_STEP or not frames.any():
             at = float(goal)
             continue

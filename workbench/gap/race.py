@@ -67,12 +67,14 @@ Signatures = dict[tuple[object, ...], Seen]
 @dataclass(frozen=True)
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
-    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge."""
+    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge; least:
+    what must be foretold of one that is fitted."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: list[float] = field(default_factory=list)
+    least: float = 0.0
 
 
 class Trying:
@@ -118,7 +120,7 @@ class Trying:
         if guesses is not None:
             _tell(self.race.remembered, self.joints, guesses[1])
         yield []  # until all have said what they remember
-        if guesses is None or guesses[1][0] >= REMEMBERED * _best(self.race.remembered, None):
+        if guesses is None or guesses[1][0] >= max(self.race.least, REMEMBERED * _best(self.race.remembered, None)):
             return None
         return guesses
 
@@ -160,7 +162,7 @@ class Trying:
         yield []  # until all have said what they foretell
         last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > 0 and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
+                if g > race.least and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""

@@ -147,11 +147,12 @@ class Search:
         return [done[n] for n in range(len(parts))]
 
     def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], ahead: float = 0.0) -> list[Trial]:
+              report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[Trial]:
         """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
         at several joints, each judged by its own joint's channels. takes: on which, by group.
-        ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels."""
-        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}), []
+        ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
+        signatures must foretell of one that is fitted."""
+        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least), []
         for n, group in enumerate(groups):
             base = {i: current.residuals[i] for i in takes[n]}
             asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, self.apart(group[0], takes[n]),

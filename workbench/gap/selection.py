@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.asked import TIERS, TIERS_OF_ALL, asked
+from workbench.gap.asked import TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD, asked, standing_out
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
@@ -41,8 +41,8 @@ several, the first may leave much to the next, but a name that leaves half at th
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH, NEARLY_ALL = 0.6, 0.9
-"""Share of a gap from which on less likely effects are not asked for; the second on the ground, where a joint's effect can look
-like the ground's, before joints are asked."""
+"""Share of a gap from which on less likely effects are not asked for; the second before joints are asked, as a joint's effect can
+look like one of the whole robot's."""
 MOST_STEPS, LAST_STEPS = 5, 3
 """Of a fit of all effects, when one was added, and when one was dropped at the end; it ends where little changes."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
@@ -125,6 +125,7 @@ def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
            most_work: float, astray: bool = False) -> Fit:
     stopped = False
+    least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     while len(current.effects) < MOST_EFFECTS and not stopped:
         beyond = _remaining(search, current, _before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
@@ -138,12 +139,12 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
                 break
             groups, on = asked(search, pool, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
-            trials += search.tried(current, groups, on, say, ahead)
+            trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and trials[0].closed > (NEARLY_ALL if tier < TIERS_OF_ALL and search.jury.walks(takes) else ENOUGH):
+            if trials and _says_it(search, current, trials[0], takes, tier):
                 break
-        least = LAST_CLOSED if astray else LEAST_CLOSED
-        worth = [t for t in trials if t.closed > least and _worthwhile(search, t, takes, rounds)]
+        closed = LAST_CLOSED if astray else LEAST_CLOSED
+        worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds)]
         choices = _accepted(worth)
         fits = search.side_by_side([_with(search, current, accepted, takes) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: f[0].cost["choose"], default=(current, []))
@@ -154,6 +155,24 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             break
         current = after
     return current
+
+
+def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+    """Whether the best so far leaves nothing worth asking in the tiers that follow."""
+    of_all = tier < (TIERS_OF_ALL if search.jury.walks(takes) else TIERS_OF_ALL_HELD)
+    if of_all and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
+        return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > ENOUGH
+    return t.closed > (NEARLY_ALL if of_all else ENOUGH)
+
+
+def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]) -> float:
+    """Share of what is beyond noise in its own joint that an effect judged by all channels takes away."""
+    if not len(t.by_channel):
+        return 0.0
+    here = search.telling([t.candidate], takes)
+    cost, expected = search.jury.by_channel({i: current.residuals[i] for i in here}, "choose")
+    own = np.concatenate([np.isin(e.columns(), e.columns(t.candidate.joint)) for e in (search.jury.evidence[i] for i in here)])
+    return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
 
 
 def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Part[Fit]:
@@ -227,8 +246,10 @@ def _beyond_settled(search: Search, t: Trial, takes: Sequence[int], rounds: Sequ
 
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
-    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now."""
-    return search.jury.closed(r.before.residuals, now.residuals, "choose", t.joint)
+    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
+    that was judged or stood out."""
+    outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
+    return search.jury.closed(r.before.residuals, now.residuals, "choose", t.candidate.joint if outstanding else t.joint)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
