@@ -10,7 +10,7 @@ from tests.test_gap_search import CONFIG
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
 from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import with_missed
+from workbench.gap.missed import _read, with_missed
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
 from workbench.gap.special import special
@@ -79,3 +79,28 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     assert share.low < share.value < share.high
     after = nominal_residuals(quiet, jury)
     assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))
+
+
+def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
+    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 3.0}),))
+    jury = recorded_with(quiet, stopped)
+    before = nominal_residuals(quiet, jury)
+    assert _read(jury.evidence[0], "two", before[0])[0]
+    assert with_missed(jury, quiet[0], before)[1] == ()
+
+
+def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):
+    loose = replace(quiet[0], effects=(EffectSpec("backlash", ("two",), {"gap": 4.0}),))
+    jury = recorded_with(quiet, loose)
+    (e,) = jury.evidence
+    column = e.channels.index("two")
+
+    def left(turned, model):
+        recorded = e.recorded.copy()
+        recorded[:, column] += np.deg2rad(turned)
+        residuals = jury.on([replace(e, recorded=recorded)]).residuals([Question(model, (0,))])[0][0]
+        return float(np.nanmean(residuals[:, column] * e.sigma[column]))
+
+    assert left(1.5, loose) == pytest.approx(left(0.0, loose), abs=np.deg2rad(0.05))
+    assert left(9.0, loose) > np.deg2rad(4.0)
+    assert left(1.5, quiet[0]) - left(0.0, quiet[0]) > np.deg2rad(1.0)

@@ -1,16 +1,17 @@
 """Evidence, fits and selection on a small arm whose joint `three` is stiffer than its model says."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.gap_sessions import record_arm
 from workbench.effects.registry import known_effects
-from workbench.gap import selection
+from workbench.gap import asked, selection
 from workbench.gap.candidates import Candidate, candidates
 from workbench.gap.compare_session import roll_out, run_of
-from workbench.gap.evidence import gather, joint_of, ratios, smoothed
+from workbench.gap.evidence import ACROSS, gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
@@ -266,3 +267,33 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
     assert 0.4 < jury.closed({0: ill}, {0: better}, "choose") < 0.8
     assert jury.closed({0: ill}, {0: better}, "choose", "one") == 0
     assert jury.closed({0: quiet}, {0: ill}, "choose") == 0
+
+
+@pytest.mark.parametrize(("gaps", "expected"), [
+    ({"one": 6.7, "two": 2.6, "pitch": 1.5}, {"one"}),
+    ({"one": 6.7, "two": 4.0}, set()),
+    ({"one": 6.7, "pitch": 5.0}, set()),
+    ({"pitch": 6.7, "one": 2.0}, set()),
+    ({"one across x": 6.7, "two": 2.0}, {"one"}),
+    ({}, set()),
+])
+def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatch, gaps, expected):
+    named = {c.replace(" across ", ACROSS): s for c, s in gaps.items()}
+    monkeypatch.setattr(asked, "channel_gaps", lambda e, residual: named)
+    search = SimpleNamespace(grounded=lambda takes: takes, jury=SimpleNamespace(evidence=[None]),
+                             nominal=SimpleNamespace(joints=("one", "two")))
+    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
+    search.grounded = lambda takes: ()
+    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
+
+
+def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_joints(worn):
+    session, search, nominal = worn
+    pool = candidates(session.model, search.jury.evidence)
+    beyond = {"three": 3.0, "two": 3.0}
+    by_tier = [[c for g in asked.asked(search, pool, nominal, beyond, search.held, tier)[0] for c in g]
+               for tier in range(asked.TIERS)]
+    assert all(not c.where for c in by_tier[1])
+    assert {c.name for c in by_tier[1]} >= {"supply_voltage", "timing_drift"}
+    assert {c.joint for c in by_tier[2]} == {"three", "two"}
+    assert all(c.joint is None and c.where for tier in by_tier[3:] for c in tier)

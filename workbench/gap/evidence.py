@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.effects.base import si_values
+from workbench.effects.registry import known_effects
 from workbench.gap.compare_session import Rollouts
 from workbench.gap.comparison import noise_of
 from workbench.gap.metrics import rms
@@ -47,7 +49,7 @@ SMOOTHED = 0.065
 
 
 PLAY = {"backlash": "gap", "loose_mount": "play"}
-"""Effects with free play, and the parameter that says how much [deg]."""
+"""Effects with free play, and the parameter that says how much."""
 
 
 def joint_of(channel: str) -> str:
@@ -106,28 +108,29 @@ class TakeEvidence:
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
     def simulated(self, rollout: Take, model: RobotModel) -> Array:
-        """A rollout's channels (N, c) as this take would have shown them.
+        """A rollout's channels (N, c) as this take would have shown them."""
+        return channels_of(self.take.observed(rollout, model), self)
 
-        A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
+    def residual(self, simulated: Array, model: RobotModel, corrected: bool = True) -> Array:
+        """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. model: that was simulated;
+        corrected: for the search's step."""
+        simulated = simulated + self.offset if corrected else simulated
+        simulated = self._shifted(self._lying_in_its_play(simulated, model))
+        return (self.recorded - simulated) / self.sigma
+
+    def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
+        """A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
         that it is put where the frames that are not kept for validation want it, within the play."""
-        out = channels_of(self.take.observed(rollout, model), self)
         if not self.take.recorded.zeroed or self.take.spec.base != "fixed":
-            return out
-        used = self.uses["fit"] | self.uses["choose"]
+            return simulated
+        out, used = simulated.copy(), ~self.uses["validate"]
         for spec in (s for s in model.effects if s.effect in PLAY):
-            play = np.deg2rad(float(spec.parameters[PLAY[spec.effect]]))  # type: ignore[arg-type]
+            play = si_values(known_effects()[spec.effect], spec)[PLAY[spec.effect]]
             for i in (i for joint in spec.where for i in self.columns(joint)):
-                off = (self.recorded - out)[used, i]
+                off = (self.recorded - simulated)[used, i]
                 if np.isfinite(off).any():
                     out[:, i] += np.clip(np.nanmedian(off), -play, play)
         return out
-
-    def residual(self, simulated: Array, corrected: bool = True) -> Array:
-        """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. corrected: for the search's
-        step."""
-        simulated = simulated + self.offset if corrected else simulated
-        simulated = self._shifted(simulated)
-        return (self.recorded - simulated) / self.sigma
 
     def _shifted(self, simulated: Array) -> Array:
         """Later by what the median joint asks for: a start that one bad joint cannot move."""

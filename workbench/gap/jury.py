@@ -73,7 +73,7 @@ class Jury:
         for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
             q, i, _ = new[key]
             self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, self._until(i, q))[i])
-        return [{i: self.evidence[i].residual(self._known[key], corrected=q.step >= 1) for i, key in by_take.items()}
+        return [{i: self.evidence[i].residual(self._known[key], q.model, q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
     def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
