@@ -10,7 +10,7 @@ from tests.test_gap_search import CONFIG
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
 from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import _read, with_missed
+from workbench.gap.missed import _read, _stands_at_an_end, with_missed
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
 from workbench.gap.special import special
@@ -82,11 +82,17 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
 
 
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
-    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 3.0}),))
+    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 6.0}),))
     jury = recorded_with(quiet, stopped)
-    before = nominal_residuals(quiet, jury)
-    assert _read(jury.evidence[0], "two", before[0])[0]
-    assert with_missed(jury, quiet[0], before)[1] == ()
+    kept = _read(jury.evidence[0], "two", nominal_residuals(quiet, jury)[0])[0]
+    assert len(kept) == 2
+    assert all(_stands_at_an_end(jury.evidence, 0, "two", k) for k in kept)
+    commands = quiet[1].evidence[0].take.commands
+    goals, c = commands.goals.copy(), commands.column("one")
+    goals[1, c] = goals[0, c]
+    jury = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
+    (lost,) = _read(jury.evidence[0], "one", nominal_residuals(quiet, jury)[0])[0]
+    assert not _stands_at_an_end(jury.evidence, 0, "one", lost)
 
 
 def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):
