@@ -63,7 +63,7 @@ def test_a_loose_mount_is_read_off_with_its_axis(quiet):
     jury = recorded_with(quiet, loose)
     found = [c for c in special(quiet[0], jury.evidence, nominal_residuals(quiet, jury)) if c.name == "loose_mount"]
     assert [c.where for c in found] == [("two",)]
-    assert np.abs(found[0].values(np.ones(1))[1:]) == pytest.approx([1, 0, 0], abs=0.2)
+    assert np.abs(found[0].values(np.ones(1))[1:]) == pytest.approx([1, 0, 0], abs=0.04)
 
 
 def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):

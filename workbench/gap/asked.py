@@ -90,10 +90,10 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
 
 
 def _tier(c: Candidate, grounded: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
-    """First how cameras saw the robot, which was read off. With the base held, the whole robot, joints, links. On the ground,
-    joints that stand out and their feet, what moves the robot as a whole by one number, by several (for which a walk has to be
-    looked at all around), then joints, then zero offsets and what is in lighter links."""
-    if c.effect.layer == "measurement":
+    """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, joints,
+    links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one number, by several (for
+    which a walk has to be looked at all around), then joints, then zero offsets and what is in lighter links."""
+    if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
         return 1 if not c.where else 2 if c.joint is not None else 3

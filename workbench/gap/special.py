@@ -69,15 +69,21 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
 
 def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
            ill: Sequence[Mapping[str, float]]) -> list[Candidate]:
-    """A loose mount where the link turns across its servo's axis: about the axis along which it does so most, as far as that."""
+    """A loose mount where the link turns across its servo's axis: about the link's axis along which it does so most, as far as
+    that."""
     rows, sigma = [], 1.0
+    tree = model.kinematics
+    neutral, frame = tree.forward(np.zeros((1, len(tree.joints)))), tree.frames[joint]
+    servo = neutral[frame.parent][1][0] @ frame.X_PF_R @ frame.axis
     for i, e in enumerate(evidence):
         columns = [k for k, c in enumerate(e.channels) if c.startswith(joint + ACROSS)]
         if len(columns) == 2 and any(e.channels[k] in ill[i] for k in columns):
             three = np.zeros((len(e.recorded), 3))
             for k in columns:
                 three[:, "xyz".index(e.channels[k][-1])] = residuals[i][:, k] * e.sigma[k]
-            rows.append(three[np.isfinite(three).all(axis=1)])
+            angle = e.recorded[:, e.channels.index(joint)]
+            good = np.isfinite(three).all(axis=1) & np.isfinite(angle)
+            rows.append(Rotation.from_rotvec(-angle[good, None] * servo).apply(three[good]))  # the servo carries it round
             sigma = float(e.sigma[columns[0]])
     if not rows:
         return []
@@ -85,9 +91,7 @@ def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], resi
     axis = np.linalg.svd(off - off.mean(axis=0), full_matrices=False)[2][0]
     along = (off - off.mean(axis=0)) @ axis
     play = float(np.rad2deg(max(np.ptp(np.quantile(along, [0.05, 0.95])) - 2 * sigma, 0.5 * sigma)))
-    tree = model.kinematics
-    R = tree.forward(np.zeros((1, len(tree.joints))))[tree.frames[joint].child][1][0]
-    in_link = R.T @ axis
+    in_link = neutral[frame.child][1][0].T @ axis
     in_link = in_link * np.sign(in_link[np.argmax(np.abs(in_link))])
     return [Candidate.of(known_effects()["loose_mount"], (joint,), (0.0, *in_link), (play, *in_link), (False, True, True, True))]
 
