@@ -287,13 +287,19 @@ def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatc
     assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
 
 
-def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_joints(worn):
+def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn):
     session, search, nominal = worn
     pool = candidates(session.model, search.jury.evidence)
-    beyond = {"three": 3.0, "two": 3.0}
-    by_tier = [[c for g in asked.asked(search, pool, nominal, beyond, search.held, tier)[0] for c in g]
-               for tier in range(asked.TIERS)]
-    assert all(not c.where for c in by_tier[1])
-    assert {c.name for c in by_tier[1]} >= {"supply_voltage", "timing_drift"}
-    assert {c.joint for c in by_tier[2]} == {"three", "two"}
-    assert all(c.joint is None and c.where for tier in by_tier[3:] for c in tier)
+
+    def asked_of(*joints):
+        return [[c for g in asked.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
+                for tier in range(asked.TIERS)]
+
+    of_all, at_joints, *others = asked_of("one", "two", "three")[1:]
+    assert {c.name for c in of_all} >= {"supply_voltage", "timing_drift"}
+    assert all(not c.where for c in of_all)
+    assert {c.joint for c in at_joints} == {"one", "two", "three"}
+    assert all(c.joint is None and c.where for tier in others for c in tier)
+    of_all, at_joints, *_ = asked_of("two", "three")[1:]
+    assert not of_all
+    assert {c.joint for c in at_joints} == {None, "two", "three"}

@@ -19,7 +19,8 @@ lacks something, not the robot as a whole."""
 ILL = 0.25
 """Joints whose gap is this share of the worst joint's are asked about."""
 FEW = 2
-"""Joints that may be ill on the ground, with the body as the model has it, without zero offsets of others being asked about."""
+"""Joints that may be ill without the robot as a whole being asked about before them and, on the ground, with the body as the
+model has it, without zero offsets of others being asked about."""
 MOVED = 0.1
 """Angle [rad] beyond which a joint has moved enough to show what it lacks."""
 
@@ -31,7 +32,8 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
     grounded = search.grounded(takes)
-    moves_all = bool(grounded) and (len(joints) > FEW or any(c in BODY for c in beyond))
+    many = len(joints) > FEW
+    moves_all = bool(grounded) and (many or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current)
     outstanding = standing_out(search, current, takes)
 
@@ -50,7 +52,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:
             continue  # a point mass has that freedom
-        if c.key in used or _tier(c, bool(grounded), heavy, outstanding) != tier:
+        if c.key in used or _tier(c, bool(grounded), many, heavy, outstanding) != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
@@ -89,14 +91,15 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     return moved - ill, ill
 
 
-def _tier(c: Candidate, grounded: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
-    """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, joints,
-    links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one number, by several (for
-    which a walk has to be looked at all around), then joints, then zero offsets and what is in lighter links."""
+def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
+    """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
+    joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
+    number, by several (for which a walk has to be looked at all around), then joints, then zero offsets and what is in lighter
+    links."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
-        return 1 if not c.where else 2 if c.joint is not None else 3
+        return 1 if not c.where and many else 2 if not c.where or c.joint is not None else 3
     if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
         return 5
     if c.where and c.where[0] in outstanding:
