@@ -303,3 +303,14 @@ def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn
     of_all, at_joints, *_ = asked_of("two", "three")[1:]
     assert not of_all
     assert {c.joint for c in at_joints} == {None, "two", "three"}
+
+
+@pytest.mark.parametrize("zeroed", [True, False])
+def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(worn, zeroed):
+    session, search, nominal = worn
+    e = search.jury.evidence[0]
+    seen = replace(e, take=replace(e.take, recorded=replace(e.take.recorded, zeroed=zeroed)))
+    search = Search(search.jury.on([seen]), session.model)
+    pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
+    groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
+    assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])

@@ -47,6 +47,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             return bool(well) and not ill
         return c.joint in well
 
+    zeroed = all(search.jury.evidence[i].take.recorded.zeroed for i in takes)
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
@@ -58,7 +59,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             groups[c.key] = [c]
         elif c.joint is not None:
             if c.name in SEEN_ELSEWHERE:
-                if moves_all or (grounded and c.joint in joints):
+                if moves_all or (c.joint in joints and (grounded or not zeroed)):
                     groups[c.key] = [c]
             elif c.joint in joints and not (grounded and settled(c)):
                 groups.setdefault(c.key if c.read_off or grounded else (c.name, "joint"), []).append(c)
