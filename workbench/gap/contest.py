@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -43,6 +43,8 @@ True effects close 97 % and more on a stand, 90 % on the ground; what the vocabu
 LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
 """RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
 gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
+CHANGING = 0.5
+"""The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
 LEAST = 0.2
 
 
@@ -88,15 +90,17 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
     return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
 
 
-def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array]) -> list[Standing]:
-    """Standings less sure where held takes, which told the effect, leave much at its place. floors: of the fit, by take."""
+def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
+            changing: Collection[Candidate] = ()) -> list[Standing]:
+    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change.
+    floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out = []
     for c, s in zip(fit.effects, standings):
         told_held = search.is_settled(c) or search.held == search.fitted
         worst = max((r for channel, r in left if told_held and c.joint in (None, joint_of(channel)) and r == r), default=0.0)
-        factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
+        factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
 

@@ -12,6 +12,7 @@ import numpy as np
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
 from workbench.gap.conclusions import Residuals, finding, posterior, rejected, unexplained, verdict_of
+from workbench.gap.constancy import drifts
 from workbench.gap.contest import Standing, contest, doubted
 from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
@@ -73,7 +74,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit
     floors = search.floors(fit) if fit.effects else {}
-    standings = doubted(search, fit, standings, floors)
+    changing = drifts(search, fit)
+    standings = doubted(search, fit, standings, floors, [d.effect for d in changing])
     fitted = fit.model(session.model)
     model = replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed)))
     after, rough = fit.residuals, floors
@@ -83,7 +85,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         rough = floors_everywhere(looked_at, floors)
     findings = tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
-    left = unexplained(evidence, after, rough) if gap else ()
+    left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
     slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
     verdict = verdict_of(bool(gap) and not slight, findings, left)

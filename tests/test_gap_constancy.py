@@ -1,0 +1,52 @@
+"""Numbers that a take wants to change: friction that fades while the robot works is no friction that stays."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.test_gap_search import CONFIG, worn  # noqa: F401
+from workbench.effects.registry import known_effects
+from workbench.gap.candidates import Candidate, with_effects
+from workbench.gap.constancy import drifts
+from workbench.gap.search import Search
+from workbench.simulation.batch import run_job
+
+
+@pytest.fixture
+def friction(worn):  # noqa: F811
+    effect = known_effects()["coulomb_friction"]
+    return Candidate.of(effect, ("three",), effect.neutral(worn[0].model))
+
+
+def fitted(search, friction):
+    return search.refitted(search.evaluated([(friction, np.ones(friction.size))]), search.held, 4)
+
+
+def test_friction_that_stays_shows_no_drift(worn, friction):  # noqa: F811
+    search = worn[1]
+    assert drifts(search, fitted(search, friction)) == []
+
+
+def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):  # noqa: F811
+    session, search, _ = worn
+    e = search.jury.evidence[0]
+
+    def played(torque):
+        unit = friction.values(np.ones(1))[0] - friction.neutral[0]
+        model = with_effects(session.model, [(friction, np.array([(torque - friction.neutral[0]) / unit]))])
+        return e.simulated(run_job(search.jury.job(model, 0, CONFIG)), model)
+
+    late = np.clip(e.since / e.since[-1], 0.0, 1.0)[:, None]
+    noise = np.random.default_rng(1).normal(size=e.recorded.shape) * e.sigma
+    fading = replace(e, recorded=np.where(np.isfinite(e.recorded), (1 - late) * played(0.3) + late * played(0.1) + noise, np.nan))
+    search = Search(search.jury.on([fading]), session.model)
+    (drift,) = drifts(search, fitted(search, friction))
+    assert drift.effect == friction
+    assert drift.first == pytest.approx(0.3, abs=0.05)
+    assert drift.last == pytest.approx(0.1, abs=0.05)
+    left = drift.left([fading])
+    assert left.where == ("three",)
+    assert left.unit == "deg"
+    assert left.error > 0.0
+    assert "coulomb_friction(three)" in left.description

@@ -1,0 +1,91 @@
+"""Whether fitted numbers stay what they are: physics without a name can look like a known effect whose size changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.candidates import Candidate
+from workbench.gap.evidence import TakeEvidence
+from workbench.gap.findings import Unexplained
+from workbench.gap.jury import Jury
+from workbench.gap.ledger import in_file_units
+from workbench.gap.search import Fit, Search, Slopes
+
+Array = NDArray[np.float64]
+CHANGE = 0.25
+"""Share of a number that it changes by from a take's first to its last frame, from which on that is told: two engines, or a robot
+and a model, differ by less."""
+SURE = 5.0
+"""Standard errors of that change that it must be."""
+LEAST_GAIN = 150.0
+"""Of chi squared, that the change must explain on the fitted stretches."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A number of an effect (its index) that held takes want to change: its values at a take's beginning and end, and what a
+    number that stays leaves for that, RMS over sigma."""
+
+    effect: Candidate
+    number: int
+    first: float
+    last: float
+    rms: float
+
+    def left(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
+        """As something that a constant number does not explain."""
+        p, joint = self.effect.parameters[self.number], self.effect.joint
+        e = next((e for e in evidence if joint is None or joint in e.channels), evidence[0])
+        channel = joint if joint in e.channels else e.joints[0]
+        floor, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
+        return Unexplained(() if joint is None else (joint,), self.rms * floor, floor, unit,
+                           f"{p.name} of {self.effect} would have to go from {self.first:.3g} to {self.last:.3g} {p.unit} within "
+                           "a take: something that changes looks like it")
+
+
+def drifts(search: Search, fit: Fit) -> list[Drift]:
+    """Numbers that held takes told (walks bend them), and tell differently early and late: a test of constancy against a linear
+    trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`)."""
+    out: list[Drift] = []
+    of_number = [(c, k) for c in fit.effects for k in range(c.size)]
+    for s in fit.slopes:
+        if not set(s.takes) <= set(search.held):
+            continue
+        for column, n in enumerate(s.numbers):
+            c, k = of_number[int(n)]
+            told = _trend(search.jury, fit, s, column)
+            if told is None or c.shapes[k]:
+                continue
+            change, rms = told
+            if abs(change) > CHANGE * abs(fit.x[n]):
+                x = fit.x[fit.slices()[fit.effects.index(c)]]
+                way = np.eye(len(x))[k] * change / 2
+                low, high = c.bounds()
+                first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
+                out.append(Drift(c, k, first, last, rms))
+    return out
+
+
+def _trend(jury: Jury, fit: Fit, s: Slopes, column: int) -> tuple[float, float] | None:
+    """By how much a size changes over a take, and RMS of what that explains, over sigma; None where it is not sure."""
+    r = jury.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
+    clocks = {}
+    for i in s.takes:
+        e = jury.evidence[i]
+        clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
+    z = s.J[:, column] * jury.vector(clocks, "fit", s.joint)
+    z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
+    power = float(z @ z)
+    if power < 1e-9:
+        return None
+    change = -float(z @ r) / power
+    _, which = np.unique(jury.stretches(s.takes, "fit", s.joint), return_inverse=True)
+    by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
+    error = float(np.linalg.norm(by_stretch)) / power
+    if abs(change) < SURE * error or change**2 * power < LEAST_GAIN:
+        return None
+    return change, abs(change) * float(np.sqrt(power / int(np.count_nonzero(r))))
