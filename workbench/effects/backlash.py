@@ -18,6 +18,7 @@ class Backlash(Effect):
     layer = "structure"
     places = ("joint",)
     under_load = True
+    free_play = "gap"
     parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -66,6 +66,8 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     under_load: ClassVar[bool] = False
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
+    free_play: ClassVar[str] = ""
+    """The parameter that says how far a link turns freely against its servo, if it does [rad in SI]."""
 
     def sentence(self, spec: EffectSpec) -> str:
         """For a person: what is different about this robot."""

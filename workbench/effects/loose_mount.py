@@ -17,6 +17,7 @@ class LooseMount(Effect):
     name = "loose_mount"
     layer = "structure"
     places = ("joint",)
+    free_play = "play"
     parameters = (
         Parameter("play", "deg", 0.0, 30.0, 1.0, si=DEGREE),
         Parameter("axis", "1", -1.0, 1.0, 1.0, vector=True),

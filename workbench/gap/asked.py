@@ -12,7 +12,7 @@ from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
 TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD = 6, 4, 2
-"""The first are what moves the robot as a whole: on the ground, and with the base held."""
+"""The first are what moves the robot as a whole, and joints that stand out: on the ground, and with the base held."""
 STANDS_OUT = 4.0
 """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
 lacks something, not the robot as a whole."""
@@ -75,8 +75,7 @@ def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[st
     for i in search.grounded(takes):
         beyond: dict[str, float] = {}
         for channel, size in channel_gaps(search.jury.evidence[i], current.residuals[i]).items():
-            place = channel if channel in BODY else joint_of(channel)
-            beyond[place] = max(beyond.get(place, 0.0), size**2 - 1)
+            beyond[joint_of(channel)] = max(beyond.get(joint_of(channel), 0.0), size**2 - 1)
         *others, worst = sorted(beyond.items(), key=lambda b: b[1]) or [("", 0.0)]
         if worst[0] in search.nominal.joints and worst[1] > STANDS_OUT * max((b for _, b in others), default=0.0):
             out.add(worst[0])
@@ -100,7 +99,9 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
-        return 1 if not c.where and many else 2 if not c.where or c.joint is not None else 3
+        if not c.where:
+            return 1 if many else 2
+        return 2 if c.joint is not None else 3
     if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
         return 5
     if c.where and c.where[0] in outstanding:

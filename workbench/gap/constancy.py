@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from workbench.gap.findings import Unexplained
 from workbench.gap.jury import Jury
 from workbench.gap.ledger import in_file_units
 from workbench.gap.search import Fit, Search, Slopes
+from workbench.gap.selection import LEAST_GAIN
 
 Array = NDArray[np.float64]
 CHANGE = 0.25
@@ -21,8 +22,6 @@ CHANGE = 0.25
 and a model, differ by less."""
 SURE = 5.0
 """Standard errors of that change that it must be."""
-LEAST_GAIN = 150.0
-"""Of chi squared, that the change must explain on the fitted stretches."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +50,13 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     """Numbers that held takes told (walks bend them), and tell differently early and late: a test of constancy against a linear
     trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`)."""
     out: list[Drift] = []
-    of_number = [(c, k) for c in fit.effects for k in range(c.size)]
+    of_number = [(c, x, k) for c, x in fit.sizes() for k in range(c.size)]
     for s in fit.slopes:
         if not set(s.takes) <= set(search.held):
             continue
-        for column, n in enumerate(s.numbers):
-            c, k = of_number[int(n)]
-            told = _trend(search.jury, fit, s, column)
-            if told is None or c.shapes[k]:
-                continue
-            change, rms = told
-            if abs(change) > CHANGE * abs(fit.x[n]):
-                x = fit.x[fit.slices()[fit.effects.index(c)]]
+        for n, change, rms in _trends(search.jury, fit, s):
+            c, x, k = of_number[n]
+            if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
                 first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
@@ -70,22 +64,23 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     return out
 
 
-def _trend(jury: Jury, fit: Fit, s: Slopes, column: int) -> tuple[float, float] | None:
-    """By how much a size changes over a take, and RMS of what that explains, over sigma; None where it is not sure."""
+def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float]]:
+    """Numbers (indices of x) that surely change over a take, by how much, and RMS of what that explains, over sigma."""
     r = jury.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
     clocks = {}
     for i in s.takes:
         e = jury.evidence[i]
         clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
-    z = s.J[:, column] * jury.vector(clocks, "fit", s.joint)
-    z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
-    power = float(z @ z)
-    if power < 1e-9:
-        return None
-    change = -float(z @ r) / power
+    clock = jury.vector(clocks, "fit", s.joint)
     _, which = np.unique(jury.stretches(s.takes, "fit", s.joint), return_inverse=True)
-    by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
-    error = float(np.linalg.norm(by_stretch)) / power
-    if abs(change) < SURE * error or change**2 * power < LEAST_GAIN:
-        return None
-    return change, abs(change) * float(np.sqrt(power / int(np.count_nonzero(r))))
+    for n, slope in zip(s.numbers.tolist(), s.J.T):
+        z = slope * clock
+        z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
+        power = float(z @ z)
+        if power < 1e-9:
+            continue
+        change = -float(z @ r) / power
+        by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
+        error = float(np.linalg.norm(by_stretch)) / power
+        if abs(change) >= SURE * error and change**2 * power >= LEAST_GAIN:
+            yield n, change, abs(change) * float(np.sqrt(power / int(np.count_nonzero(r))))

@@ -48,10 +48,6 @@ SMOOTHED = 0.065
 """Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
 
 
-PLAY = {"backlash": "gap", "loose_mount": "play"}
-"""Effects with free play, and the parameter that says how much."""
-
-
 def joint_of(channel: str) -> str:
     """The joint that a channel tells of; the channel's own name where it is the body's."""
     return channel.partition(ACROSS)[0]
@@ -103,6 +99,10 @@ class TakeEvidence:
         """Frames after the first command."""
         return np.asarray(self.since >= 0.0)
 
+    def zero(self, joint: str) -> float:
+        """Where a joint's recorded angle is zero, on its servo's scale [rad]."""
+        return float(self.take.measurement.rest_pose.get(joint, 0.0)) if self.take.recorded.zeroed else 0.0
+
     def columns(self, joint: str | None = None) -> NDArray[np.int_]:
         """Of one joint's channels; of all."""
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
@@ -124,8 +124,10 @@ class TakeEvidence:
         if not self.take.recorded.zeroed or self.take.spec.base != "fixed":
             return simulated
         out, used = simulated.copy(), ~self.uses["validate"]
-        for spec in (s for s in model.effects if s.effect in PLAY):
-            play = si_values(known_effects()[spec.effect], spec)[PLAY[spec.effect]]
+        for spec, effect in ((s, known_effects()[s.effect]) for s in model.effects):
+            if not effect.free_play:
+                continue
+            play = si_values(effect, spec)[effect.free_play]
             for i in (i for joint in spec.where for i in self.columns(joint)):
                 off = (self.recorded - simulated)[used, i]
                 if np.isfinite(off).any():

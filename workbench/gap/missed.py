@@ -14,6 +14,7 @@ from workbench.effects.schedules import without_poses
 from workbench.gap.evidence import TakeEvidence, joint_error
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
+from workbench.gap.special import AT_STOP
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
@@ -22,8 +23,6 @@ LEAST_STEP = np.deg2rad(2.0)
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
-AT_END = np.deg2rad(0.6)
-"""How near the furthest that a joint ever went it stands there [rad]."""
 LEAST_CLOSED = 0.5
 """Share of a joint's gap that the poses taken for missed must explain."""
 
@@ -99,13 +98,12 @@ def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: i
     stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
     way = 1.0 if goal > stood else -1.0
     end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
-    return way * goal > end and way * stood > end - AT_END
+    return way * goal > end and way * stood > end - AT_STOP
 
 
 def _seen(e: TakeEvidence, joint: str) -> Array:
     """Where a joint was [rad], the zero being the servo's."""
-    rest = float(e.take.measurement.rest_pose.get(joint, 0.0)) if e.take.recorded.zeroed else 0.0
-    return np.asarray(e.recorded[:, e.channels.index(joint)] + rest)
+    return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
 
 def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:

@@ -117,7 +117,8 @@ def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...]
 
 def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
     """Whether a joint that was given an effect still goes wrong with the base held. No known name is what it lacks, and on the
-    ground it leads all others astray: only what moves the robot as a whole is asked there, and taken where it is most of it."""
+    ground it leads all others astray: only joints that stand out and what moves the robot as a whole are asked there, and taken
+    where that is most of it."""
     given = {c.joint for c in current.effects}
     return any(joint_of(c) in given for c in _remaining(search, current, nominal, search.held, ROUGH_SHARE))
 

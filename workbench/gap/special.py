@@ -45,7 +45,7 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
         column = e.joints.index(joint)
         seen = e.recorded[:, column]
         said = seen - residuals[i][:, column] * e.sigma[column]
-        rest = float(e.take.measurement.rest_pose.get(joint, 0.0)) if e.take.recorded.zeroed else 0.0
+        rest = e.zero(joint)
         for side in ends:
             mean = smoothed(seen[:, None], 5)[:, 0] / np.sqrt(5) * side
             good = np.isfinite(mean) & np.isfinite(said)
