@@ -14,7 +14,7 @@ class ZeroOffset(Effect):
     name = "zero_offset"
     layer = "structure"
     places = ("joint",)
-    parameters = (Parameter("angle", "deg", -45.0, 45.0, 2.0, si=DEGREE),)
+    parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"{', '.join(spec.where)} stands {spec.parameters['angle']:.1f} deg off its servo's zero."

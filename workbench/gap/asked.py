@@ -11,8 +11,10 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD = 6, 4, 2
+TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD = 7, 4, 2
 """The first are what moves the robot as a whole, and joints that stand out: on the ground, and with the base held."""
+NEVER_LAST = 5
+"""The tier, of zero offsets, after which the next is asked however good they are: a longer link moves a foot much alike."""
 STANDS_OUT = 4.0
 """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
 lacks something, not the robot as a whole."""
@@ -94,16 +96,17 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
 def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
     """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
-    number, by several (for which a walk has to be looked at all around), then joints, then zero offsets and what is in lighter
-    links."""
+    number, by several (for which a walk has to be looked at all around), then joints, zero offsets, and what is in links."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
         if not c.where:
             return 1 if many else 2
         return 2 if c.joint is not None else 3
-    if c.name in ("link_length", *SEEN_ELSEWHERE) or (c.name == "payload" and c.where[0] not in heavy):
+    if c.name in SEEN_ELSEWHERE:
         return 5
+    if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
+        return 6
     if c.where and c.where[0] in outstanding:
         return 1
     if c.joint is not None:

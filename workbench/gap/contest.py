@@ -92,14 +92,15 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = ()) -> list[Standing]:
-    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change.
-    floors: of the fit, by take."""
+    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
+    whole robot at joints that no other effect is to answer for. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
-    out = []
+    out, theirs = [], {c.joint for c in fit.effects}
     for c, s in zip(fit.effects, standings):
         told_held = search.is_settled(c) or search.held == search.fitted
-        worst = max((r for channel, r in left if told_held and c.joint in (None, joint_of(channel)) and r == r), default=0.0)
+        own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
+        worst = max((r for r in own if told_held and r == r), default=0.0)
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out

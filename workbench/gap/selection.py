@@ -11,14 +11,15 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.asked import TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD, asked, standing_out
+from workbench.gap.asked import NEVER_LAST, TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD, asked, standing_out
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Part, Trial
 from workbench.gap.search import Fit, Report, Search
 
-MOST_EFFECTS = 6
+MOST_ROUNDS = 6
+"""With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
 MOST_WORK, MOST_ROLLOUTS = 2500.0, 60.0
 """Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
 recording."""
@@ -127,7 +128,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
            most_work: float, astray: bool = False) -> Fit:
     stopped = False
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
-    while len(current.effects) < MOST_EFFECTS and not stopped:
+    for _ in range(MOST_ROUNDS):
         beyond = _remaining(search, current, _before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
@@ -142,7 +143,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and _says_it(search, current, trials[0], takes, tier):
+            if trials and tier != NEVER_LAST and _says_it(search, current, trials[0], takes, tier):
                 break
         closed = LAST_CLOSED if astray else LEAST_CLOSED
         worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds)]
@@ -152,9 +153,10 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         rounds.append(Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted),
                             stopped))
-        if not accepted:
+        if accepted:
+            current = after
+        if stopped or not accepted:
             break
-        current = after
     return current
 
 
