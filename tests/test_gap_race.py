@@ -1,6 +1,7 @@
 """What keeps a search short: guesses near what was looked at, rules instead of differences, nothing rolled out in vain."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from workbench.gap.asked import _when_held
 from workbench.gap.candidates import Candidate
 from workbench.gap.covariance import _scattered
 from workbench.gap.fitting import Solved, fit_blocks, lowest, together
-from workbench.gap.jury import Jury, Question
-from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _guess, _scan, _tell
+from workbench.gap.guess import guess, scan
+from workbench.gap.jury import STRETCHES, Jury, Question
+from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
 from workbench.gap.search import Search
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
@@ -34,30 +36,30 @@ def friction():
 
 def test_an_effect_of_one_number_is_looked_at_at_several_sizes_within_its_bounds():
     c = friction()
-    assert [c.values(p)[0] for p in _scan(c, (0.7, 2.0), True)] == pytest.approx([0.46, 0.2])
-    assert len(_scan(c, (90.0, 99.0), True)) == 1  # both at the bound
+    assert [c.values(p)[0] for p in scan(c, (0.7, 2.0), True)] == pytest.approx([0.46, 0.2])
+    assert len(scan(c, (90.0, 99.0), True)) == 1  # both at the bound
 
 
 def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     c = Candidate.of(known_effects()["command_delay"], (), (0.0,))
     r0 = np.ones(20)
-    probes = _scan(c, (0.7, 2.0), True)
+    probes = scan(c, (0.7, 2.0), True)
     weak = [r0 - 0.01 * p[0] for p in probes]  # a line would say: a hundred times that
-    x, gain = _guess(c, r0, probes, weak, FAR_WALKING)
+    x, gain = guess(c, r0, probes, weak, FAR_WALKING)
     assert x[0] == pytest.approx(FAR_WALKING * 2.0)
     assert 0 < gain < 20
     slips = [r0, r0 - 1.0]  # nothing at the first size, all at the second
-    assert _guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
+    assert guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
 
 
 def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_not_scaled():
     c = Candidate.of(known_effects()["stribeck_friction"], ("flm",), (0.0, 20.0))
-    probes = _scan(c, (1.0, 4.0), False)
+    probes = scan(c, (1.0, 4.0), False)
     assert sorted({round(c.values(p)[1]) for p in probes}) == [5, 20, 80]
-    assert {p[1] for p in _scan(c, (1.0,), True)} == {0.0}  # walks are expensive
+    assert {p[1] for p in scan(c, (1.0,), True)} == {0.0}  # walks are expensive
     r0 = np.linspace(-1.0, 1.0, 20)
     fades = [r0 * (1 - 0.3 * p[0]) if p[1] == 2.0 else r0 + 0.01 * p[0] for p in probes]
-    x, gain = _guess(c, r0, probes, fades, 5.0)
+    x, gain = guess(c, r0, probes, fades, 5.0)
     assert x == pytest.approx([1 / 0.3, 2.0])
     assert gain == pytest.approx(r0 @ r0)
 
@@ -214,7 +216,7 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
     c = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     rng = np.random.default_rng(0)
     line, bend, truth = rng.normal(size=(2, 50)), rng.normal(size=(2, 50)), np.array([0.6, -0.9])
-    probes = _scan(c, (1.0,), True)
+    probes = scan(c, (1.0,), True)
     assert [p.tolist() for p in probes] == [[2, 0], [0, 2], [-2, 0], [0, -2], [2, 2], [2, -2], [-2, 2], [-2, -2]]
     both = rng.normal(size=50)
 
@@ -223,11 +225,35 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
 
     r0 = -shown(truth)
     seen = [r0 + shown(p) for p in probes]
-    x, gain = _guess(c, r0, probes, seen, FAR_WALKING)
+    x, gain = guess(c, r0, probes, seen, FAR_WALKING)
     assert x == pytest.approx(truth, abs=1e-3)
     assert gain == pytest.approx(r0 @ r0, rel=1e-6)
-    far, _ = _guess(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
+    far, _ = guess(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
     assert np.abs(far).max() <= 4 * FAR_WALKING
+
+
+def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
+    """Take 0 goes with the floor's tilt, take 1 was thrown about by something else."""
+    rng = np.random.default_rng(1)
+    line, truth = rng.normal(size=(2, 60)), np.array([1.5, -0.5])
+    calm, wild = -truth @ line, 50 * rng.normal(size=60)
+    probes = [np.array(p, dtype=float) for p in ([2, 0], [0, 2], [-2, 0], [0, -2], [2, 2], [2, -2], [-2, 2], [-2, -2])]
+    signatures = [[np.concatenate([p @ line, 30 * rng.normal(size=60)])] for p in probes]
+    power = {0: float(calm @ calm), 1: float(wild @ wild)}
+
+    def calmest(explained, least=0.0):
+        trying = Trying.__new__(Trying)
+        trying.jury = SimpleNamespace(expected=lambda takes, use: 60.0,
+                                      stretches=lambda takes, use: np.repeat([0, STRETCHES], 60))
+        trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
+        trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
+        return trying._calmest(probes, signatures, explained)
+
+    take, x = calmest(0.0)
+    assert take == 0
+    assert x == pytest.approx(truth, abs=1e-3)
+    assert calmest(0.9 * sum(power.values())) is None  # all are explained
+    assert calmest(0.0, least=1e6) is None  # it shows too little
 
 
 def test_one_number_looks_far_where_slopes_are_noise():

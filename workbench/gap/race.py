@@ -8,25 +8,24 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, minimize
 
 from workbench.gap.candidates import Candidate, with_effects
 from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through
-from workbench.gap.jury import COARSE, Jury, Question
+from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan
+from workbench.gap.jury import COARSE, Jury, Question, take_of
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two sizes,
-and those of several numbers at the last, beyond what a walk makes of anything small."""
-SHAPED = (0.0, 2.0, -2.0)
-"""Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 LOOKED, LOOKED_SHARE = 2.5, 0.3
 """How long [s] a walk is looked at, for an effect of one number, and the share of what is missing that must show by then; else
 longer. Walks are expensive, and late in them small differences have grown into others."""
+CALM = 0.5
+"""Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
+them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
+"""
 WORTH = 0.3
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 BEHIND = 0.6
@@ -129,12 +128,47 @@ class Trying:
         everyone = list(range(len(self.group)))
         c = self.group[0]
         sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
-        probes = _scan(c, sizes, self.walking)
+        probes = scan(c, sizes, self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
         before = self._left(plain)
         self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), before)] for a in answers], self.until
-        return self._guessed(*self.signatures[self._name])
+        told = self._guessed(*self.signatures[self._name])
+        calm = None if self.coarse or not self.walking else self._calmest(*self.signatures[self._name][:2], told[1][0])
+        if calm is None:
+            return told
+        x = yield from self._fitted_on(*calm)
+        (answer,) = yield [self._question([0], [x])]
+        return max(told, ([x], [sum(self.power.values()) - self.jury.cost(answer, "fit")]), key=lambda t: t[1])
+
+    def _fitted_on(self, take: int, x: Array) -> Part[Array]:
+        """Sizes as one take alone wants them."""
+        def ask(point: Sequence[Array]) -> Question:
+            return replace(self._question([0], point), takes=(take,))
+
+        def tell(answer: dict[int, Array]) -> list[Array]:
+            return [self.jury.vector(answer, "fit")]
+
+        (answer,) = yield [ask([x])]
+        (solved,) = yield from through(fit_blocks([x], tell(answer), [self.group[0].bounds()], STEPS_WALKING, WALKING), ask, tell)
+        return solved.x
+
+    def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
+        """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
+        beyond = {i: self.power[i] - self.jury.expected((i,), "fit") for i in self.takes}
+        if gain > CALM * sum(beyond.values()):
+            return None
+        take = take_of(self.jury.stretches(self.takes, "fit"))
+        best: tuple[int, Array] | None = None
+        most = CALM
+        for i in self.takes:
+            here = take == i
+            r0 = self.r0[0][here]
+            x, gain = guess(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
+            share = gain / max(beyond[i], self.race.least, 1.0)
+            if share > most:
+                best, most = (i, x), share
+        return best
 
     def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
                  ) -> tuple[list[Array], list[float]]:
@@ -142,7 +176,7 @@ class Trying:
         looked_at = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
         r0 = self._left(looked_at)
         far = FAR_WALKING if self.walking else FAR
-        guesses = [_guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
+        guesses = [guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
         share = max(self.jury.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
@@ -215,64 +249,3 @@ def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Se
 def _best(best: dict[str | None, float], joint: str | None) -> float:
     """At a joint; of all, for what concerns all."""
     return max(best.values()) if joint is None else best[joint]
-
-
-def _scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
-    """Sizes at which a candidate is looked at: of one number, several, both ways where it lifts feet; of more, each alone, of
-    a walk all around."""
-    if c.read_off:
-        return [np.ones(c.size)]
-    probes = c.around() if walking else c.probes()
-    low, high = c.bounds()
-    if len(probes) > 1 or not c.size:
-        return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
-    lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
-    ways = (1.0, -1.0) if lifts else (1.0,)
-    shapes = SHAPED if c.shapes.any() and not walking else (0.0,)
-    points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
-    return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
-
-
-def _guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
-    """Sizes to start from, and how much of the sum of squares signatures say they take away."""
-    whole = float(r0 @ r0)
-    if not c.size:
-        return np.empty(0), whole - float(seen[0] @ seen[0])
-    low, high = c.bounds()
-    if np.linalg.matrix_rank(np.array(probes)[:, ~c.shapes]) > 1:  # several numbers, not one at several sizes
-        return _bent_guess(r0, np.array(probes), np.array(seen), (low, high), 2 * far)
-    best = (probes[0], -np.inf)
-    for p, v in zip(probes, seen):
-        S = v - r0
-        power = float(S @ S)
-        size = float(np.clip(-(S @ r0) / power, -far, far)) if power > 1e-9 else 0.0
-        x = np.clip(np.where(c.shapes, p, size * p), low, high)
-        size = float(x[~c.shapes] @ p[~c.shapes] / max(float(p[~c.shapes] @ p[~c.shapes]), 1e-9))
-        gain = whole - float(np.sum((r0 + S * size) ** 2))
-        if gain > best[1]:
-            best = (x, gain)
-    return best
-
-
-def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
-    """The same of several numbers: what is seen at points (k, n) told by a line for each number and, as a walk hardly answers in
-    lines, by squares of those that were seen both ways and the product of the first two; sizes where the sum of squares of that,
-    or of a point that was seen, is least."""
-    both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
-
-    def terms(x: Array) -> Array:
-        together = x[..., both[:2]].prod(axis=-1, keepdims=True) if len(both) > 1 else x[..., :0]
-        return np.concatenate([x, x[..., both] ** 2, together], axis=-1)
-
-    answers = np.linalg.lstsq(terms(points), seen - r0, rcond=1e-8)[0]
-    G, g = answers @ answers.T, answers @ r0
-
-    def cost(x: Array) -> float:
-        return float(terms(x) @ G @ terms(x) + 2 * terms(x) @ g)
-
-    reach = far * np.abs(points).max(axis=0)
-    box = Bounds(np.maximum(bounds[0], -reach), np.minimum(bounds[1], reach))
-    ends = [minimize(cost, start, method="L-BFGS-B", bounds=box) for start in (np.zeros(points.shape[1]), *points)]
-    known = [(np.asarray(end.x, dtype=float), -float(end.fun)) for end in ends]
-    known += [(p, float(r0 @ r0 - r @ r)) for p, r in zip(points, seen)]
-    return max(known, key=lambda k: k[1])
