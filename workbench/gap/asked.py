@@ -11,8 +11,8 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD = 7, 4, 2
-"""The first are what moves the robot as a whole, and joints that stand out: on the ground, and with the base held."""
+TIERS, TIERS_OF_ALL = 7, 4
+"""On the ground the first are what moves the robot as a whole, and joints that stand out."""
 NEVER_LAST = 5
 """The tier, of zero offsets, after which the next is asked however good they are: a longer link moves a foot much alike."""
 STANDS_OUT = 4.0

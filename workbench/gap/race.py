@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
-LOOKED, LOOKED_SHARE = 2.5, 0.3
-"""How long [s] a walk is looked at, for an effect of one number, and the share of what is missing that must show by then; else
-longer. Walks are expensive, and late in them small differences have grown into others."""
+LOOKED, LOOKED_SHARE, LOOKED_SHARE_HELD = 2.5, 0.3, 0.5
+"""How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on the
+ground and with the base held; else longer. Late in walks small differences have grown into others."""
 CALM = 0.5
 """Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
 them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
@@ -91,10 +91,11 @@ class Trying:
         self.joints = [c.joint if apart else None for c in group]
         self.walking = jury.walks(tuple(base))
         self.base, self.takes = base, tuple(base)
-        self.coarse = self.walking and all(c.size < 2 for c in group)  # several numbers are told apart by little
+        self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
         self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
-        self.looked_at = (max(base, key=lambda i: self.power[i]),) if self.coarse else self.takes  # walks are expensive
+        alone = self.coarse and self.walking  # walks are expensive
+        self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
         self.until = self._shown() if self.coarse else np.inf
         self.without: dict[int, Array] = {}
         self._name = (*(c.key for c in group), self.looked_at)
@@ -181,10 +182,11 @@ class Trying:
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _shown(self) -> float:
-        """How long a walk is looked at [s]."""
+        """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
         seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
-        least = LOOKED_SHARE * sum(self.power[i] for i in self.looked_at)
-        while self.jury.cost(self.jury.early(seen, until), "fit") < least:
+        share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
+        while any(self.jury.cost(self.jury.early(seen, until), "fit", j) < share * self.jury.cost(seen, "fit", j)
+                  for j in set(self.joints)):
             until += LOOKED / 2
         return until
 
@@ -234,7 +236,7 @@ class Trying:
         return Question(model, self.takes, COARSE if self.coarse else 1.0)
 
     def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
-        """What an answer leaves; of a walk, the difference that coarse steps tell, beside what the search's step leaves."""
+        """What an answer leaves: the difference that coarse steps tell, beside what the search's step leaves."""
         return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:

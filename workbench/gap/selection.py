@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.asked import NEVER_LAST, TIERS, TIERS_OF_ALL, TIERS_OF_ALL_HELD, asked, standing_out
+from workbench.gap.asked import NEVER_LAST, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidates import Candidate
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
@@ -42,8 +42,8 @@ several, the first may leave much to the next, but a name that leaves half at th
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH, NEARLY_ALL = 0.6, 0.9
-"""Share of a gap from which on less likely effects are not asked for; the second before joints are asked, as a joint's effect can
-look like one of the whole robot's."""
+"""Share of a gap from which on less likely effects are not asked for. The second with the base held, as what a hand carries looks
+like a weak shoulder, and on the ground before joints are asked, as a joint's effect can look like one of the whole robot's."""
 MOST_STEPS, LAST_STEPS = 5, 3
 """Of a fit of all effects, when one was added, and when one was dropped at the end; it ends where little changes."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
@@ -162,10 +162,10 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
 
 def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
-    of_all = tier < (TIERS_OF_ALL if search.jury.walks(takes) else TIERS_OF_ALL_HELD)
-    if of_all and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
+    surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
+    if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
         return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > ENOUGH
-    return t.closed > (NEARLY_ALL if of_all else ENOUGH)
+    return t.closed > (NEARLY_ALL if surely else ENOUGH)
 
 
 def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]) -> float:
