@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
-from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate, candidates
-from workbench.gap.contest import Rival, Standing, _hardly_other, contest, doubted
+from workbench.gap.candidates import candidates
+from workbench.gap.contest import Rival, Standing, contest, doubted
 from workbench.gap.jury import Jury
 from workbench.gap.search import Search
 from workbench.gap.selection import Chosen, Round
@@ -50,15 +48,6 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
     assert less.probability < 0.5
     assert less.rivals[0].probability == pytest.approx(0.08 / 0.9 * less.probability)
     assert doubted(search, far, standings, {0: 100 + floors[0]}) == standings  # all below the fit's own floor
-
-
-@pytest.mark.parametrize(("effect", "neutral", "value", "hardly"), [
-    ("ground_friction", 0.6, 0.57, True), ("ground_friction", 0.6, 0.5, False), ("soft_ground", np.inf, 4000.0, False),
-    ("supply_voltage", 11.1, 11.0, False)])
-def test_a_floor_that_grips_hardly_otherwise_is_no_sure_finding(effect, neutral, value, hardly):
-    c = Candidate.of(known_effects()[effect], (), (neutral,))
-    x = np.array([brentq(lambda x: c.values(np.array([x]))[0] - value, 1e-6, 10.0)])
-    assert _hardly_other(c, x) is hardly
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

@@ -45,8 +45,6 @@ LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
 gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
 CHANGING = 0.5
 """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
-SLIGHT, SLIGHTLY = 0.5, 0.1
-"""The factor for a floor that grips hardly otherwise than the model's, and the share that is: engines and floors differ so."""
 LEAST = 0.2
 
 
@@ -94,24 +92,18 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = ()) -> list[Standing]:
-    """Standings less sure where held takes, which told the effect, leave much at its place (of the whole robot: at joints that no
-    other effect is to answer for), or want its numbers to change, or a floor is hardly another. floors: of the fit, by take."""
+    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
+    whole robot at joints that no other effect is to answer for. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], {c.joint for c in fit.effects}
-    for c, s, where in zip(fit.effects, standings, fit.slices()):
+    for c, s in zip(fit.effects, standings):
         told_held = search.is_settled(c) or search.held == search.fitted
         own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
         worst = max((r for r in own if told_held and r == r), default=0.0)
-        factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
-        factor *= (CHANGING if c in changing else 1.0) * (SLIGHT if _hardly_other(c, fit.x[where]) else 1.0)
+        factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
-
-
-def _hardly_other(c: Candidate, x: Array) -> bool:
-    """Whether a floor's one number is about the model's own."""
-    return c.effect.layer == "ground" and c.size == 1 and bool(abs(c.values(x)[0] - c.neutral[0]) < SLIGHTLY * c.neutral[0])
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
