@@ -104,9 +104,9 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
             return 1 if many else 2
         return 2 if c.joint is not None else 3
     if c.name in SEEN_ELSEWHERE:
-        return 5
+        return NEVER_LAST
     if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
-        return 6
+        return NEVER_LAST + 1
     if c.where and c.where[0] in outstanding:
         return 1
     if c.joint is not None:

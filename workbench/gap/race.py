@@ -133,9 +133,10 @@ class Trying:
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
         before = self._left(plain)
-        self.signatures[self._name] = probes, [[v - w for v, w in zip(self._left(a), before)] for a in answers], self.until
-        told = self._guessed(*self.signatures[self._name])
-        calm = None if self.coarse or not self.walking else self._calmest(*self.signatures[self._name][:2], told[1][0])
+        signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
+        self.signatures[self._name] = probes, signatures, self.until
+        told = self._guessed(probes, signatures, self.until)
+        calm = None if self.coarse or not self.walking else self._calmest(probes, signatures, told[1][0])
         if calm is None:
             return told
         x = yield from self._fitted_on(*calm)
@@ -185,9 +186,11 @@ class Trying:
         """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
         seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
         share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
-        while any(self.jury.cost(self.jury.early(seen, until), "fit", j) < share * self.jury.cost(seen, "fit", j)
-                  for j in set(self.joints)):
+        least = {j: share * self.jury.cost(seen, "fit", j) for j in self.joints}
+        early = self.jury.early(seen, until)
+        while any(self.jury.cost(early, "fit", j) < enough for j, enough in least.items()):
             until += LOOKED / 2
+            early = self.jury.early(seen, until)
         return until
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
