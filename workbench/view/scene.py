@@ -89,7 +89,11 @@ class _Scene:
         where = np.concatenate([p.base_p[:, :2] for p in played])
         self.low, self.high = where.min(axis=0), where.max(axis=0)
         self.middle = (float((self.low + self.high)[0] / 2), float((self.low + self.high)[1] / 2))
-        self.reach = 1.15 * shapes.height + 0.5 * float(np.linalg.norm(self.high - self.low))
+        links = [p.in_world(link)[0] for p in played for link in p.links]
+        # an arm may reach far beyond its height when stretched, and stand high above the floor
+        self.tall = max(shapes.height, max(float(p[:, 2].max()) for p in links))
+        wide = max(float(np.linalg.norm(p[:, :2] - self.middle, axis=1).max()) for p in links)
+        self.reach = max(1.15 * self.tall + 0.5 * float(np.linalg.norm(self.high - self.low)), wide)
         self.meshcat = _quiet_meshcat()
         self.animation = MeshcatAnimation(rate)
         self.copies: list[Copy] = []
@@ -192,7 +196,7 @@ class _Scene:
         for name, intensity in lights.items():
             self.meshcat.SetProperty(f"/Lights/{name}/<object>", "intensity", intensity)
         add_grid(self.meshcat, self.low - 2.5 * self.shapes.height, self.high + 2.5 * self.shapes.height)
-        target = np.array([*self.middle, 0.5 * self.shapes.height])
+        target = np.array([*self.middle, 0.5 * self.tall])
         self.meshcat.SetCamera(Meshcat.PerspectiveCamera(fov=35.0, aspect=1.6, near=0.02, far=50.0))
         self.meshcat.SetCameraPose(target + 2.3 * self.reach * np.array([0.5, -1.0, 0.5]), target)
 
