@@ -11,6 +11,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import small_robot, swing
+from workbench.gap.bench.arm import arm_sdf
 from workbench.gap.findings import (
     Alternative,
     Change,
@@ -114,6 +115,16 @@ def test_the_robot_says_its_worst_joint(model: RobotModel) -> None:
     said = [t.get_text() for t in robot_map(model, {"flm": 20.0, "frm": 1.1, "flb": float("nan")}).axes[0].texts]
     assert "flm 20.0×" in said
     assert "frm" in said  # within the limit: no number
+
+
+def test_names_of_joints_in_one_line_stand_apart(tmp_path: Path) -> None:
+    (tmp_path / "arm.sdf").write_text(arm_sdf(True))
+    arm = RobotModel(description=str(tmp_path / "arm.sdf"), base="base")
+    texts = robot_map(arm, dict.fromkeys(arm.joints, 9.0)).axes[0].texts
+    x, y = np.transpose([t.xyann for t in texts])
+    assert len(texts) == len(arm.joints)
+    assert np.abs(np.diff(np.sort(y))).min() > 0.05 * np.ptp([t.xy[0] for t in texts])
+    assert x.min() > max(t.xy[0] for t in texts)
 
 
 def test_before_and_after_shows_the_worst_unseen_stretch(story: TakeStory) -> None:

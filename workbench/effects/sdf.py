@@ -138,7 +138,7 @@ class SdfRobot:
         ends = [f.X_PF_p for f in following] or [numbers(s.find("pose"), 6)[:3] for s in foot if s.tag == "collision"]
         if not ends:
             raise InputError(self.path, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
-        return np.asarray(np.mean(ends, axis=0) + carrier.X_MB_R.T @ carrier.X_MB_p, dtype=float)
+        return np.asarray(np.mean(ends, axis=0) - carrier.p_BM, dtype=float)
 
     def _ends(self, k: Kinematics, link: str) -> tuple[list[JointFrame], list[Element]]:
         """Joints that hang on a link; of one that carries none, its foot's shapes."""
@@ -157,7 +157,7 @@ class SdfRobot:
                 p = p + poses[link][1][0] @ shift
             write_pose(self._link(name), p, R, relative_to=k.root)
         for name, f in k.frames.items():
-            write_pose(self._joint(name), -f.X_MB_R.T @ f.X_MB_p, f.X_MB_R.T)
+            write_pose(self._joint(name), f.p_BM, f.X_MB_R.T)
 
     def _foot(self, link: str) -> list[Element]:
         """Shapes of the link's foot: those named so, or all that touch."""

@@ -30,6 +30,11 @@ class JointFrame:
     upper: float
     effort: float
 
+    @property
+    def p_BM(self) -> Array:
+        """Where the joint is, (3,) [m] in its child link's frame B."""
+        return -self.X_MB_R.T @ self.X_MB_p
+
 
 @dataclass(frozen=True)
 class Kinematics:

@@ -58,28 +58,28 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     poses = {link: (p[0], R[0]) for link, (p, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
     figure = new_figure(7.6, 4.6)
     axes = figure.subplots()
-    segments = []
-    for link, (p, R) in poses.items():
-        joint = k.joint_of(link)
-        if joint is None:
-            continue
-        segments.append([_oblique(poses[k.frames[joint].parent][0]), _oblique(p)])
-        if joint in shapes.feet:
-            segments.append([_oblique(p), _oblique(p + R @ shapes.feet[joint][1])])
+    points = {j: _oblique(poses[f.child][0] + poses[f.child][1] @ f.p_BM) for j, f in k.frames.items()}
+    segments, carrying = [], {f.parent for f in k.frames.values()}
+    for joint, f in k.frames.items():
+        carrier = k.parent_joint[f.parent]
+        segments.append([points[carrier] if carrier else _oblique(poses[f.parent][0]), points[joint]])
+        if joint in shapes.feet or f.child not in carrying:
+            (p, R), end = poses[f.child], shapes.feet[joint][1] if joint in shapes.feet else k.centers[f.child]
+            segments.append([points[joint], _oblique(p + R @ end)])
     axes.add_collection(LineCollection(segments, colors=COMMAND, linewidths=5, alpha=0.35, capstyle="round", zorder=1))
-    points = {j: _oblique(poses[k.frames[j].child][0]) for j in model.joints}
-    loud = sorted((j for j in points if ratios.get(j, 0.0) > LIMIT), key=lambda j: -ratios[j])[:4]
-    for joint, (x, y) in points.items():
-        ratio = ratios.get(joint, np.nan)
+    loud = sorted((j for j in model.joints if ratios.get(j, 0.0) > LIMIT), key=lambda j: -ratios[j])[:4]
+    for joint in model.joints:
+        (x, y), ratio = points[joint], ratios.get(joint, np.nan)
         known = np.isfinite(ratio)
         size, colour = (60 + 90 * np.log(max(ratio, 1.0)), HEAT(SCALE(ratio))) if known else (30, "#D9D9DD")
         axes.scatter(x, y, s=size, color=colour, edgecolor="#555555", linewidth=0.8, zorder=3)
         if joint not in loud:
             axes.annotate(joint, (x, y), xytext=(9, 4), textcoords="offset points", fontsize=8, color="#777777", zorder=2)
-    right, top = np.max(list(points.values()), axis=0)
-    height = top - min(y for _, y in points.values())
+    ends = np.concatenate(segments)
+    (right, top), (width, height) = ends.max(axis=0), np.ptp(ends, axis=0)
+    line = max(0.16 * height, 0.1 * width)
     for row, joint in enumerate(sorted(loud, key=lambda j: -points[j][1])):
-        axes.annotate(f"{joint} {ratios[joint]:.1f}×", points[joint], xytext=(right + 0.5 * height, top - 0.24 * row * height),
+        axes.annotate(f"{joint} {ratios[joint]:.1f}×", points[joint], xytext=(right + 2 * line, top - row * line),
                       va="center", fontsize=12, fontweight="bold", color=RECORDED, zorder=4,
                       arrowprops={"arrowstyle": "-", "color": RECORDED, "linewidth": 1.0, "alpha": 0.6})
     axes.set_aspect("equal", adjustable="datalim")

@@ -88,10 +88,10 @@ class Marker:
             path = f"{self.at[self.model.base]}/{name}"
             self.meshcat.SetObject(path, sphere, Rgba(0, 0, 0, 0.92))
             return path
-        frame = self.model.kinematics.frames[place]
-        path = f"{self.at[frame.child]}/{name}"
+        joint = self.model.kinematics.frames[place]
+        path = f"{self.at[joint.child]}/{name}"
         self.meshcat.SetObject(path, sphere, Rgba(0, 0, 0, 0.92))
-        self.meshcat.SetTransform(path, RigidTransform(-frame.X_MB_R.T @ frame.X_MB_p))  # the joint, in its link's frame
+        self.meshcat.SetTransform(path, RigidTransform(joint.p_BM))
         return path
 
     def _animate(self, path: str, ratio: Array, sized: bool) -> None:
