@@ -28,8 +28,10 @@ def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -
     if sum(ends[i] for i in fitted) <= LONG:
         return [e if i in fitted else _until(e, 0.0) for i, e in enumerate(evidence)]
     power = {i: _power(evidence[i], residuals[i]) for i in fitted}
-    whole = np.sum([_by_name(evidence, i, p.sum(axis=0)) for i, p in power.items()], axis=0)
-    shares = {i: _by_name(evidence, i, p) / np.maximum(whole, 1e-9) for i, p in power.items()}
+    names = list(dict.fromkeys(c for e in evidence for c in e.channels))
+    by_name = {i: _by_name(p, evidence[i].channels, names) for i, p in power.items()}
+    whole = np.sum([p.sum(axis=0) for p in by_name.values()], axis=0)
+    shares = {i: p / np.maximum(whole, 1e-9) for i, p in by_name.items()}
     until = dict.fromkeys(range(len(evidence)), 0.0)
     while True:
         spent = sum(until.values())
@@ -51,11 +53,10 @@ def _power(e: TakeEvidence, residual: Array) -> Array:
     return np.maximum(beyond, 0.01 * seen[:, None])
 
 
-def _by_name(evidence: Sequence[TakeEvidence], take: int, values: Array) -> Array:
-    """Columns (…, c) of a take as those of all channels that any take has."""
-    names = list(dict.fromkeys(c for e in evidence for c in e.channels))
-    out = np.zeros((*values.shape[:-1], len(names)))
-    out[..., [names.index(c) for c in evidence[take].channels]] = values
+def _by_name(values: Array, channels: Sequence[str], names: Sequence[str]) -> Array:
+    """Columns (N, c), one for each of `channels`, as those of all `names`."""
+    out = np.zeros((len(values), len(names)))
+    out[:, [names.index(c) for c in channels]] = values
     return out
 
 
