@@ -48,5 +48,5 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction): 
     left = drift.left([fading])
     assert left.where == ("three",)
     assert left.unit == "deg"
-    assert left.error > 0.0
+    assert left.error > 5 * left.floor > 0.0
     assert "coulomb_friction(three)" in left.description

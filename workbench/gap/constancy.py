@@ -26,22 +26,23 @@ SURE = 5.0
 
 @dataclass(frozen=True)
 class Drift:
-    """A number of an effect (its index) that held takes want to change: its values at a take's beginning and end, and what a
-    number that stays leaves for that, RMS over sigma."""
+    """A number of an effect (its index) that held takes want to change: its values at a take's beginning and end; what a number
+    that stays leaves for that, and what chance does, a standard error: RMS over sigma."""
 
     effect: Candidate
     number: int
     first: float
     last: float
     rms: float
+    chance: float
 
     def left(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
         """As something that a constant number does not explain."""
         p, joint = self.effect.parameters[self.number], self.effect.joint
         e = next((e for e in evidence if joint is None or joint in e.channels), evidence[0])
         channel = joint if joint in e.channels else e.joints[0]
-        floor, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
-        return Unexplained(() if joint is None else (joint,), self.rms * floor, floor, unit,
+        sigma, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
+        return Unexplained(() if joint is None else (joint,), self.rms * sigma, self.chance * sigma, unit,
                            f"{p.name} of {self.effect} would have to go from {self.first:.3g} to {self.last:.3g} {p.unit} within "
                            "a take: something that changes looks like it")
 
@@ -54,18 +55,19 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     for s in fit.slopes:
         if not set(s.takes) <= set(search.held):
             continue
-        for n, change, rms in _trends(search.jury, fit, s):
+        for n, change, error, of in _trends(search.jury, fit, s):
             c, x, k = of_number[n]
             if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
                 first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
-                out.append(Drift(c, k, first, last, rms))
+                out.append(Drift(c, k, first, last, abs(change) * of, error * of))
     return out
 
 
-def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float]]:
-    """Numbers (indices of x) that surely change over a take, by how much, and RMS of what that explains, over sigma."""
+def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float, float]]:
+    """Numbers (indices of x) that surely change over a take, by how much, its standard error, and the RMS over sigma that a
+    change of one makes."""
     r = jury.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
     clocks = {}
     for i in s.takes:
@@ -83,4 +85,4 @@ def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float
         by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
         error = float(np.linalg.norm(by_stretch)) / power
         if abs(change) >= SURE * error and change**2 * power >= LEAST_GAIN:
-            yield n, change, abs(change) * float(np.sqrt(power / int(np.count_nonzero(r))))
+            yield n, change, error, float(np.sqrt(power / int(np.count_nonzero(r))))
