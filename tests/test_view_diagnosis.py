@@ -262,3 +262,18 @@ def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     assert title_of(told.effect, told.where).endswith("at flm or flb")
     assert sentence_of(told).endswith("Or the same at flb: these recordings do not say.")
     assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
+
+
+def test_the_card_shows_the_number_that_the_data_tell(model: RobotModel, story: TakeStory) -> None:
+    stop = replace(finding("joint_stop"), parameters={
+        "lower": Estimate(-180.0, -inf, inf, "deg"), "upper": Estimate(12.6, 11.9, 13.2, "deg")})
+    page = diagnosis_report(replace(diagnosis(model), findings=(stop,)), [story], "Session small").html()
+    card = page[page.lower().index("joint stop at flm<"):]
+    assert card.index("12.6 deg") < card.index("-180 deg")
+
+
+def test_a_finding_of_the_whole_robot_is_shown_where_no_other_finding_is(model: RobotModel, story: TakeStory) -> None:
+    floor = replace(finding("ground_friction"), where=())
+    captions = [diagnosis_report(replace(diagnosis(model), findings=found), [story], "Session small").html().count("flm in walk: what")
+                for found in ((floor,), (finding(),), (finding(), floor))]
+    assert captions == [1, 1, 1]

@@ -9,6 +9,10 @@ from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 
 
+WHOLE = 180.0
+"""An end [deg] that no servo reaches."""
+
+
 class JointStop(Effect):
     """A joint ends before its servo does.
 
@@ -19,12 +23,14 @@ class JointStop(Effect):
     layer = "structure"
     places = ("joint",)
     parameters = (
-        Parameter("lower", "deg", -180.0, 180.0, -30.0, si=DEGREE),
-        Parameter("upper", "deg", -180.0, 180.0, 30.0, si=DEGREE),
+        Parameter("lower", "deg", -WHOLE, WHOLE, -30.0, si=DEGREE),
+        Parameter("upper", "deg", -WHOLE, WHOLE, 30.0, si=DEGREE),
     )
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"{', '.join(spec.where)} goes no further than {scalar(spec, 'lower'):.1f} and {scalar(spec, 'upper'):.1f} deg."
+        ends = [f"{way} than {scalar(spec, end):.1f} deg" for end, way in (("lower", "lower"), ("upper", "higher"))
+                if abs(scalar(spec, end)) < WHOLE]
+        return f"{', '.join(spec.where)} goes no {' and no '.join(ends) or 'further than it could'}."
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (-math.inf, math.inf)

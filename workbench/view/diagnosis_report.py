@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -90,7 +90,8 @@ def diagnosis_report(diagnosis: Diagnosis, stories: Sequence[TakeStory], title: 
     report.add(_where(diagnosis, stories))
     drawn: set[tuple[int, str]] = set()
     for finding in diagnosis.findings:
-        report.add(_finding(finding, diagnosis.rejected, stories, drawn))
+        others = {place for f in diagnosis.findings if f is not finding for place in f.where}
+        report.add(_finding(finding, diagnosis.rejected, stories, drawn, others))
     if stories:
         report.add(_unseen(stories))
     report.add(_left(diagnosis))
@@ -122,13 +123,18 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
         rival = rival_of(f)
         sure = f"{100 * f.confidence:.0f} % sure" + (
             f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
-        first = next(iter(f.parameters.values()), None)
-        numbers.append((title_of(f.effect, f.where), "is there" if first is None else _size(first), sure))
+        told = sorted(f.parameters.values(), key=lambda e: not _bounded(e))
+        numbers.append((title_of(f.effect, f.where), _size(told[0]) if told else "is there", sure))
     for s in stories:
         before, after = s.ratios(s.before), s.ratios(s.after)
         worst = max(before, key=lambda c: _finite(before[c]))
         numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
     return numbers[:8]
+
+
+def _bounded(e: Estimate) -> bool:
+    """Whether the data say anything of it."""
+    return bool(np.isfinite([e.low, e.high]).any())
 
 
 def _size(e: Estimate) -> str:
@@ -175,9 +181,9 @@ def _gap_row(g: GapEntry) -> list[str]:
     return [g.layer, _place(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
 
 
-def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[TakeStory], drawn: set[tuple[int, str]]
-             ) -> Section:
-    """drawn: takes and joints that the page has a figure of; this section's is added."""
+def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[TakeStory], drawn: set[tuple[int, str]],
+             others: Collection[str]) -> Section:
+    """drawn: takes and joints that the page has a figure of; this section's is added. others: places of other findings."""
     said = sentence_of(finding)
     parts: list[Part] = [Text(said)]
     if finding.evidence not in said:
@@ -190,7 +196,7 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     rows = [["how sure", sure], *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
-    shown = _best_view(finding, stories, drawn)
+    shown = _best_view(finding, stories, drawn, others)
     if shown is not None:
         i, joint = shown
         drawn.add(shown)
@@ -203,11 +209,12 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
-def _best_view(finding: Finding, stories: Sequence[TakeStory], drawn: set[tuple[int, str]]) -> tuple[int, str] | None:
-    """The take and joint on which the finding shows most: its own joint, else the one that improved most; one that is not yet
-    drawn, if there is any."""
+def _best_view(finding: Finding, stories: Sequence[TakeStory], drawn: set[tuple[int, str]], others: Collection[str]
+               ) -> tuple[int, str] | None:
+    """The take and joint on which the finding shows most: its own joint, else the one that improved most of those that are no
+    place of another finding; one that is not yet drawn, if there is any."""
     found = [(_gain(s, c), i, c) for i, s in enumerate(stories) for c in s.channels if c in s.recorded.joints]
-    own = [f for f in found if f[2] in finding.where]
+    own = [f for f in found if f[2] in finding.where] or [f for f in found if f[2] not in others]
     new = [f for f in own or found if f[1:] not in drawn]
     if not found:
         return None
