@@ -8,7 +8,6 @@ from workbench.effects.base import DEGREE, Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 
-
 WHOLE = 180.0
 """An end [deg] that no servo reaches."""
 

@@ -90,8 +90,8 @@ def diagnosis_report(diagnosis: Diagnosis, stories: Sequence[TakeStory], title: 
     report.add(_where(diagnosis, stories))
     drawn: set[tuple[int, str]] = set()
     for finding in diagnosis.findings:
-        others = {place for f in diagnosis.findings if f is not finding for place in f.where}
-        report.add(_finding(finding, diagnosis.rejected, stories, drawn, others))
+        elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
+        report.add(_finding(finding, diagnosis.rejected, stories, drawn, elsewhere))
     if stories:
         report.add(_unseen(stories))
     report.add(_left(diagnosis))
