@@ -1,11 +1,13 @@
 """Rivals in each other's place: the better one takes it, whoever was taken first."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import Rival, Standing, contest, doubted
+from workbench.gap.contest import Rival, Standing, _misfit, contest, doubted
 from workbench.gap.jury import Jury
 from workbench.gap.search import Search
 from workbench.gap.selection import Chosen, Round
@@ -56,3 +58,9 @@ def test_where_nothing_stays_nothing_is_contested(worn):
     fit, standings = contest(search, Chosen(nominal, ()), lambda what, share: None)
     assert fit is nominal
     assert standings == []
+
+
+def test_a_rival_must_lead_by_more_where_no_fit_is_right():
+    search = SimpleNamespace(fitted=(0,), jury=SimpleNamespace(expected=lambda takes, use: 100.0))
+    assert _misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
+    assert _misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0

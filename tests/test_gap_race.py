@@ -107,6 +107,19 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
     assert np.sqrt(np.mean((cut - brief)[both] ** 2)) < 0.1  # of noise: both are shifted by what they show of the clock
 
 
+def test_what_a_whole_take_says_of_the_start_is_not_what_its_beginning_says(quiet):
+    session, evidence = quiet
+    freely = replace(evidence[0], start_is_free=True)
+    jury = Jury([freely], CONFIG, n_jobs=1)
+    slow = replace(session.model, effects=(EffectSpec("clock_rate", (), {"ratio": 1.03}),))
+    whole, brief = (r[0] for r in jury.residuals([Question(slow, (0,)), Question(slow, (0,), until=1.0)]))
+    cut = jury.early({0: whole}, 1.0)[0]
+    both = np.isfinite(cut) & np.isfinite(brief)
+    assert both.sum() > 0.8 * np.isfinite(brief).sum()
+    assert np.sqrt(np.mean((whole - brief)[both] ** 2)) > 1.0  # the end of the take moved its start
+    assert np.sqrt(np.mean((cut - brief)[both] ** 2)) < 0.2
+
+
 def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypatch):
     session, evidence = quiet
 

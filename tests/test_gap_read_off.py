@@ -1,6 +1,7 @@
 """What no search finds and the recordings show: stops, missed poses, turned marker frames, loose mounts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from tests.test_gap_search import CONFIG
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
 from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import _read, _stands_at_an_end, with_missed
+from workbench.gap.missed import LEAST_CLOSED, SURELY, _least_closed, _read, _stands_at_an_end, with_missed
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
 from workbench.gap.special import special
@@ -110,3 +111,13 @@ def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the
     assert left(1.5, loose) == pytest.approx(left(0.0, loose), abs=np.deg2rad(0.05))
     assert left(9.0, loose) > np.deg2rad(4.0)
     assert left(1.5, quiet[0]) - left(0.0, quiet[0]) > np.deg2rad(1.0)
+
+
+def test_poses_missed_on_the_ground_alone_must_explain_nearly_all():
+    def jury(*bases):
+        return SimpleNamespace(evidence=[SimpleNamespace(take=SimpleNamespace(spec=SimpleNamespace(base=b))) for b in bases])
+
+    assert _least_closed(jury("fixed", "free"), {0: 1, 1: 0}) == LEAST_CLOSED
+    assert _least_closed(jury("fixed", "free"), {0: 0, 1: 2}) == SURELY
+    assert _least_closed(jury("free", "free"), {0: 1, 1: 1}) == LEAST_CLOSED
+    assert _least_closed(jury("fixed", "free"), {0: 0, 1: 1}) is None

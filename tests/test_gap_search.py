@@ -324,3 +324,14 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
     groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
+
+
+def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
+    monkeypatch.setattr(selection, "standing_out", lambda *_: set())
+    c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
+    fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
+    for settled, looked_at in ((True, [0]), (False, [0, 1])):
+        search = SimpleNamespace(held=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, jury=SimpleNamespace(
+            closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
+        r = Round(fit, (), ())
+        assert selection.completed(search, r, Trial(c, np.ones(1), {}, None), fit) == 1.0

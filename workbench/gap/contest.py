@@ -22,13 +22,14 @@ Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
 TEMPER = 4.0
 """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where walks do not
 tell."""
-ROUGH = 0.005
+ROUGH = 0.015
 """The same as a share of an effect's gain: where that is more, walks leave more open."""
 NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
 BETTER = 30.0
-"""Of the same: a rival that does better by this much takes an effect's place."""
+"""Of the same: a rival that does better by this much takes an effect's place; by more where the fit leaves more than a right
+model does."""
 NUMBER, NUMBER_SHARE = 40.0, 0.03
 """What each number that a name has more than another must bring, of the same: TEMPER times the logarithm of how many frames speak
 (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a model,
@@ -80,7 +81,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         if turn == len(fit.effects) or not challengers:
             break
         lead, best, replaced = max(challengers, key=lambda challenger: challenger[0])
-        if lead < BETTER:
+        if lead < BETTER * _misfit(search, fit):
             break
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
@@ -110,7 +111,7 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     taken = seats[fit.effects[i].key][1]
     walked = taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(fit.effects[i])
     temper = max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) if walked else TEMPER
-    temper *= max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
+    temper *= _misfit(search, fit)
     leads = np.array([0.0, *(_lead(fit, r, taken) for r in rivals)])
     weight = np.exp(0.5 * (leads - leads.max()) / temper)
     p = weight / weight.sum()
@@ -119,6 +120,12 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
             for r, q in zip(rivals, p[1:])]
     return Standing(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
+
+
+def _misfit(search: Search, fit: Fit) -> float:
+    """What a fit leaves on the choosing stretches in shares of what a right model does, at least 1: by how much more than noise
+    alone would have them chi squared differences are left to chance."""
+    return max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
 
 
 def _lead(fit: Fit, rival: Fit, taken: Trial) -> float:

@@ -118,6 +118,12 @@ class TakeEvidence:
         simulated = self._shifted(self._lying_in_its_play(simulated, model))
         return (self.recorded - simulated) / self.sigma
 
+    def early(self, residual: Array, until: float) -> Array:
+        """Residuals (N, c) as a rollout that ends `until` [s] after the first command leaves them: later frames are NaN, and say
+        nothing of the start."""
+        seen = np.where(self.since[:, None] <= until, residual, np.nan)
+        return (self.recorded - self._shifted(self.recorded - seen * self.sigma)) / self.sigma
+
     def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
         """A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
         that it is put where the frames that are not kept for validation want it, within the play."""

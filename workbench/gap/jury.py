@@ -72,7 +72,8 @@ class Jury:
         self.rollouts += len(order)
         for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
             q, i, _ = new[key]
-            self._keep(key, self.early({i: self.evidence[i].simulated(rollout, q.model)}, self._until(i, q))[i])
+            e = self.evidence[i]
+            self._keep(key, np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan))
         return [{i: self.evidence[i].residual(self._known[key], q.model, q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
@@ -98,8 +99,8 @@ class Jury:
         return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
 
     def early(self, residuals: dict[int, Array], until: float) -> dict[int, Array]:
-        """Residuals, or channels, as a question with this `until` would have them."""
-        return {i: np.where(self.evidence[i].since[:, None] <= until, r, np.nan) for i, r in residuals.items()}
+        """Residuals as a question with this `until` would have them."""
+        return {i: self.evidence[i].early(r, until) for i, r in residuals.items()}
 
     def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
         """One rollout; each take's own servo changes apply."""

@@ -23,8 +23,9 @@ LEAST_STEP = np.deg2rad(2.0)
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
-LEAST_CLOSED = 0.5
-"""Share of a joint's gap that the poses taken for missed must explain."""
+LEAST_CLOSED, SURELY = 0.5, 0.9
+"""Share of a joint's gap that the poses taken for missed must explain; the second where none was missed with the base held: on
+the ground a joint may be kept from going."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
     for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
         read = {i: _read(e, joint, residuals[i]) for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
         count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
-        if not _credible(jury, {i: len(r[0]) for i, r in read.items()}) or count > 0.6 * of:
+        least = _least_closed(jury, {i: len(r[0]) for i, r in read.items()})
+        if least is None or count > 0.6 * of:
             continue
         if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, r in read.items() for k in r[0]):
             continue
@@ -74,7 +76,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
                     for r in (residuals, after))
         frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
-        if was - now > LEAST_CLOSED * (was - frames) and was - now > 100:
+        if was - now > least * (was - frames) and was - now > 100:
             fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
                                   joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
             found.append(Missed(joint, count, of, fit, unseen))
@@ -82,11 +84,13 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
     return jury, tuple(found)
 
 
-def _credible(jury: Jury, missed: Mapping[int, int]) -> bool:
-    """On the ground a joint may be kept from going, once: believed are poses missed with the base held, or, without such takes,
-    more than one."""
+def _least_closed(jury: Jury, missed: Mapping[int, int]) -> float | None:
+    """Share of the joint's gap that so many missed poses, by take, must explain; None: not believed. On the ground a joint may be
+    kept from going, once."""
     held = [n for i, n in missed.items() if jury.evidence[i].take.spec.base == "fixed"]
-    return sum(held) > 0 if held else sum(missed.values()) > 1
+    if sum(held):
+        return LEAST_CLOSED
+    return (SURELY if held else LEAST_CLOSED) if sum(missed.values()) > 1 else None
 
 
 def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:

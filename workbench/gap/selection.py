@@ -250,9 +250,11 @@ def _beyond_settled(search: Search, t: Trial, takes: Sequence[int], rounds: Sequ
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out."""
+    that was judged or stood out; on held takes alone, where they told it."""
     outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
-    return search.jury.closed(r.before.residuals, now.residuals, "choose", t.candidate.joint if outstanding else t.joint)
+    takes = search.held if search.is_settled(t.candidate) else search.fitted
+    before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
+    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
