@@ -23,7 +23,7 @@ LEAST_STEP = np.deg2rad(2.0)
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
-LEAST_CLOSED, SURELY = 0.5, 0.9
+LEAST_CLOSED, SURELY = 0.5, 0.8
 """Share of a joint's gap that the poses taken for missed must explain; the second where none was missed with the base held: on
 the ground a joint may be kept from going."""
 
