@@ -20,10 +20,10 @@ from workbench.robot.model_file import Posterior, parameter_names
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 Z90 = 1.645
-WIDER = 1.5
+WIDER = 1.25
 """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
 engine, or the world, is not ours."""
-LEAST_RELATIVE = 0.015
+LEAST_RELATIVE = 0.01
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
