@@ -121,6 +121,8 @@ class TakeEvidence:
     def early(self, residual: Array, until: float) -> Array:
         """Residuals (N, c) as a rollout that ends `until` [s] after the first command leaves them: later frames are NaN, and say
         nothing of the start."""
+        if self.since[-1] <= until:
+            return residual
         seen = np.where(self.since[:, None] <= until, residual, np.nan)
         return (self.recorded - self._shifted(self.recorded - seen * self.sigma)) / self.sigma
 
