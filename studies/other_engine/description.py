@@ -160,10 +160,9 @@ def describe(path: str | Path) -> Description:
             links.append(LinkPart(name, mass, com, inertia, shapes))
             continue
         f = kinematics.frames[joint]
-        R_LM = f.X_MB_R.T
         links.append(LinkPart(
             name, mass, com, inertia, shapes, joint=joint, parent=f.parent, p=f.X_PF_p + f.X_PF_R @ f.X_MB_p,
-            R=f.X_PF_R @ f.X_MB_R, anchor=-R_LM @ f.X_MB_p, axis=R_LM @ f.axis, lower=f.lower, upper=f.upper))
+            R=f.X_PF_R @ f.X_MB_R, anchor=f.p_BM, axis=f.axis_B, lower=f.lower, upper=f.upper))
     return Description(tuple(links), kinematics.joints)
 
 

@@ -73,7 +73,7 @@ def gravity(arm: Kinematics, q: Array, offsets: Array | None = None) -> Array:
     for i, joint in enumerate(JOINTS):
         f = arm.frames[joint]
         p, R = poses[f.child]
-        axis, origin = R @ (f.X_MB_R.T @ f.axis), p - np.einsum("nij,j->ni", R @ f.X_MB_R.T, f.X_MB_p)
+        axis, origin = R @ f.axis_B, p + R @ f.p_BM
         for link in arm.links:
             if joint in arm.chain(link):
                 centre = poses[link][0] + poses[link][1] @ arm.centers[link]

@@ -145,9 +145,8 @@ class Machine:
                 continue
             frame = kinematics.frames[joint]
             p_BL, R_BL = poses[frame.child]
-            R_BM = R_BL @ frame.X_MB_R.T  # M on the child, at the joint's origin
-            origin = trajectory.p_WB + np.einsum("nij,nj->ni", R_WB, p_BL - R_BM @ frame.X_MB_p)
-            yield k, carried, origin, np.einsum("nij,nj->ni", R_WB, R_BM @ frame.axis)
+            origin = trajectory.p_WB + np.einsum("nij,nj->ni", R_WB, p_BL + R_BL @ frame.p_BM)
+            yield k, carried, origin, np.einsum("nij,nj->ni", R_WB, R_BL @ frame.axis_B)
 
 
 def _unmount(plant: MultibodyPlant, base: str) -> tuple[Array, Array]:

@@ -67,7 +67,7 @@ class SdfRobot:
         """The link turns freely by `play` in all about `axis` (3,), in the link's frame, through the joint's origin."""
         frame = Kinematics.from_text(self.text(), self.path).frames[joint]
         across = np.asarray(axis) / np.linalg.norm(axis) if np.any(axis) else np.zeros(3)
-        if not np.linalg.norm(np.cross(across, frame.X_MB_R.T @ frame.axis)) > 0.02:
+        if not np.linalg.norm(np.cross(across, frame.axis_B)) > 0.02:
             raise InputError(self.path, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
         xyz = Element("xyz", {"expressed_in": self._carried_by(joint)})
         xyz.text = written(across)

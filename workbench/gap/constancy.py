@@ -55,13 +55,13 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     for s in fit.slopes:
         if not set(s.takes) <= set(search.held):
             continue
-        for n, change, error, of in _trends(search.jury, fit, s):
+        for n, change, error, rms in _trends(search.jury, fit, s):
             c, x, k = of_number[n]
             if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
                 first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
-                out.append(Drift(c, k, first, last, abs(change) * of, error * of))
+                out.append(Drift(c, k, first, last, abs(change) * rms, error * rms))
     return out
 
 

@@ -67,13 +67,15 @@ Signatures = dict[tuple[object, ...], Seen]
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
     those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge; least:
-    what must be foretold of one that is fitted."""
+    what must be foretold of one that is fitted; early: what there is without them leaves, by takes and how long these are looked
+    at."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: list[float] = field(default_factory=list)
     least: float = 0.0
+    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
 
 class Trying:
@@ -175,7 +177,7 @@ class Trying:
     def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
                  ) -> tuple[list[Array], list[float]]:
         """Sizes to start from and what they gain, on all takes as on what was looked at."""
-        looked_at = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
+        looked_at = self._early(until)
         r0 = self._left(looked_at)
         far = FAR_WALKING if self.walking else FAR
         guesses = [guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
@@ -187,11 +189,16 @@ class Trying:
         seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
         share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
         least = {j: share * self.jury.cost(seen, "fit", j) for j in self.joints}
-        early = self.jury.early(seen, until)
-        while any(self.jury.cost(early, "fit", j) < enough for j, enough in least.items()):
+        while any(self.jury.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
             until += LOOKED / 2
-            early = self.jury.early(seen, until)
         return until
+
+    def _early(self, until: float) -> dict[int, Array]:
+        """What there is already leaves of the takes that are looked at for so long [s]."""
+        key = self.looked_at, until
+        if key not in self.race.early:
+            self.race.early[key] = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
+        return self.race.early[key]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
         """Of the group, those that are not told to be far behind a rival."""

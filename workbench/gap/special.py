@@ -59,12 +59,13 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     found = {side: (min(e for e, _ in told), max(m for _, m in told)) for side, told in ends.items() if told}
     if not found:
         return []
-    far = 180.0
-    neutral, typical, held = [-far, far], [-far, far], [True, True]
+    stop = known_effects()["joint_stop"]
+    far = [stop.parameters[0].low, stop.parameters[1].high]
+    neutral, typical, held = list(far), list(far), [True, True]
     for side, (end, reach) in found.items():
         k = 1 if side > 0 else 0
         neutral[k], typical[k], held[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
-    return [Candidate.of(known_effects()["joint_stop"], (joint,), neutral, typical, held)]
+    return [Candidate.of(stop, (joint,), neutral, typical, held)]
 
 
 def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],

@@ -35,6 +35,11 @@ class JointFrame:
         """Where the joint is, (3,) [m] in its child link's frame B."""
         return -self.X_MB_R.T @ self.X_MB_p
 
+    @property
+    def axis_B(self) -> Array:
+        """The joint's axis, (3,) unit, in its child link's frame B."""
+        return self.X_MB_R.T @ self.axis
+
 
 @dataclass(frozen=True)
 class Kinematics:

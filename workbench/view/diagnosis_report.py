@@ -123,8 +123,8 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
         rival = rival_of(f)
         sure = f"{100 * f.confidence:.0f} % sure" + (
             f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
-        told = sorted(f.parameters.values(), key=lambda e: not _bounded(e))
-        numbers.append((title_of(f.effect, f.where), _size(told[0]) if told else "is there", sure))
+        told = max(f.parameters.values(), key=_bounded, default=None)
+        numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in stories:
         before, after = s.ratios(s.before), s.ratios(s.after)
         worst = max(before, key=lambda c: _finite(before[c]))

@@ -59,13 +59,16 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     figure = new_figure(7.6, 4.6)
     axes = figure.subplots()
     points = {j: _oblique(poses[f.child][0] + poses[f.child][1] @ f.p_BM) for j, f in k.frames.items()}
-    segments, carrying = [], {f.parent for f in k.frames.values()}
+    carrying = {f.parent for f in k.frames.values()}
+    tips = {j: k.centers[f.child] for j, f in k.frames.items() if f.child not in carrying}
+    tips |= {j: p_LF for j, (_, p_LF) in shapes.feet.items()}
+    segments = []
     for joint, f in k.frames.items():
         carrier = k.parent_joint[f.parent]
         segments.append([points[carrier] if carrier else _oblique(poses[f.parent][0]), points[joint]])
-        if joint in shapes.feet or f.child not in carrying:
-            (p, R), end = poses[f.child], shapes.feet[joint][1] if joint in shapes.feet else k.centers[f.child]
-            segments.append([points[joint], _oblique(p + R @ end)])
+        if joint in tips:
+            p, R = poses[f.child]
+            segments.append([points[joint], _oblique(p + R @ tips[joint])])
     axes.add_collection(LineCollection(segments, colors=COMMAND, linewidths=5, alpha=0.35, capstyle="round", zorder=1))
     loud = sorted((j for j in model.joints if ratios.get(j, 0.0) > LIMIT), key=lambda j: -ratios[j])[:4]
     for joint in model.joints:
