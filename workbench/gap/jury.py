@@ -126,10 +126,13 @@ class Jury:
         left = self.vector(residuals, use, joint)
         return float(left @ left)
 
-    def beyond(self, residuals: dict[int, Array], use: str) -> float:
-        """Chi squared beyond what is expected of a right model, of the channels that have a gap."""
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None, share: float = 0.0) -> float:
+        """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
+        has gone of it since `before`."""
         cost, expected = self.by_channel(residuals, use)
-        return float(np.sum((cost - expected)[cost > self._without_gap(residuals, cost, expected)]))
+        was = cost if before is None else self.by_channel(before, use)[0]
+        may_err = share * np.maximum(was - cost, 0.0)
+        return float(np.sum(np.maximum(cost - expected - may_err, 0.0)[cost > self._without_gap(residuals, cost, expected)]))
 
     def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
         """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""

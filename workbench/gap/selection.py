@@ -146,7 +146,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             if trials and tier != NEVER_LAST and _says_it(search, current, trials[0], takes, tier):
                 break
         closed = LAST_CLOSED if astray else LEAST_CLOSED
-        worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds)]
+        worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([_with(search, current, accepted, takes) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: f[0].cost["choose"], default=(current, []))
@@ -185,14 +185,19 @@ def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
-    """Whether all that is beyond noise would not be enough for one more effect, beside those of the whole robot."""
+    """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot,
+    with the base held beyond what these may err by in each channel."""
     jury, left = search.jury, 0.0
+    walks = jury.walks(takes)
+    before = current if walks else _before_rough(rounds, current)
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
-            left += sum(jury.beyond({i: current.residuals[i]}, use) for use in ("fit", "choose")) / 3  # a third chooses
+            was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
+            left += sum(jury.beyond(now, use, was, LEAST_SHARE) for use in ("fit", "choose")) / 3  # a third chooses
+    if not walks:
+        return left < ALL_CLOSED * LEAST_GAIN
     brought = sum(t.gain["choose"] for t in _taken(rounds) if t.joint is None)
-    least, share = (LEAST_WALKING, ROUGH_SHARE) if jury.walks(takes) else (ALL_CLOSED * LEAST_GAIN, LEAST_SHARE)
-    return left < max(least, share * brought)
+    return left < max(LEAST_WALKING, ROUGH_SHARE * brought)
 
 
 def _taken(rounds: Sequence[Round]) -> list[Trial]:
@@ -222,29 +227,31 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
 
 
-def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> bool:
-    """Whether an effect that was fitted brings enough."""
+def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round], current: Fit) -> bool:
+    """Whether an effect that was fitted beside `current` brings enough."""
     if t.foretold:
         return False
-    brought = sum(a.gain["choose"] for a in _taken(rounds)
-                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
-    least = LEAST_WALKING if t.joint is None and search.jury.walks(takes) else LEAST_GAIN * max(1, t.candidate.size)
+    walks = search.jury.walks(takes)
+    least = LEAST_WALKING if t.joint is None and walks else LEAST_GAIN * max(1, t.candidate.size)
     if t.joint is not None and t.closed > NEARLY_ALL:
         least *= ALL_CLOSED
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    return min(gain, _beyond_settled(search, t, takes, rounds)) > max(least, LEAST_SHARE * brought)
-
-
-def _beyond_settled(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round]) -> float:
-    """An effect's gain less what those that held takes told may err by, channel by channel: a strong effect in one joint must not
-    hide what moves all others."""
+    if not walks:
+        return min(gain, _beyond_error(search, t, takes, _before_rough(rounds, current), current, LEAST_SHARE)) > least
+    brought = sum(a.gain["choose"] for a in _taken(rounds)
+                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
     settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in _taken([r]))]
-    if search.settled is None or not settled:
-        return t.gain["choose"]
+    if search.settled is not None and settled:
+        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
+    return gain > max(least, LEAST_SHARE * brought)
+
+
+def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
+    """An effect's gain less what those that led from `before` to `now` may err by, this share of what they brought channel by
+    channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
     here = search.telling([t.candidate], tuple(takes))
-    was, now = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose")[0]
-                for fit in (settled[0].before, search.settled))
-    may_err = ROUGH_SHARE * np.maximum(was - now, 0.0)
+    was, left = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
+    may_err = share * np.maximum(was - left, 0.0)
     return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
 
 
