@@ -25,7 +25,8 @@ QUICK = ("backlash", "joint_compliance", "coulomb_friction", "stribeck_friction"
 @pytest.fixture(scope="module")
 def engines(tmp_path_factory):
     robot = quadruped(np.random.default_rng(2)).model(tmp_path_factory.mktemp("robot") / "robot.sdf")
-    return functools.cache(lambda base: SideBySide(robot, base, timestep=1e-3))
+    # on the feet 1 ms alone bends load_friction in MuJoCo: ratio 0.31 with that, 0.21 with half, 0.17 with a quarter
+    return functools.cache(lambda base: SideBySide(robot, base, timestep=1e-3 if base == "fixed" else 5e-4))
 
 
 def check(engines, spec, allowed):
