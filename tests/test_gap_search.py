@@ -234,8 +234,10 @@ def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
     assert np.sqrt(unsure.covariance[0, 0] - alike.covariance[0, 0]) == pytest.approx(0.5, rel=0.15)
 
 
-def test_what_settled_effects_may_err_by_counts_where_they_act_and_hides_nothing_elsewhere(worn):
+@pytest.mark.parametrize("walks", [False, True])
+def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing_elsewhere(worn, monkeypatch, walks):
     session, whole, nominal = worn
+    monkeypatch.setattr(whole.jury, "walks", lambda takes: walks)
     search = Search(whole.jury, session.model)
     taken = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
     names = whole.jury.evidence[0].channels
@@ -251,8 +253,26 @@ def test_what_settled_effects_may_err_by_counts_where_they_act_and_hides_nothing
         gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
         return Trial(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
 
-    assert selection._worthwhile(search, trial("two"), (0,), [first])
-    assert not selection._worthwhile(search, trial("three"), (0,), [first])
+    assert selection._worthwhile(search, trial("two"), (0,), [first], search.settled)
+    assert not selection._worthwhile(search, trial("three"), (0,), [first], search.settled)
+
+
+def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+
+    def fit(**sizes):
+        left = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            left[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: left})
+
+    first = Round(fit(three=100.0), (), (Trial(taken, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
+    assert selection.too_little_left(search, fit(three=10.0), (0,), [first])
+    assert not selection.too_little_left(search, fit(three=40.0), (0,), [first])
+    assert not selection.too_little_left(search, fit(two=10.0), (0,), [first])
 
 
 def test_what_is_well_hides_no_gap_and_closes_none(worn):

@@ -57,6 +57,8 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
             continue
         for n, change, error, rms in _trends(search.jury, fit, s):
             c, x, k = of_number[n]
+            if c.read_off and c.effect.free_play:
+                continue  # a loose mount rattles by chance, and nothing else is seen across an axis
             if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
