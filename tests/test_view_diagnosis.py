@@ -139,6 +139,12 @@ def test_before_and_after_shows_the_worst_unseen_stretch(story: TakeStory) -> No
     assert [line.get_label() for line in top.get_lines()] == ["recorded", "nominal", "fitted"]
 
 
+def test_before_and_after_shows_what_was_judged_not_a_take_that_starts_when_another_model_would_have_it(story: TakeStory) -> None:
+    late = replace(story.fitted, q=np.roll(story.fitted.q, 5, axis=0))
+    _, fitted = before_after(replace(story, fitted=late), "flm").axes[1].get_lines()
+    assert np.nanmax(np.abs(fitted.get_ydata())) < 0.5
+
+
 @pytest.mark.parametrize("draw", [gap_map, lambda s: unseen_errors([s]), lambda s: before_after(s, "flb")])
 def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, draw) -> None:
     nothing = np.full_like(story.before, np.nan)

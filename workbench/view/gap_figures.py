@@ -108,11 +108,13 @@ def before_after(story: TakeStory, joint: str) -> Figure:
     top, strip = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.6])
     recorded = _DEGREES * story.recorded.q[use, story.recorded.column(joint)]
     top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
-    for what, take, colour, style in (("nominal", story.nominal, COMMAND, "--"), ("fitted", story.fitted, SIMULATED, "-")):
-        angle = _DEGREES * take.q[use, take.column(joint)]
-        top.plot(t[use], angle, color=colour, linestyle=style, linewidth=1.6, label=what)
-        strip.plot(t[use], recorded - angle, color=colour, linestyle=style, linewidth=1.5)
     sigma = _DEGREES * story.sigma(joint)
+    column = story.channels.index(joint)
+    # as they were judged, each model from its own first command where the recording leaves that open
+    for what, residual, colour, style in (("nominal", story.before, COMMAND, "--"), ("fitted", story.after, SIMULATED, "-")):
+        left = sigma * residual[use, column]
+        top.plot(t[use], recorded - left, color=colour, linestyle=style, linewidth=1.6, label=what)
+        strip.plot(t[use], left, color=colour, linestyle=style, linewidth=1.5)
     if np.isfinite(sigma):
         strip.axhspan(-2 * sigma, 2 * sigma, color=NOISE, zorder=0)
     for axes in (top, strip):
