@@ -20,7 +20,7 @@ from workbench.gap.search import Fit, Report, Search
 
 MOST_ROUNDS = 6
 """With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
-MOST_WORK, MOST_ROLLOUTS = 4000.0, 60.0
+MOST_WORK, MOST_ROLLOUTS = 3200.0, 60.0
 """Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
 recording."""
 LEAST_GAIN = 150.0
