@@ -51,7 +51,8 @@ def story(model: RobotModel) -> TakeStory:
     nominal = replace(fitted, q=fitted.q - away)
     moving = np.where(fitted.time[:, None] > 0, 1.0, np.nan)
     before, after = ((q - take.q) / SIGMA * moving for take in (nominal, fitted))
-    return TakeStory(recorded, nominal, fitted, model.joints, before, after, (fitted.time > 0.7) & (fitted.time < 0.9))
+    return TakeStory(recorded, nominal, fitted, model.joints, np.full(len(model.joints), SIGMA), before, after,
+                     (fitted.time > 0.7) & (fitted.time < 0.9))
 
 
 def finding(effect: str = "backlash", confidence: float = 0.97) -> Finding:

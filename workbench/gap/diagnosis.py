@@ -137,5 +137,5 @@ def _stories(jury: Jury, nominal: Mapping[str, Take], before: Residuals, after: 
         ill = channel_gaps(e, before[i])
         shown = [k for k, c in enumerate(e.channels) if ACROSS not in c or c in ill]  # across the axes there is mostly nothing
         out.append(TakeStory(replace(e.take.recorded, name=e.name), was[i], now[i], tuple(e.channels[k] for k in shown),
-                             before[i][:, shown], after[i][:, shown], e.uses["validate"]))
+                             e.sigma[shown], before[i][:, shown], after[i][:, shown], e.uses["validate"]))
     return tuple(out)

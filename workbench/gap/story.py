@@ -16,16 +16,17 @@ Array = NDArray[np.float64]
 class TakeStory:
     """One take against the nominal and the fitted model.
 
-    channels: (c) joints, and on the ground what the body does. before, after: (N, c) recorded less simulated, over what noise,
-    numerics and contact models alone make, on the recording's frames; NaN where unseen or before the first command. unseen: (N,)
-    frames that no choice and no parameter saw. recorded, nominal, fitted: the takes behind, observed alike, on one clock of
-    N frames.
+    channels: (c) joints, and on the ground what the body does. noise: (c,) what noise, numerics and contact models alone make
+    (standard deviation) [rad or m]. before, after: (N, c) recorded less simulated, over that, on the recording's frames; NaN
+    where unseen or before the first command. unseen: (N,) frames that no choice and no parameter saw. recorded, nominal, fitted:
+    the takes behind, observed alike, on one clock of N frames.
     """
 
     recorded: Take
     nominal: Take
     fitted: Take
     channels: tuple[str, ...]
+    noise: Array
     before: Array
     after: Array
     unseen: NDArray[np.bool_]
@@ -54,10 +55,8 @@ class TakeStory:
 
     def sigma(self, joint: str) -> float:
         """What noise and numerics make of a joint's residual (standard deviation) [rad]; NaN where it was never seen."""
-        difference = self.recorded.q[:, self.recorded.column(joint)] - self.nominal.q[:, self.nominal.column(joint)]
-        residual = self.before[:, self.channels.index(joint)]
-        use = np.isfinite(difference) & np.isfinite(residual) & (residual != 0)
-        return float(np.median(np.abs(difference[use] / residual[use]))) if use.any() else float("nan")
+        column = self.channels.index(joint)
+        return float(self.noise[column]) if np.isfinite(self.before[:, column]).any() else float("nan")
 
 
 def rms(x: Array) -> float:

@@ -110,9 +110,9 @@ def before_after(story: TakeStory, joint: str) -> Figure:
     top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
     sigma = _DEGREES * story.sigma(joint)
     column = story.channels.index(joint)
-    nominal = recorded - _DEGREES * story.nominal.q[use, story.nominal.column(joint)]
-    fitted = sigma * story.after[use, column]  # as it was judged: from its own first command where the recording leaves that open
-    for what, left, colour, style in (("nominal", nominal, COMMAND, "--"), ("fitted", fitted, SIMULATED, "-")):
+    # as they were judged, each from its own first command where the recording leaves that open
+    for what, residual, colour, style in (("nominal", story.before, COMMAND, "--"), ("fitted", story.after, SIMULATED, "-")):
+        left = sigma * residual[use, column]
         top.plot(t[use], recorded - left, color=colour, linestyle=style, linewidth=1.6, label=what)
         strip.plot(t[use], left, color=colour, linestyle=style, linewidth=1.5)
     if np.isfinite(sigma):
