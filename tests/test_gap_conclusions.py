@@ -7,8 +7,9 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidates import Candidate
-from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected
+from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
 from workbench.gap.contest import Rival, Standing
+from workbench.gap.findings import Alternative, Change, Finding, Unexplained
 from workbench.gap.search import Fit
 
 FRAME = {0: np.ones((1, 1))}
@@ -53,3 +54,16 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     assert [(a.effect, a.where) for a in told.alternatives] == [("zero_offset", ("knee",))]
     lost = {(r.effect, r.where) for r in rejected(SEEN, fit, (), [standing], FRAME)}
     assert lost == {("zero_offset", ("knee",)), ("link_length", ("hip",))}
+
+
+def test_a_name_that_is_less_likely_than_not_explains_nothing():
+    def named(confidence, *ties):
+        change = Change(1.0, 0.1, "deg")
+        return Finding("ground_friction", (), confidence, {}, change, change, ties)
+
+    tie = Alternative("ground_tilt", (), 0.3)
+    rest = Unexplained((), 1.0, 0.1, "deg", "goes with nothing tried")
+    assert verdict_of(False, [], []) == "no_gap"
+    assert verdict_of(True, [], [rest]) == "unexplained"
+    assert verdict_of(True, [named(0.9)], []) == verdict_of(True, [named(0.4, tie)], []) == "explained"
+    assert verdict_of(True, [named(0.9), named(0.4)], []) == verdict_of(True, [named(0.9)], [rest]) == "partly_explained"

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
-from workbench.gap.candidates import candidates
+from workbench.effects.registry import known_effects
+from workbench.gap.candidates import Candidate, candidates
 from workbench.gap.contest import Rival, Standing, _misfit, contest, doubted
 from workbench.gap.jury import Jury
 from workbench.gap.search import Search
@@ -50,6 +51,17 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
     assert less.probability < 0.5
     assert less.rivals[0].probability == pytest.approx(0.08 / 0.9 * less.probability)
     assert doubted(search, far, standings, {0: 100 + floors[0]}) == standings  # all below the fit's own floor
+
+
+@pytest.mark.parametrize(("friction", "sure"), [(1.12, 0.45), (0.88, 0.45), (0.7, 0.9), (1.3, 0.9)])
+def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(worn, friction, sure):
+    _, search = worn
+    floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
+    x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
+    fit = SimpleNamespace(effects=(floor,), sizes=lambda: [(floor, x)], residuals=search.evaluated([]).residuals)
+    (told,) = doubted(search, fit, [Standing(0.9, ())], {})
+    assert floor.values(x)[0] == pytest.approx(friction)
+    assert told.probability == pytest.approx(sure)
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

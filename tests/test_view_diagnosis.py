@@ -227,6 +227,11 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
     assert headline(full) == "Backlash at flm explains all that the model missed."
     two = replace(full, verdict="partly_explained", findings=(finding(), replace(finding("ground_friction"), where=())))
     assert headline(two).startswith("Backlash at flm and ground friction explain part of")
+    guess = replace(finding("ground_friction"), where=(), confidence=0.4, alternatives=())
+    assert headline(replace(two, findings=(finding(), guess))) == (
+        "Backlash at flm explains part of what the model missed; the rest has no sure name yet.")
+    assert headline(replace(two, findings=(guess,))) == (
+        "Nothing that the workbench knows is likely to be what the model missed; nearest comes ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
     assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
     assert "nothing that the workbench knows" in headline(replace(nothing, verdict="unexplained"))

@@ -30,12 +30,12 @@ SAME_ELSEWHERE = 0.1
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The contract's word."""
+    """The contract's word; what has a name that is less likely than not is not explained by it."""
     if not gap:
         return "no_gap"
     if not findings:
         return "unexplained"
-    return "partly_explained" if left else "explained"
+    return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
 
 
 def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals

@@ -47,6 +47,9 @@ gap may be closed by 97 % and still leave ten times the noise: something else ac
 CHANGING = 0.5
 """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
 LEAST = 0.2
+ALIKE_FLOOR, HARDLY = 0.15, 0.5
+"""By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
+robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more."""
 
 
 @dataclass(frozen=True)
@@ -94,17 +97,26 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
-    whole robot at joints that no other effect is to answer for. floors: of the fit, by take."""
+    whole robot at joints that no other effect is to answer for; and where a floor is nearly the model's. floors: of the fit, by
+    take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], {c.joint for c in fit.effects}
-    for c, s in zip(fit.effects, standings):
+    for (c, x), s in zip(fit.sizes(), standings):
         told_held = search.is_settled(c) or search.held == search.fitted
         own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
         worst = max((r for r in own if told_held and r == r), default=0.0)
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
+        factor *= HARDLY if _hardly_another_floor(c, x) else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
+
+
+def _hardly_another_floor(c: Candidate, x: Array) -> bool:
+    """Whether an effect only changes a friction of feet and floor, by less than engines differ there."""
+    if c.effect.layer != "ground" or not c.parameters[0].replaces:
+        return False
+    return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:

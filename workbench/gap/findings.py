@@ -16,6 +16,8 @@ from workbench.robot.model_file import model_text
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]
+LIKELY = 0.5
+"""Probability from which on a name counts as an explanation."""
 FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 
@@ -85,6 +87,11 @@ class Finding:
         _check_confidence(self.confidence)
         if len(self.alternatives) > 1:
             raise ValueError(f"a tie is one finding with at most one alternative, got {len(self.alternatives)}")
+
+    @property
+    def likely(self) -> bool:
+        """Whether the effect, or the one it ties with, is there rather than not."""
+        return self.confidence + sum(a.confidence for a in self.alternatives) >= LIKELY
 
     def to_json(self) -> dict[str, Any]:
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence),

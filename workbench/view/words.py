@@ -28,15 +28,19 @@ _LEFT = re.compile(r"(?P<take>[^:]+): (?:across its axis \((?P<across>[^)]+)\), 
 
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in one sentence."""
-    names = listed([_with_rival(f) for f in diagnosis.findings])
-    explain = f"{capital(names)} explain{'s' if len(diagnosis.findings) == 1 else ''}"
+    likely = [f for f in diagnosis.findings if f.likely]
+    names = listed([_with_rival(f) for f in likely or diagnosis.findings])
+    explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
     match diagnosis.verdict:
         case "no_gap":
             return "The model explains these recordings as they are: nothing is missing that they could show."
         case "explained":
             return f"{explain} all that the model missed."
+        case "partly_explained" if not likely:
+            return f"Nothing that the workbench knows is likely to be what the model missed; nearest comes {names}."
         case "partly_explained":
-            return f"{explain} part of what the model missed; the rest has no name yet."
+            sure = "" if len(likely) == len(diagnosis.findings) else "sure "
+            return f"{explain} part of what the model missed; the rest has no {sure}name yet."
         case "unexplained":
             return "The recordings leave the model, and nothing that the workbench knows explains how."
 
