@@ -10,8 +10,8 @@ from workbench.effects.registry import known_effects
 from workbench.gap.candidates import Candidate, candidates
 from workbench.gap.contest import Rival, Standing, _misfit, contest, doubted
 from workbench.gap.jury import Jury
+from workbench.gap.rounds import Chosen, Round
 from workbench.gap.search import Search
-from workbench.gap.selection import Chosen, Round
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,15 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
     (told,) = doubted(search, fit, [Standing(0.9, ())], {})
     assert floor.values(x)[0] == pytest.approx(friction)
     assert told.probability == pytest.approx(sure)
+
+
+def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
+    _, search = worn
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    fit = SimpleNamespace(effects=(tilt,), residuals=search.evaluated([]).residuals)
+    for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
+        fit.sizes = lambda x=x: [(tilt, x)]
+        assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(sure)
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

@@ -17,8 +17,8 @@ from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
 from workbench.gap.race import Trial
 from workbench.gap.registered import read_takes, register_takes
+from workbench.gap.rounds import Round
 from workbench.gap.search import Search
-from workbench.gap.selection import Round
 from workbench.gap.session import load_session
 from workbench.simulation import SimulationConfig
 

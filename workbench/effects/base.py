@@ -66,6 +66,8 @@ class Effect:
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     under_load: ClassVar[bool] = False
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
+    limit: ClassVar[str] = ""
+    """The effect that it becomes, where a number that only shapes it comes to its end."""
     free_play: ClassVar[str] = ""
     """The parameter that says how far a link turns freely against its servo, if it does [rad in SI]."""
 

@@ -15,6 +15,8 @@ TIERS, TIERS_OF_ALL = 7, 4
 """On the ground the first are what moves the robot as a whole, and joints that stand out."""
 NEVER_LAST = 5
 """The tier, of zero offsets, after which the next is asked however good they are: a longer link moves a foot much alike."""
+LONE = 2
+"""The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
 STANDS_OUT = 4.0
 """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
 lacks something, not the robot as a whole."""
@@ -51,11 +53,13 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
 
     zeroed = all(search.jury.evidence[i].take.recorded.zeroed for i in takes)
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
+    lone = not grounded and len(search.nominal.joints) == 1
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:
             continue  # a point mass has that freedom
-        if c.key in used or _tier(c, bool(grounded), many, heavy, outstanding) != tier:
+        likely = _tier(c, bool(grounded), many, heavy, outstanding)
+        if c.key in used or (min(likely, LONE) if lone else likely) != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]

@@ -13,8 +13,8 @@ from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, join
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
 from workbench.gap.missed import Missed
+from workbench.gap.rounds import Round
 from workbench.gap.search import Fit
-from workbench.gap.selection import Round
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]

@@ -13,8 +13,8 @@ from workbench.gap.evidence import TakeEvidence
 from workbench.gap.findings import Unexplained
 from workbench.gap.jury import Jury
 from workbench.gap.ledger import in_file_units
+from workbench.gap.rounds import LEAST_GAIN
 from workbench.gap.search import Fit, Search, Slopes
-from workbench.gap.selection import LEAST_GAIN
 
 Array = NDArray[np.float64]
 CHANGE = 0.25

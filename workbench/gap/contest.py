@@ -13,8 +13,9 @@ from workbench.gap.candidates import Candidate
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.evidence import joint_of, ratios
 from workbench.gap.race import Part, Trial
+from workbench.gap.rounds import Chosen, Round
 from workbench.gap.search import Fit, Report, Search
-from workbench.gap.selection import CLOSE, MOST_RIVALS, Chosen, Round, completed
+from workbench.gap.selection import CLOSE, MOST_RIVALS, completed
 
 Array = NDArray[np.float64]
 Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
@@ -47,9 +48,12 @@ gap may be closed by 97 % and still leave ten times the noise: something else ac
 CHANGING = 0.5
 """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
 LEAST = 0.2
+SHAPE_END = 0.5
+"""Doublings from its end at which a number that only shapes an effect hardly does so any more."""
 ALIKE_FLOOR, HARDLY = 0.15, 0.5
 """By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
-robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more."""
+robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
+same for a number that would go further if it might: it makes up for something else."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
     fit = chosen.fit
     seats: Seats = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
     for turn in range(len(fit.effects) + 1):
-        near = [_near(seats, fit.effects, c) for c in fit.effects]
+        near = [_near(seats, fit.effects, c, x) for c, x in fit.sizes()]
         put = iter(search.side_by_side([_put(search, fit, i, t) for i, there in enumerate(near) for t in there],
                                        partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
         rivals = [[next(put) for _ in there] for there in near]
@@ -97,8 +101,8 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
-    whole robot at joints that no other effect is to answer for; and where a floor is nearly the model's. floors: of the fit, by
-    take."""
+    whole robot at joints that no other effect is to answer for; where a floor is nearly the model's, or a number as far as it may
+    go. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], {c.joint for c in fit.effects}
@@ -107,7 +111,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
         worst = max((r for r in own if told_held and r == r), default=0.0)
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
-        factor *= HARDLY if _hardly_another_floor(c, x) else 1.0
+        factor *= HARDLY if _hardly_another_floor(c, x) or _at_its_limit(c, x) else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
 
@@ -117,6 +121,11 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
     if c.effect.layer != "ground" or not c.parameters[0].replaces:
         return False
     return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
+
+
+def _at_its_limit(c: Candidate, x: Array) -> bool:
+    """Whether a number is at the end of what is possible, away from where the effect vanishes."""
+    return not c.read_off and any(np.any(np.isclose(x, end, rtol=1e-3) & (end != 0) & ~c.shapes) for end in c.bounds())
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
@@ -143,16 +152,31 @@ def _misfit(search: Search, fit: Fit) -> float:
 def _lead(fit: Fit, rival: Fit, taken: Trial) -> float:
     """By how much a fit with a rival in an effect's place is better, of chi squared, numbers priced."""
     price = max(NUMBER, NUMBER_SHARE * taken.gain["choose"])
-    return fit.cost["choose"] - rival.cost["choose"] + price * (len(fit.x) - len(rival.x))
+    own = [c.key for c in rival.effects]
+    (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
+    return fit.cost["choose"] - rival.cost["choose"] + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
 
 
-def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate) -> list[Trial]:
-    """Who came near an effect when it was taken, and is not among those that stay."""
+def _told(fit: Fit, i: int) -> int:
+    """Numbers of an effect that the data tell: where along its axis a joint carries a mass makes no name better."""
+    return int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
+
+
+def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
+    """Who came near an effect when it was taken, and is not among those that stay; and what it is at the end of its shape."""
     r, trial = seats[c.key]
     taken = {e.key for e in effects}
     reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
-    return [t for t in r.rivals(trial) if not t.foretold and t.candidate.key not in taken
-            and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
+    there = [t for t in r.rivals(trial) if t.candidate.key not in taken]
+    plain = [t for t in there if t.candidate.key == (c.effect.limit, c.where) and _at_its_end(c, x)]
+    return plain + [t for t in there if not t.foretold and t not in plain
+                    and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
+
+
+def _at_its_end(c: Candidate, x: Array) -> bool:
+    """Whether a number that only shapes an effect is as far as it may go."""
+    low, high = c.bounds()
+    return bool(np.any(c.shapes & ((x < low + SHAPE_END) | (x > high - SHAPE_END))))
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:

@@ -98,7 +98,8 @@ class Trying:
         self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
         alone = self.coarse and self.walking  # walks are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
-        self.until = self._shown() if self.coarse else np.inf
+        lone = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
+        self.until = self._shown() if self.coarse and not lone else np.inf
         self.without: dict[int, Array] = {}
         self._name = (*(c.key for c in group), self.looked_at)
 

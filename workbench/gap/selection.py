@@ -5,17 +5,19 @@ First what held takes show, where nothing but the servos moves the robot; then, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from workbench.gap.asked import NEVER_LAST, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.asked import LONE, NEVER_LAST, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidates import Candidate
+from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Part, Trial
+from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough, taken
 from workbench.gap.search import Fit, Report, Search
 
 MOST_ROUNDS = 6
@@ -23,14 +25,11 @@ MOST_ROUNDS = 6
 MOST_WORK, MOST_ROLLOUTS = 3200.0, 60.0
 """Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
 recording."""
-LEAST_GAIN = 150.0
-"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
-is half its noise: engines, and a robot and its model, differ by as much."""
 LEAST_WALKING = 600.0
-"""The same of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
+"""LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 ALL_CLOSED = 0.5
 """Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE = 0.05
+LEAST_SHARE = 0.01
 """Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
 again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
 that."""
@@ -41,45 +40,17 @@ LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
-ENOUGH, NEARLY_ALL = 0.6, 0.9
-"""Share of a gap from which on less likely effects are not asked for. The second with the base held, as what a hand carries looks
-like a weak shoulder, and on the ground before joints are asked, as a joint's effect can look like one of the whole robot's."""
-MOST_STEPS, LAST_STEPS = 5, 3
-"""Of a fit of all effects, when one was added, and when one was dropped at the end; it ends where little changes."""
+ENOUGH = 0.6
+"""Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
+before joints are asked, as a joint's effect can look like one of the whole robot's."""
+MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
+"""Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
+it ends where little changes."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
 ALIKE = 0.25
 """Joints whose best gain is this share of the greatest are taken in the same round."""
-
-
-@dataclass(frozen=True)
-class Round:
-    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
-    limit of work, before all that could be asked was."""
-
-    before: Fit
-    trials: tuple[Trial, ...]
-    accepted: tuple[Trial, ...]
-    stopped: bool = False
-
-    def rivals(self, trial: Trial) -> list[Trial]:
-        """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
-        place = trial.joint
-        return [t for t in self.trials if place is None or t.joint in (place, None)]
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """The effects that stay, fitted together, and how they were found."""
-
-    fit: Fit
-    rounds: tuple[Round, ...]
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the limit of work ended the search."""
-        return any(r.stopped for r in self.rounds)
 
 
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False) -> Chosen:
@@ -129,11 +100,16 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
     stopped = False
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
-        beyond = _remaining(search, current, _before_rough(rounds, current), takes)
+        beyond = _remaining(search, current, before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
+        if not search.jury.walks(takes) and len(search.nominal.joints) == 1 and search.jury.work <= most_work:
+            current, seats = _lone_round(search, pool, current, beyond, takes, say)
+            rounds += seats
+            if seats:
+                continue
         trials: list[Trial] = []
         for tier in range(TIERS_OF_ALL if astray else TIERS):
             stopped = search.jury.work > most_work
@@ -148,16 +124,46 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         closed = LAST_CLOSED if astray else LEAST_CLOSED
         worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
-        fits = search.side_by_side([_with(search, current, accepted, takes) for accepted in choices])
-        after, accepted = min(zip(fits, choices), key=lambda f: f[0].cost["choose"], default=(current, []))
+        fits = search.side_by_side([_with(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
+        after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
-        rounds.append(Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted),
-                            stopped))
-        if accepted:
-            current = after
-        if stopped or not accepted:
+        seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
+        together = [] if stopped else _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+        if together and priced(together[0][0]) < HALF * priced(after):
+            after = together[0][0]
+            seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
+        rounds += seats
+        if stopped or after is current:
             break
+        current = after
     return current
+
+
+def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
+                say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
+    """Of a robot of one joint, in which all acts: sets of effects before any is fitted alone, if one is nearly all."""
+    groups: list[list[Candidate]] = []
+    on: dict[int, tuple[int, ...]] = {}
+    for tier in range(LONE + 1):
+        more, takes_of = asked(search, pool, current, beyond, takes, tier)
+        on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
+        groups += more
+    looked = search.tried(current, groups, on, say, least=np.inf)
+    together = _fitted(search, current, several(search, current, looked, takes, beyond), takes)
+    if not together:
+        return current, []
+    best = together[0][0]
+    before, after = ({i: fit.residuals[i] for i in takes} for fit in (current, best))
+    if search.jury.closed(before, after, "choose") <= NEARLY_ALL:
+        return current, []
+    return best, seated(search, current, together)
+
+
+def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
+    """Sets of effects fitted beside `current`, the best first; that one once more, from new slopes: it begins where lines lead."""
+    fits = search.side_by_side([_with(search, current, chosen, takes, TOGETHER_STEPS) for chosen in sets])
+    ranked = sorted(zip(fits, sets), key=lambda f: priced(f[0]))
+    return [(search.refitted(fit, takes, MOST_STEPS), chosen) for fit, chosen in ranked[:1]] + ranked[1:]
 
 
 def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
@@ -178,10 +184,10 @@ def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]
     return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
 
 
-def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...]) -> Part[Fit]:
+def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
     """All effects fitted together, when some were added."""
     (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
-    return (yield from search.refitting(start, takes, MOST_STEPS))
+    return (yield from search.refitting(start, takes, steps))
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
@@ -189,25 +195,15 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
     with the base held beyond what these may err by in each channel."""
     jury, left = search.jury, 0.0
     walks = jury.walks(takes)
-    before = current if walks else _before_rough(rounds, current)
+    before = current if walks else before_rough(rounds, current)
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
             left += sum(jury.beyond(now, use, was, LEAST_SHARE) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
         return left < ALL_CLOSED * LEAST_GAIN
-    brought = sum(t.gain["choose"] for t in _taken(rounds) if t.joint is None)
+    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None)
     return left < max(LEAST_WALKING, ROUGH_SHARE * brought)
-
-
-def _taken(rounds: Sequence[Round]) -> list[Trial]:
-    """What was taken of physics; engines do not differ in how cameras saw the robot, nor in when commands came."""
-    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer not in ("measurement", "timing")]
-
-
-def _before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
-    """What there was before the first effect whose hundredths engines play differently: timing they do not."""
-    return next((r.before for r in rounds if any(t.candidate.effect.layer != "timing" for t in r.accepted)), current)
 
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
@@ -237,10 +233,10 @@ def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence
         least *= ALL_CLOSED
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     if not walks:
-        return min(gain, _beyond_error(search, t, takes, _before_rough(rounds, current), current, LEAST_SHARE)) > least
-    brought = sum(a.gain["choose"] for a in _taken(rounds)
+        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
+    brought = sum(a.gain["choose"] for a in taken(rounds)
                   if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
-    settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in _taken([r]))]
+    settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in taken([r]))]
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
     return gain > max(least, LEAST_SHARE * brought)

@@ -1,0 +1,65 @@
+"""Several effects in one joint: which sets signatures foretell."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from workbench.effects.registry import known_effects
+from workbench.gap.candidates import Candidate
+from workbench.gap.company import _best_sets, _Seen, _variants, several
+from workbench.gap.race import Trial
+
+
+def trial(name, closed=0.5, joint="knee"):
+    effect = known_effects()[name]
+    c = Candidate.of(effect, ("knee",), effect.neutral(SimpleNamespace()))
+    return Trial(c, np.ones(c.size), {"fit": 1.0, "choose": 1.0}, joint, foretold=True, closed=closed)
+
+
+def seen(name, signature, size=1.0):
+    return _Seen(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
+
+
+def names(sets):
+    return [{t.candidate.name for t in chosen} for chosen in sets]
+
+
+def test_two_are_named_where_both_together_explain_what_neither_does_though_a_third_explains_most_alone():
+    rng = np.random.default_rng(3)
+    friction, play = rng.normal(size=(2, 400))
+    between = friction + play + rng.normal(size=400)
+    r0 = -(2.0 * friction + 2.2 * play) + 0.01 * rng.normal(size=400)
+    pool = [seen("viscous_friction", between), seen("coulomb_friction", friction, 4.0), seen("backlash", play)]
+    both, *_ = _best_sets(pool, r0)
+    assert {t.candidate.name: float(t.x[0]) for t in both} == pytest.approx(
+        {"coulomb_friction": 8.0, "backlash": 2.2}, rel=0.02)  # in the sizes at which they were looked at
+    assert not any(t.foretold for t in both)
+
+
+def test_one_more_that_does_not_halve_what_is_left_is_not_asked_for_nor_one_that_would_have_to_be_less_than_nothing():
+    rng = np.random.default_rng(4)
+    friction, play, other = rng.normal(size=(3, 400))
+    alone = -2.0 * friction + rng.normal(size=400)
+    assert _best_sets([seen("coulomb_friction", friction), seen("backlash", play), seen("dead_band", other)], alone) == []
+    less = -2.0 * friction + 2.0 * play
+    assert names(_best_sets([seen("coulomb_friction", friction), seen("backlash", play)], less)) == []
+
+
+def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept():
+    sticking = trial("stribeck_friction")
+    points = [np.array([1.0, 0.0]), np.array([1.0, 2.0])]
+    rng = np.random.default_rng(5)
+    slow, fast, play = rng.normal(size=(3, 300))
+    pool = [*_variants(sticking, points, [slow, fast]), seen("backlash", play)]
+    assert len(pool) == 3
+    (both,) = _best_sets(pool, -(1.5 * fast + play))
+    assert next(t.x for t in both if t.candidate.name == "stribeck_friction") == pytest.approx([1.5, 2.0])
+
+
+def test_a_walk_and_what_one_explains_are_left_to_single_effects():
+    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: True))
+    assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
+    held = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: False))
+    assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
+    assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []

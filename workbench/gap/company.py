@@ -1,0 +1,165 @@
+"""Several effects in one joint at once: what their signatures together say, where no single one explains what is missing.
+
+Lines through what each was seen to do alone are cheap to add up, so that all sets are tried: best subsets, not one at a time
+(A. J. Miller, Subset Selection in Regression, 2002). Only the best sets are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.race import Trial
+from workbench.gap.rounds import LEAST_GAIN, Round
+from workbench.gap.search import Fit, Search
+
+Array = NDArray[np.float64]
+NEARLY_ALL = 0.9
+"""Share of a gap from which on less likely effects are not asked for with the base held, as what a hand carries looks like a weak
+shoulder, nor sets of them."""
+HALF = 0.5
+"""Share of what the best smaller set leaves, as signatures foretell it, that one more effect may leave."""
+FITTED = {2: 1, 3: 3}
+"""Effects in a set, and how many such sets are fitted: lines foretell roughly."""
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What an effect does to what is fitted in a joint: signatures (m, k), each at the sizes in a row of points (k, n)."""
+
+    trial: Trial
+    signatures: Array
+    points: Array
+
+    def sizes(self, share: Array) -> Array:
+        """With these shares (k,) of the points."""
+        low, high = self.trial.candidate.bounds()
+        shapes = self.trial.candidate.shapes
+        return np.clip(np.where(shapes, self.points[0], share @ self.points), low, high)
+
+
+def companies(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str) -> list[list[Trial]]:
+    """Sets of effects that, as signatures foretell it, explain a joint far better than fewer do, with sizes to begin from.
+
+    trials: of a race beside `current` on these takes, whose base is held.
+    """
+    known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
+    until = min((looked[2] for _, looked in known), default=np.inf)
+    base = search.jury.early({i: current.residuals[i] for i in takes}, until)
+    rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
+    r0 = search.jury.vector(base, "fit", joint)[rows[joint]]
+    seen = [s for t, (points, did, _) in known for s in _variants(t, points, [v[rows[t.joint]] for v in did])]
+    return _best_sets(seen, r0) if seen else []
+
+
+def _signatures(search: Search, t: Trial, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
+    """Sizes at which a candidate was looked at, what each did, and for how long it was looked at [s]."""
+    for name, (points, seen, until) in search.signatures.items():
+        if name[-1] == takes and t.candidate.key in name[:-1]:
+            b = name.index(t.candidate.key)
+            return points, [s[b] for s in seen], until
+    return None
+
+
+def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, judged: str | None, joint: str
+          ) -> NDArray[np.bool_]:
+    """Of the vector of the channels of `judged` (None: of all), what is of a joint, and was looked at."""
+    inside = {}
+    for i in takes:
+        e = search.jury.evidence[i]
+        inside[i] = np.zeros_like(current.residuals[i])
+        inside[i][np.ix_(e.since <= until, e.columns(joint))] = 1.0
+    return search.jury.vector(inside, "fit", judged) != 0
+
+
+def _variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[_Seen]:
+    """An effect of several numbers, each seen alone; of one, as it was seen at each size."""
+    c = t.candidate
+    if not c.size or not len(points):
+        return
+    if c.size > 1 and not c.shapes.any():
+        yield _Seen(t, np.stack(signatures, axis=1), np.array(points))
+        return
+    for p, v in zip(points, signatures):
+        yield _Seen(t, v[:, None], p[None])
+
+
+def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
+    A = np.concatenate([s.signatures for s in seen], axis=1)
+    ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
+    H, g = A.T @ A, A.T @ r0
+    H[np.diag_indices_from(H)] += 1e-9 * np.diag(H) + 1e-9
+    best = float(r0 @ r0)
+    out: list[list[Trial]] = []
+    for size in (1, *FITTED):
+        sets: dict[frozenset[object], tuple[float, list[Trial]]] = {}
+        for which in combinations(range(len(seen)), size):
+            name = frozenset(seen[k].trial.candidate.key for k in which)
+            if len(name) < size:
+                continue
+            numbers = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in which])
+            share = -np.linalg.solve(H[np.ix_(numbers, numbers)], g[numbers])
+            left = float(r0 @ r0 + g[numbers] @ share)
+            if name in sets and left >= sets[name][0]:
+                continue
+            x = [seen[k].sizes(s) for k, s in zip(which, np.split(share, np.cumsum([ends[k + 1] - ends[k] for k in which])[:-1]))]
+            if all(_possible(seen[k], there) for k, there in zip(which, x)):
+                sets[name] = left, [replace(seen[k].trial, x=there, foretold=False) for k, there in zip(which, x)]
+        ranked = sorted(sets.values(), key=lambda s: s[0])
+        if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
+            break
+        if size > 1:
+            out += [trials for left, trials in ranked[:FITTED[size]] if left < HALF * best]
+        best = min(best, ranked[0][0])
+    return out
+
+
+def _possible(s: _Seen, x: Array) -> bool:
+    """Whether an effect is there at all, at these sizes."""
+    return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
+
+
+def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
+            ) -> list[list[Trial]]:
+    """Sets of effects for the joint that errs most, where the base is held and no single one is most of it."""
+    worst = max((c for c in beyond if c not in BODY), key=lambda c: beyond[c], default=None)
+    if worst is None or search.jury.walks(takes):
+        return []
+    joint = joint_of(worst)
+    if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
+        return []
+    return companies(search, current, trials, takes, joint)
+
+
+def priced(fit: Fit) -> float:
+    """What a fit leaves on the choosing stretches, and what its numbers have to bring."""
+    return fit.cost["choose"] + LEAST_GAIN * len(fit.x)
+
+
+def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]) -> list[Round]:
+    """A round for each of the effects that are taken together, the first of `sets`, which were fitted; its rivals those with
+    which another set has it replaced."""
+    best, chosen = sets[0]
+    names = {t.candidate.key for t in chosen}
+    sizes = _by_key(best)
+    out = []
+    for t in chosen:
+        rest = search.evaluated([s for s in best.sizes() if s[0].key != t.candidate.key])
+        gain = {use: rest.cost[use] - best.cost[use] for use in ("fit", "choose")}
+        trials = [replace(t, x=sizes[t.candidate.key], gain=gain)]
+        for fit, others in sets[1:]:
+            new = [o for o in others if o.candidate.key not in names]
+            if len(others) == len(chosen) and len(new) == 1 and t.candidate.key not in {o.candidate.key for o in others}:
+                theirs = {use: gain[use] - fit.cost[use] + best.cost[use] for use in gain}
+                trials.append(replace(new[0], x=_by_key(fit)[new[0].candidate.key], gain=theirs, joint=t.joint))
+        out.append(Round(current, tuple(trials), (trials[0],)))
+    return out
+
+
+def _by_key(fit: Fit) -> dict[tuple[str, tuple[str, ...]], Array]:
+    return {c.key: x for c, x in fit.sizes()}

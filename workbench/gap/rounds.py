@@ -1,0 +1,52 @@
+"""What a search went through, round by round, and what it chose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workbench.gap.race import Trial
+from workbench.gap.search import Fit
+
+LEAST_GAIN = 150.0
+"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
+is half its noise: engines, and a robot and its model, differ by as much."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
+    limit of work, before all that could be asked was."""
+
+    before: Fit
+    trials: tuple[Trial, ...]
+    accepted: tuple[Trial, ...]
+    stopped: bool = False
+
+    def rivals(self, trial: Trial) -> list[Trial]:
+        """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
+        place = trial.joint
+        return [t for t in self.trials if place is None or t.joint in (place, None)]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The effects that stay, fitted together, and how they were found."""
+
+    fit: Fit
+    rounds: tuple[Round, ...]
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the limit of work ended the search."""
+        return any(r.stopped for r in self.rounds)
+
+
+def taken(rounds: Sequence[Round]) -> list[Trial]:
+    """What was taken of physics; engines do not differ in how cameras saw the robot, nor in when commands came."""
+    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer not in ("measurement", "timing")]
+
+
+def before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
+    """What there was before the first effect whose hundredths engines play differently: timing they do not."""
+    return next((r.before for r in rounds if any(t.candidate.effect.layer != "timing" for t in r.accepted)), current)
