@@ -160,7 +160,7 @@ def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond:
 
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
-    """Sets of effects fitted beside `current`, the best first; that one once more, from new slopes: it begins where lines lead."""
+    """Sets of effects fitted beside `current`, the best first; that one once more, from new slopes."""
     fits = search.side_by_side([_with(search, current, chosen, takes, TOGETHER_STEPS) for chosen in sets])
     ranked = sorted(zip(fits, sets), key=lambda f: priced(f[0]))
     return [(search.refitted(fit, takes, MOST_STEPS), chosen) for fit, chosen in ranked[:1]] + ranked[1:]
