@@ -29,10 +29,10 @@ LEAST_WALKING = 600.0
 """LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 ALL_CLOSED = 0.5
 """Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE = 0.01
-"""Of what the effects before it brought at its place, that an effect must bring, and of a channel's gap that counts as one
-again: two engines, or a robot and a model, differ by some hundredths of what an effect does, and a second effect must not live on
-that."""
+LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
+"""Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
+held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
+a second effect must not live on that."""
 ROUGH_SHARE = 0.1
 """The same of a channel's gap on the ground, where engines differ more, and of what is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
@@ -239,7 +239,7 @@ def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence
     settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in taken([r]))]
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    return gain > max(least, LEAST_SHARE * brought)
+    return gain > max(least, WALKING_SHARE * brought)
 
 
 def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
