@@ -317,6 +317,17 @@ def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_t
         assert selection._says_it(search, None, trial, (0,), tier) is enough
 
 
+def test_beside_a_pull_no_tilt_is_asked(worn):
+    _, search, nominal = worn
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
+    pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
+    for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
+        asked_of = [asked.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.held, tier)[0]
+                    for tier in range(asked.TIERS)]
+        assert [g for g in asked_of if g] == groups
+
+
 def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn):
     session, search, nominal = worn
     pool = candidates(session.model, search.jury.evidence)

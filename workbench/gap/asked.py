@@ -17,6 +17,8 @@ NEVER_LAST = 5
 """The tier, of zero offsets, after which the next is asked however good they are: a longer link moves a foot much alike."""
 LONE = 2
 """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
+ONE_PULL = ("ground_tilt", "tether_force")
+"""What pulls the robot the same way: beside the one the other only makes up for how roughly that was fitted."""
 STANDS_OUT = 4.0
 """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
 lacks something, not the robot as a whole."""
@@ -58,6 +60,8 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:
             continue  # a point mass has that freedom
+        if c.name in ONE_PULL and used & {(name, ()) for name in ONE_PULL}:
+            continue
         likely = _tier(c, bool(grounded), many, heavy, outstanding)
         if c.key in used or (min(likely, LONE) if lone else likely) != tier:
             continue

@@ -70,7 +70,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
             kept = search.resettled(kept)
-        if kept is not current:
+        if kept is not current or _left_walking(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
     return Chosen(kept, tuple(rounds))
 
@@ -85,6 +85,11 @@ def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...]
         least = share if i in search.held else ROUGH_SHARE
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
     return out
+
+
+def _left_walking(search: Search, fit: Fit) -> bool:
+    """Whether walks still show a gap: of several numbers, fits begun in coarse steps may not have come to their end."""
+    return any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
 
 
 def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
