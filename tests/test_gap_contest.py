@@ -1,5 +1,6 @@
 """Rivals in each other's place: the better one takes it, whoever was taken first."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -58,7 +59,7 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
     _, search = worn
     floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
     x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
-    fit = SimpleNamespace(effects=(floor,), sizes=lambda: [(floor, x)], residuals=search.evaluated([]).residuals)
+    fit = replace(search.evaluated([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
     (told,) = doubted(search, fit, [Standing(0.9, ())], {})
     assert floor.values(x)[0] == pytest.approx(friction)
     assert told.probability == pytest.approx(sure)
@@ -67,10 +68,25 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
 def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
     _, search = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
-    fit = SimpleNamespace(effects=(tilt,), residuals=search.evaluated([]).residuals)
     for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
-        fit.sizes = lambda x=x: [(tilt, x)]
+        fit = replace(search.evaluated([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
         assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(sure)
+
+
+def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_together(worn):
+    _, search = worn
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    mass = Candidate.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
+
+    def told(c, x, deviations):
+        fit = replace(search.evaluated([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))
+        return doubted(search, fit, [Standing(0.9, ())], {})[0].probability
+
+    assert told(tilt, [0.1, 2.0], [0.5, 0.5]) == pytest.approx(0.9)
+    assert told(tilt, [0.1, 0.9], [0.5, 0.5]) == pytest.approx(0.45)
+    assert told(mass, [0.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.45)
+    assert told(mass, [1.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.9)
+    assert told(mass, [0.4, 3.0, 0.0, 1.0], [np.inf, 0.1, 0.1, 0.1]) == pytest.approx(0.9)  # nothing is known of it
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.gap.candidates import Candidate
 from workbench.gap.contest import Rival, Standing
+from workbench.gap.covariance import WIDER, Z90
 from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
@@ -19,10 +20,6 @@ from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
-Z90 = 1.645
-WIDER = 1.25
-"""Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
-engine, or the world, is not ours."""
 LEAST_RELATIVE = 0.01
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 SAME_ELSEWHERE = 0.1

@@ -11,6 +11,10 @@ from workbench.gap.fitting import Solved
 from workbench.gap.jury import Jury, take_of
 
 Array = NDArray[np.float64]
+Z90 = 1.645
+WIDER = 1.25
+"""Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
+engine, or the world, is not ours."""
 TEMPER_WALKING = 60.0
 """What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of the
 same effect that begin elsewhere end some hundreds apart there."""
