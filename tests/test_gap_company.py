@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.company import _best_sets, _Seen, _variants, several
 from workbench.gap.race import Trial
 

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
 from workbench.gap.contest import Rival, Standing
 from workbench.gap.findings import Alternative, Change, Finding, Unexplained
+from workbench.gap.point_mass import PointMass
 from workbench.gap.search import Fit
 
 FRAME = {0: np.ones((1, 1))}
@@ -19,7 +20,7 @@ SEEN = [SimpleNamespace(joints=("knee",), channels=("knee",), sigma=np.ones(1), 
 
 def test_where_a_mass_is_errs_with_its_moment_and_with_the_mass_together():
     """A moment m = mass * place: its variance at a known mass, and what the mass alone would move it by if they err together."""
-    c = Candidate.of(known_effects()["payload"], ("body_link",), (0.0, 0.0, 0.0, 0.0))
+    c = PointMass.of(known_effects()["payload"], ("body_link",), (0.0, 0.0, 0.0, 0.0))
     x = np.array([4.0, 4.0, 8.0, -4.0])
     alone = estimates(c, x, np.diag([0.0, 0.04, 0.0, 0.0]))["position"]
     assert alone.value == pytest.approx((0.02, 0.04, -0.02))

@@ -7,7 +7,7 @@ import pytest
 
 from tests.test_gap_search import CONFIG, worn  # noqa: F401
 from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate, with_effects
+from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.constancy import drifts
 from workbench.gap.search import Search
 from workbench.simulation.batch import run_job

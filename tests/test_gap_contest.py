@@ -8,9 +8,12 @@ import pytest
 
 from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate, candidates
-from workbench.gap.contest import Rival, Standing, _misfit, contest, doubted
+from workbench.gap.candidate import Candidate
+from workbench.gap.candidates import candidates
+from workbench.gap.contest import Rival, Standing, _misfit, contest
+from workbench.gap.doubts import doubted
 from workbench.gap.jury import Jury
+from workbench.gap.point_mass import PointMass
 from workbench.gap.rounds import Chosen, Round
 from workbench.gap.search import Search
 
@@ -76,7 +79,7 @@ def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
 def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_together(worn):
     _, search = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
-    mass = Candidate.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
+    mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
 
     def told(c, x, deviations):
         fit = replace(search.evaluated([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))

@@ -9,7 +9,7 @@ import pytest
 from tests.test_gap_search import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.asked import _when_held
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.covariance import _scattered
 from workbench.gap.fitting import Solved, fit_blocks, lowest, together
 from workbench.gap.guess import guess, scan

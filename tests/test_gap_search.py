@@ -9,7 +9,8 @@ import pytest
 from tests.gap_sessions import record_arm
 from workbench.effects.registry import known_effects
 from workbench.gap import asked, selection
-from workbench.gap.candidates import Candidate, candidates
+from workbench.gap.candidate import Candidate
+from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import ACROSS, gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together

@@ -6,7 +6,8 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from workbench.gap.candidates import Candidate, heavy_links
+from workbench.gap.candidate import Candidate
+from workbench.gap.candidates import heavy_links
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
@@ -55,7 +56,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
 
     zeroed = all(search.jury.evidence[i].take.recorded.zeroed for i in takes)
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
-    lone = not grounded and len(search.nominal.joints) == 1
+    lone = search.lone and not grounded
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
         if c.name == "com_shift" and ("payload", c.where) in used:

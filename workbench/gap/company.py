@@ -82,7 +82,7 @@ def _variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) ->
     c = t.candidate
     if not c.size or not len(points):
         return
-    if c.size > 1 and not c.shapes.any():
+    if np.count_nonzero(~c.shapes) > 1:
         yield _Seen(t, np.stack(signatures, axis=1), np.array(points))
         return
     for p, v in zip(points, signatures):
@@ -90,11 +90,8 @@ def _variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) ->
 
 
 def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
-    A = np.concatenate([s.signatures for s in seen], axis=1)
-    ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
-    H, g = A.T @ A, A.T @ r0
-    H[np.diag_indices_from(H)] += 1e-9 * np.diag(H) + 1e-9
-    best = float(r0 @ r0)
+    lines = _Lines(seen, r0)
+    best = lines.whole
     out: list[list[Trial]] = []
     for size in (1, *FITTED):
         sets: dict[frozenset[object], tuple[float, list[Trial]]] = {}
@@ -102,13 +99,8 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
             name = frozenset(seen[k].trial.candidate.key for k in which)
             if len(name) < size:
                 continue
-            numbers = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in which])
-            share = -np.linalg.solve(H[np.ix_(numbers, numbers)], g[numbers])
-            left = float(r0 @ r0 + g[numbers] @ share)
-            if name in sets and left >= sets[name][0]:
-                continue
-            x = [seen[k].sizes(s) for k, s in zip(which, np.split(share, np.cumsum([ends[k + 1] - ends[k] for k in which])[:-1]))]
-            if all(_possible(seen[k], there) for k, there in zip(which, x)):
+            left, x = lines.lowest(which)
+            if (name not in sets or left < sets[name][0]) and all(_possible(seen[k], there) for k, there in zip(which, x)):
                 sets[name] = left, [replace(seen[k].trial, x=there, foretold=False) for k, there in zip(which, x)]
         ranked = sorted(sets.values(), key=lambda s: s[0])
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
@@ -117,6 +109,25 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
             out += [trials for left, trials in ranked[:FITTED[size]] if left < HALF * best]
         best = min(best, ranked[0][0])
     return out
+
+
+class _Lines:
+    """Signatures added up: what is missing, r0, less what they do in shares of what was seen."""
+
+    def __init__(self, seen: Sequence[_Seen], r0: Array) -> None:
+        A = np.concatenate([s.signatures for s in seen], axis=1)
+        self.seen, self.whole = seen, float(r0 @ r0)
+        self.ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
+        self.H, self.g = A.T @ A, A.T @ r0
+        self.H[np.diag_indices_from(self.H)] += 1e-9 * np.diag(self.H) + 1e-9
+
+    def lowest(self, which: Sequence[int]) -> tuple[float, list[Array]]:
+        """The least that some of them leave of the sum of squares, and at which sizes."""
+        numbers = [np.arange(self.ends[k], self.ends[k + 1]) for k in which]
+        n = np.concatenate(numbers)
+        share = -np.linalg.solve(self.H[np.ix_(n, n)], self.g[n])
+        parts = np.split(share, np.cumsum([len(own) for own in numbers])[:-1])
+        return self.whole + float(self.g[n] @ share), [self.seen[k].sizes(part) for k, part in zip(which, parts)]
 
 
 def _possible(s: _Seen, x: Array) -> bool:
@@ -146,7 +157,7 @@ def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]
     which another set has it replaced."""
     best, chosen = sets[0]
     names = {t.candidate.key for t in chosen}
-    sizes = _by_key(best)
+    sizes = best.sizes_by_key()
     out = []
     for t in chosen:
         rest = search.evaluated([s for s in best.sizes() if s[0].key != t.candidate.key])
@@ -156,10 +167,6 @@ def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]
             new = [o for o in others if o.candidate.key not in names]
             if len(others) == len(chosen) and len(new) == 1 and t.candidate.key not in {o.candidate.key for o in others}:
                 theirs = {use: gain[use] - fit.cost[use] + best.cost[use] for use in gain}
-                trials.append(replace(new[0], x=_by_key(fit)[new[0].candidate.key], gain=theirs, joint=t.joint))
+                trials.append(replace(new[0], x=fit.sizes_by_key()[new[0].candidate.key], gain=theirs, joint=t.joint))
         out.append(Round(current, tuple(trials), (trials[0],)))
     return out
-
-
-def _by_key(fit: Fit) -> dict[tuple[str, tuple[str, ...]], Array]:
-    return {c.key: x for c, x in fit.sizes()}

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.contest import Rival, Standing
 from workbench.gap.covariance import WIDER, Z90
 from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
 from workbench.gap.missed import Missed
+from workbench.gap.point_mass import PointMass
 from workbench.gap.rounds import Round
 from workbench.gap.search import Fit
 from workbench.robot.model_file import Posterior, parameter_names
@@ -63,16 +64,18 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
     values = np.array(c.values(x))
-    if c.point_mass and np.isfinite(half).all():  # where it is says a moment over a mass: both err, together
-        slopes = _slopes(c, x)
-        half = Z90 * np.sqrt(np.diag(slopes @ covariance @ slopes.T))
-        ends = np.array([values - half, values + half])
+    unknown = np.ones(len(values), dtype=bool)
+    if isinstance(c, PointMass):  # where it is says a moment over a mass: both err, together
+        slopes, known = _slopes(c, x), np.isfinite(half)
+        spread = Z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
+        ends = np.array([values - spread, values + spread])
+        unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
+    else:
+        unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
-    unknown = np.ones(len(values), dtype=bool)
-    unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
     at = 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.evidence import TakeEvidence
 from workbench.gap.findings import Unexplained
 from workbench.gap.jury import Jury

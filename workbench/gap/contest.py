@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidates import Candidate
-from workbench.gap.covariance import TEMPER_WALKING, WIDER, Z90
-from workbench.gap.evidence import joint_of, ratios
+from workbench.gap.candidate import Candidate
+from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import Chosen, Round
 from workbench.gap.search import Fit, Report, Search
@@ -42,18 +41,9 @@ SUREST = 0.98
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
 """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the last.
 True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in part."""
-LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
-"""RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
-gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
-CHANGING = 0.5
-"""The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
 LEAST = 0.2
 SHAPE_END = 0.5
 """Doublings from its end at which a number that only shapes an effect hardly does so any more."""
-ALIKE_FLOOR, HARDLY = 0.15, 0.5
-"""By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
-robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
-same for a number that would go further if it might, or may be nothing: it makes up for something else."""
 
 
 @dataclass(frozen=True)
@@ -96,46 +86,6 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
             best = search.resettled(best, best.effects[-1])
         fit = search.refitted(best, search.fitted, STEPS)
     return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
-
-
-def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
-            changing: Collection[Candidate] = ()) -> list[Standing]:
-    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
-    whole robot at joints that no other effect is to answer for; where a floor is nearly the model's, a number as far as it may
-    go, or nothing within its interval. floors: of the fit, by take."""
-    left = [(channel, r) for i in search.held if i in floors
-            for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
-    out, theirs = [], {c.joint for c in fit.effects}
-    for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
-        told_held = search.is_settled(c) or search.held == search.fitted
-        own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
-        worst = max((r for r in own if told_held and r == r), default=0.0)
-        factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
-        slight = _hardly_another_floor(c, x) or _at_its_limit(c, x) or _may_be_nothing(c, x, fit.covariance[own_x, own_x])
-        factor *= HARDLY if slight else 1.0
-        out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
-    return out
-
-
-def _hardly_another_floor(c: Candidate, x: Array) -> bool:
-    """Whether an effect only changes a friction of feet and floor, by less than engines differ there."""
-    if c.effect.layer != "ground" or not c.parameters[0].replaces:
-        return False
-    return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
-
-
-def _may_be_nothing(c: Candidate, x: Array, covariance: Array) -> bool:
-    """Whether the 90 % intervals of all numbers that make an effect, a point mass's of its mass, hold what it vanishes at."""
-    half = Z90 * WIDER * np.sqrt(np.diag(covariance))
-    makes = ~c.shapes & np.isfinite(half)
-    if c.point_mass:
-        makes[1:] = False
-    return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
-
-
-def _at_its_limit(c: Candidate, x: Array) -> bool:
-    """Whether a number is at the end of what is possible, away from where the effect vanishes."""
-    return not c.read_off and any(np.any(np.isclose(x, end, rtol=1e-3) & (end != 0) & ~c.shapes) for end in c.bounds())
 
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
@@ -194,7 +144,8 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     the other has, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
-    starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if rival.candidate.name == own.name else [rival.x]
+    alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)
+    starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if alike else [rival.x]
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there

@@ -13,7 +13,8 @@ from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
 from workbench.gap.conclusions import Residuals, finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.constancy import drifts
-from workbench.gap.contest import Standing, contest, doubted
+from workbench.gap.contest import Standing, contest
+from workbench.gap.doubts import doubted
 from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 
 Array = NDArray[np.float64]
 SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0

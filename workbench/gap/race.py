@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidates import Candidate, with_effects
+from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through
 from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan
 from workbench.gap.jury import COARSE, Jury, Question, take_of

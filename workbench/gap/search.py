@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidates import Candidate, with_effects
+from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.covariance import covariance_of
 from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question
@@ -68,6 +68,10 @@ class Fit:
         x = self.x if x is None else x
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
+    def sizes_by_key(self) -> dict[tuple[str, tuple[str, ...]], Array]:
+        """Of each effect, by what it is and where."""
+        return {c.key: x for c, x in self.sizes()}
+
     def bounds(self) -> tuple[Array, Array]:
         """Of x."""
         ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
@@ -93,6 +97,11 @@ class Search:
         self.settled: Fit | None = None
         self.signatures: Signatures = {}
 
+    @property
+    def lone(self) -> bool:
+        """Whether the robot has one joint, in which all that it lacks acts."""
+        return len(self.nominal.joints) == 1
+
     def is_settled(self, c: Candidate) -> bool:
         """Whether held takes told its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
@@ -113,7 +122,7 @@ class Search:
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         self.settled = None
         self.settled = self.retimed(self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there))))
-        told = {c.key: x for c, x in self.settled.sizes()}
+        told = self.settled.sizes_by_key()
         return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
     def retimed(self, current: Fit) -> Fit:

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from workbench.gap.asked import LONE, NEVER_LAST, TIERS, TIERS_OF_ALL, asked, standing_out
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
@@ -110,7 +110,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
-        if not search.jury.walks(takes) and len(search.nominal.joints) == 1 and search.jury.work <= most_work:
+        if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:
             current, seats = _lone_round(search, pool, current, beyond, takes, say)
             rounds += seats
             if seats:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.effects.registry import known_effects
-from workbench.gap.candidates import Candidate
+from workbench.gap.candidate import Candidate
 from workbench.gap.evidence import ACROSS, TakeEvidence, smoothed
 from workbench.gap.ledger import channel_gaps
 from workbench.robot import RobotModel

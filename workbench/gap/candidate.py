@@ -1,0 +1,153 @@
+"""An effect at a place, with its numbers as sizes that a fit moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter
+from workbench.robot import EffectSpec, RobotModel
+
+Array = NDArray[np.float64]
+ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
+"""What a search from neutral cannot find: a stop shows nothing until the joint meets it, a mount's axis has to be known first;
+`special` reads them off the recordings."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
+    value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
+    speed at which friction fades) x is the number of doublings. held: by number,
+    whether it is no matter of fitting (an axis that was read off the recording)."""
+
+    effect: Effect
+    where: tuple[str, ...]
+    neutral: tuple[float, ...]
+    typical: tuple[float, ...]
+    held: tuple[bool, ...]
+    reach: float = math.inf
+
+    @classmethod
+    def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
+           held: Sequence[bool] | None = None) -> Self:
+        """typical: default the effect's own."""
+        own = tuple(p.typical_beside(n) for p, n in zip(_by_number(effect), neutral))
+        return cls(effect, where, tuple(neutral), tuple(typical or own), tuple(held or (False,) * len(own)))
+
+    @property
+    def name(self) -> str:
+        return self.effect.name
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """What it is and where."""
+        return self.effect.name, self.where
+
+    @property
+    def joint(self) -> str | None:
+        """The one joint in which it acts."""
+        return self.where[0] if "joint" in self.effect.places and len(self.where) == 1 else None
+
+    @property
+    def read_off(self) -> bool:
+        """Whether its sizes were read off the recordings, 1 being what they say."""
+        return self.effect.name in ASKED_APART
+
+    @property
+    def parameters(self) -> list[Parameter]:
+        """The parameter behind each number; a vector has three."""
+        return _by_number(self.effect)
+
+    @property
+    def size(self) -> int:
+        """How many numbers are fitted."""
+        return self.held.count(False)
+
+    @property
+    def shapes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those of numbers that only shape the effect."""
+        return np.array([p.shapes for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
+
+    def values(self, x: Sequence[float] | Array) -> list[float]:
+        """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
+        sizes = iter(np.asarray(x, dtype=float).tolist())
+        out = []
+        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
+            size = 1.0 if held else next(sizes)
+            if held:
+                value = t
+            elif math.isinf(n):
+                value = t / max(size, t / p.high)
+            else:
+                value = n * 2.0**size if p.shapes else n + size * (t - n)
+            out.append(float(np.clip(value, p.low, p.high)))
+        return out
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Of the sizes x."""
+        low, high = [], []
+        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
+            if held:
+                continue
+            if math.isinf(n):
+                ends = [0.0, t / p.low]
+            elif p.shapes:
+                ends = [math.log2(end / n) if end > 0 else -10.0 for end in (p.low, p.high)]
+            else:
+                ends = [(end - n) / (t - n) for end in (max(p.low, n - self.reach), min(p.high, n + self.reach))]
+            low.append(min(ends))
+            high.append(max(ends))
+        return np.array(low), np.array(high)
+
+    def probes(self) -> list[Array]:
+        """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
+        that says where a scalar acts; one empty for an effect without numbers."""
+        scalar = any(not p.vector for p in self.effect.parameters)
+        fitted = [p for p, held in zip(self.parameters, self.held) if not held]
+        shown = [i for i, p in enumerate(fitted) if not p.shapes and not (scalar and p.vector)]
+        return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
+
+    def around(self) -> list[Array]:
+        """Probes both ways and, of the first two, together: what a push to the left shows depends on that to the front. The same
+        as probes where there is one."""
+        probes = self.probes()
+        return probes if len(probes) < 2 else both_ways(np.zeros(self.size), probes)
+
+    @property
+    def makes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those that make the effect: where all are 0, it is not there."""
+        return ~self.shapes
+
+    def spec(self, x: Sequence[float] | Array) -> EffectSpec:
+        """The effect at these sizes."""
+        rest = iter(self.values(x))
+        parameters: dict[str, float | tuple[float, float, float]] = {}
+        for p in self.effect.parameters:
+            parameters[p.name] = (next(rest), next(rest), next(rest)) if p.vector else next(rest)
+        return EffectSpec(self.effect.name, self.where, parameters)
+
+    def __str__(self) -> str:
+        return f"{self.effect.name}({','.join(self.where)})"
+
+
+def both_ways(middle: Array, ways: Sequence[Array]) -> list[Array]:
+    """From `middle` each of these ways, forth and back, and the first two together."""
+    signs = (1.0, -1.0)
+    return [*(middle + s * way for s in signs for way in ways),
+            *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
+
+
+def _by_number(effect: Effect) -> list[Parameter]:
+    """The parameter behind each number; a vector has three."""
+    return [p for p in effect.parameters for _ in range(3 if p.vector else 1)]
+
+
+def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]) -> RobotModel:
+    """The nominal robot with effects of given sizes, one after the other."""
+    return replace(nominal, effects=(*nominal.effects, *(c.spec(x) for c, x in effects)))

@@ -1,0 +1,64 @@
+"""What makes a finding less sure, whatever its rivals do."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.candidate import Candidate
+from workbench.gap.contest import LEAST, Standing
+from workbench.gap.covariance import WIDER, Z90
+from workbench.gap.evidence import joint_of, ratios
+from workbench.gap.search import Fit, Search
+
+Array = NDArray[np.float64]
+LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
+"""RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
+gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
+CHANGING = 0.5
+"""The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
+ALIKE_FLOOR, HARDLY = 0.15, 0.5
+"""By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
+robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
+same for a number that would go further if it might, or may be nothing: it makes up for something else."""
+
+
+def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
+            changing: Collection[Candidate] = ()) -> list[Standing]:
+    """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
+    whole robot at joints that no other effect is to answer for; where a floor is nearly the model's, a number as far as it may
+    go, or nothing within its interval. floors: of the fit, by take."""
+    left = [(channel, r) for i in search.held if i in floors
+            for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
+    out, theirs = [], {c.joint for c in fit.effects}
+    for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
+        told_held = search.is_settled(c) or search.held == search.fitted
+        own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
+        worst = max((r for r in own if told_held and r == r), default=0.0)
+        factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
+        slight = _hardly_another_floor(c, x) or _at_its_limit(c, x) or _may_be_nothing(c, x, fit.covariance[own_x, own_x])
+        factor *= HARDLY if slight else 1.0
+        out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
+    return out
+
+
+def _hardly_another_floor(c: Candidate, x: Array) -> bool:
+    """Whether an effect only changes a friction of feet and floor, by less than engines differ there."""
+    if c.effect.layer != "ground" or not c.parameters[0].replaces:
+        return False
+    return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
+
+
+def _may_be_nothing(c: Candidate, x: Array, covariance: Array) -> bool:
+    """Whether the 90 % intervals of all numbers that make an effect hold what it vanishes at."""
+    half = Z90 * WIDER * np.sqrt(np.diag(covariance))
+    makes = c.makes & np.isfinite(half)
+    return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
+
+
+def _at_its_limit(c: Candidate, x: Array) -> bool:
+    """Whether a number is at the end of what is possible, away from where the effect vanishes."""
+    return not c.read_off and any(np.any(np.isclose(x, end, rtol=1e-3) & (end != 0) & ~c.shapes) for end in c.bounds())
