@@ -23,9 +23,10 @@ NEARLY_ALL = 0.9
 """Share of a gap from which on less likely effects are not asked for with the base held, as what a hand carries looks like a weak
 shoulder, nor sets of them."""
 HALF = 0.5
-"""Share of what the best smaller set leaves, as signatures foretell it, that one more effect may leave."""
-FITTED = {2: 1, 3: 3}
-"""Effects in a set, and how many such sets are fitted: lines foretell roughly."""
+"""Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
+FITTED, ALIKE = {2: 1, 3: 6}, 2.0
+"""Effects in a set, and how many such sets are fitted: of those that leave less than ALIKE times what the best does, as lines
+foretell roughly."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,15 @@ class _Seen:
     points: Array
 
     def sizes(self, share: Array) -> Array:
-        """With these shares (k,) of the points."""
+        """With these shares (k,) of the points, as far as they may go."""
         low, high = self.trial.candidate.bounds()
         shapes = self.trial.candidate.shapes
         return np.clip(np.where(shapes, self.points[0], share @ self.points), low, high)
+
+    def shares(self, x: Array) -> Array:
+        """The shares of the points that make these sizes."""
+        makes = ~self.trial.candidate.shapes
+        return np.asarray(np.linalg.lstsq(self.points[:, makes].T, x[makes], rcond=None)[0], dtype=float)
 
 
 def companies(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str) -> list[list[Trial]]:
@@ -105,8 +111,8 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
         ranked = sorted(sets.values(), key=lambda s: s[0])
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
             break
-        if size > 1:
-            out += [trials for left, trials in ranked[:FITTED[size]] if left < HALF * best]
+        if size > 1 and ranked[0][0] < HALF * best:
+            out += [trials for left, trials in ranked[:FITTED[size]] if left < ALIKE * ranked[0][0]]
         best = min(best, ranked[0][0])
     return out
 
@@ -122,12 +128,14 @@ class _Lines:
         self.H[np.diag_indices_from(self.H)] += 1e-9 * np.diag(self.H) + 1e-9
 
     def lowest(self, which: Sequence[int]) -> tuple[float, list[Array]]:
-        """The least that some of them leave of the sum of squares, and at which sizes."""
+        """The least that some of them leave of the sum of squares, as far as they may go, and at which sizes."""
         numbers = [np.arange(self.ends[k], self.ends[k + 1]) for k in which]
         n = np.concatenate(numbers)
-        share = -np.linalg.solve(self.H[np.ix_(n, n)], self.g[n])
-        parts = np.split(share, np.cumsum([len(own) for own in numbers])[:-1])
-        return self.whole + float(self.g[n] @ share), [self.seen[k].sizes(part) for k, part in zip(which, parts)]
+        H, g = self.H[np.ix_(n, n)], self.g[n]
+        parts = np.split(-np.linalg.solve(H, g), np.cumsum([len(own) for own in numbers])[:-1])
+        x = [self.seen[k].sizes(part) for k, part in zip(which, parts)]
+        share = np.concatenate([self.seen[k].shares(there) for k, there in zip(which, x)])
+        return self.whole + float(2 * g @ share + share @ H @ share), x
 
 
 def _possible(s: _Seen, x: Array) -> bool:

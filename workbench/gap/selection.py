@@ -46,6 +46,8 @@ before joints are asked, as a joint's effect can look like one of the whole robo
 MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
 """Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
 it ends where little changes."""
+AHEAD = 2
+"""Sets of effects that are fitted to the end."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
@@ -165,10 +167,11 @@ def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond:
 
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
-    """Sets of effects fitted beside `current`, the best first; that one once more, from new slopes."""
-    fits = search.side_by_side([_with(search, current, chosen, takes, TOGETHER_STEPS) for chosen in sets])
-    ranked = sorted(zip(fits, sets), key=lambda f: priced(f[0]))
-    return [(search.refitted(fit, takes, MOST_STEPS), chosen) for fit, chosen in ranked[:1]] + ranked[1:]
+    """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
+    begun = search.side_by_side([_with(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
+    ranked = sorted(zip(begun, sets), key=lambda f: priced(f[0]))
+    ended = search.side_by_side([search.refitting(fit, takes, TOGETHER_STEPS) for fit, _ in ranked[:AHEAD]])
+    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[AHEAD:]], key=lambda f: priced(f[0]))
 
 
 def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
