@@ -8,6 +8,7 @@ import time
 import pytest
 
 from studies.concealed_effects.ask import Asker, StoppedError, asked
+from studies.concealed_effects.carried import carry, take_up
 from studies.concealed_effects.figures import confusion_figure, reliability_figure, sizes_figure, time_figure
 from studies.concealed_effects.published import README, as_text, keep, kept, kept_section, section
 from studies.concealed_effects.sealed import Vault
@@ -157,6 +158,34 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
     (tmp_path / "elsewhere.md").write_text("nothing")
     with pytest.raises(ValueError, match="expected the lines"):
         keep(whole, tmp_path / "trial.json", tmp_path / "elsewhere.md")
+
+
+def test_a_trial_goes_on_on_another_machine_with_what_is_left_of_it(out, tmp_path):
+    """Scores come along; what is left is made anew, and has to be what was committed to."""
+    vault, carried = Vault(out / "sealed"), tmp_path / "under_way.json"
+    diagnose(out, ["s000", "s001"], asker())
+    part = report(out, vault)
+    assert carry(vault, part["sessions"], carried) == carried
+    elsewhere = tmp_path / "elsewhere"
+    other = take_up(elsewhere, carried)
+    with pytest.raises(ValueError, match="begun here"):
+        take_up(elsewhere, carried)
+    assert (other.digest(), other.seed, other.drawn_by) == (vault.digest(), vault.seed, vault.drawn_by)
+    publish(elsewhere, other)
+    asked_before = report(elsewhere, other)
+    assert asked_before["sessions"] == part["sessions"]
+    assert asked_before["criteria"] == part["criteria"]
+    with pytest.raises(ValueError, match="another session"):
+        other.seal("s002", {"truth.json": "{}"})
+    other.seal("s002", {"truth.json": json.dumps(TRUTHS["s002"])})
+    (elsewhere / "sessions/s002").mkdir(parents=True)
+    (elsewhere / "sessions/s002/answer").write_text(json.dumps(SAID["s000"]))
+    diagnose(elsewhere, ["s002"], asker())
+    assert report(elsewhere, other)["diagnosed"] == 3
+    assert carry(other, part["sessions"] * 3, carried) is not None
+    assert carry(other, [part["sessions"][0]] * other.count, carried) is None
+    with pytest.raises(ValueError, match="under way"):
+        take_up(tmp_path / "third", carried)
 
 
 def test_the_readme_says_what_the_kept_trial_found():

@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 
 from studies.concealed_effects.ask import LIMIT, Asker
+from studies.concealed_effects.carried import carry, take_up
 from studies.concealed_effects.generator import is_what_was_sealed
 from studies.concealed_effects.published import README, RESULTS, keep
 from studies.concealed_effects.sealed import COUNT, Vault
@@ -30,7 +31,7 @@ def main() -> int:
     try:
         if (args.report or args.keep or args.verify or args.again) and not (args.out / "sealed").exists():
             raise ValueError(f"{args.out}: no trial was begun here")
-        vault = Vault(args.out / "sealed", args.count, args.seed)
+        vault = take_up(args.out) if args.take_up else Vault(args.out / "sealed", args.count, args.seed)
         if args.verify:
             same = is_what_was_sealed(vault, args.verify)
             print(f"{args.verify}: the seed makes {'' if same else 'not '}what was sealed")
@@ -50,7 +51,8 @@ def main() -> int:
     print(f"{result['diagnosed']} of {result['planned']} sessions, {result['failed']} failed")
     if args.keep:
         keep(result)
-        print(f"wrote {RESULTS} and the table in {README}")
+        under_way = carry(vault, result["sessions"])
+        print(f"wrote {RESULTS} and the table in {README}" + (f"; {under_way} for another machine" if under_way else ""))
     return 0 if result["met"] else 1
 
 
@@ -69,6 +71,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--again", action="store_true", help="ask again what failed before")
     parser.add_argument("--report", action="store_true", help="only score what is diagnosed, and write the report")
     parser.add_argument("--keep", action="store_true", help="the same, and put the summary into the repository")
+    parser.add_argument("--take-up", action="store_true", help="in a new OUT, go on with the part of a trial that is kept here")
     parser.add_argument("--verify", metavar="NAME", help="make a session anew and compare it with its seal")
     parser.add_argument("--seed", type=int, help="for development only; a report says that it was chosen by hand")
     return parser.parse_args()

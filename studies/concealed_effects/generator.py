@@ -9,7 +9,7 @@ import os
 import shutil
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from multiprocessing import get_context
@@ -33,16 +33,16 @@ REDRAWS, STUBBORN = 100, 12
 """Robots that are drawn for a session, and after how many of them in vain other effects are dealt."""
 
 
-def generate(out: Path, vault: Vault, workers: int = 1, say: Callable[[str], None] = print) -> None:
-    """All sessions that are not there yet, on so many processes."""
+def generate(out: Path, vault: Vault, workers: int = 1, say: Callable[[str], None] = print, done: Collection[str] = ()) -> None:
+    """All sessions that are not there yet, on so many processes; `done`: those that nobody needs any more."""
     missing = [p for p in plan_sessions(vault.seed, vault.count)
-               if p.name not in vault.commitments or not (out / "sessions" / p.name).exists()]
-    done = vault.count - len(missing)
+               if p.name not in done and not (vault.holds(p.name) and (out / "sessions" / p.name).exists())]
+    made = vault.count - len(missing)
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         for making in as_completed([pool.submit(make, out, vault, plan) for plan in missing]):
             name, seconds = making.result()
-            done += 1
-            say(f"made {name} in {seconds:.0f} s ({done} of {vault.count})")
+            made += 1
+            say(f"made {name} in {seconds:.0f} s ({made} of {vault.count})")
 
 
 def make(out: Path, vault: Vault, plan: SessionPlan) -> tuple[str, float]:
@@ -53,7 +53,7 @@ def make(out: Path, vault: Vault, plan: SessionPlan) -> tuple[str, float]:
         folder = Path(temporary) / plan.name
         folder.mkdir()
         shown, hidden = write_session(folder, plan)
-        if plan.name not in vault.commitments:
+        if not vault.holds(plan.name):
             vault.seal(plan.name, hidden)
         for name, text in shown.items():
             (folder / name).parent.mkdir(exist_ok=True)

@@ -132,6 +132,15 @@ class Score:
         """Plain types; an open end of an interval is null."""
         return json.loads(json.dumps(_finite(asdict(self))))  # type: ignore[no-any-return]
 
+    @staticmethod
+    def from_json(kept: Mapping[str, Any]) -> Score:
+        """What to_json made, back."""
+        ends = {"low": -np.inf, "high": np.inf}
+        sizes = [ParameterScore(**{k: ends.get(k, v) if v is None else v for k, v in p.items()}) for p in kept["parameters"]]
+        measured = {k: float("nan") if kept[k] is None else kept[k] for k in ("seconds", "processor_seconds", "memory")}
+        return Score(**{**kept, **measured, "parameters": sizes, "effects": [EffectScore(**e) for e in kept["effects"]],
+                        "calibration": [(float(c), bool(t)) for c, t in kept["calibration"]]})
+
 
 def score(truth: Mapping[str, Any], findings: Mapping[str, Any], closed: Mapping[str, float | None] | None = None) -> Score:
     """`truth`: the sealed truth.json; `findings`: findings.json. InputError where the latter is not what the contract says."""

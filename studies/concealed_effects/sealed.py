@@ -53,14 +53,21 @@ class Vault:
         return hashlib.sha256(json.dumps(self.commitments, sort_keys=True).encode()).hexdigest()
 
     def seal(self, name: str, files: Mapping[str, str | bytes]) -> str:
-        """Seals files by their names; returns the SHA-256 that is now committed to. A name can be sealed once."""
-        if (self.folder / f"{name}.sha256").exists():
+        """Seals files by their names; returns the SHA-256 that is now committed to. A name can be sealed once; one that was
+        committed to on another machine with what was, or ValueError."""
+        if self.holds(name):
             raise ValueError(f"{name}: sealed already")
         plain = self.packed(name, files)
-        write_whole(self.folder / f"{name}.sealed", self._cipher(name, plain))
         committed = hashlib.sha256(plain).hexdigest()
+        if self.commitments.get(name, committed) != committed:
+            raise ValueError(f"{name}: this machine makes another session of the seed than was committed to")
+        write_whole(self.folder / f"{name}.sealed", self._cipher(name, plain))
         write_whole(self.folder / f"{name}.sha256", committed + "\n")
         return committed
+
+    def holds(self, name: str) -> bool:
+        """Whether a name is sealed here."""
+        return (self.folder / f"{name}.sealed").exists()
 
     def packed(self, name: str, files: Mapping[str, str | bytes]) -> bytes:
         """The zip that is hashed; a salt out of the seed keeps the hash from being matched by trying truths."""

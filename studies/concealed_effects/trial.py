@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from studies.concealed_effects.ask import Asker, asked
+from studies.concealed_effects.carried import scored_before
 from studies.concealed_effects.generator import generate
 from studies.concealed_effects.page import write_page
 from studies.concealed_effects.score import Score, score_folder, score_nothing
@@ -24,9 +25,10 @@ Say = Callable[[str], None]
 
 def run(out: Path, vault: Vault, asker: Asker, workers: int = 1, most: int | None = None, say: Say = print) -> dict[str, Any]:
     """The whole trial, or its first `most` sessions; returns what is written to summary.json."""
-    generate(out, vault, workers, say)
+    before = {s.name for s in scored_before(out)}
+    generate(out, vault, workers, say, before)
     publish(out, vault, say)
-    diagnose(out, list(vault.commitments)[:most], asker, workers, say)
+    diagnose(out, [n for n in vault.commitments if n not in before][:most], asker, workers, say)
     return report(out, vault, say)
 
 
@@ -76,7 +78,7 @@ def forget_failed(out: Path) -> None:
 def report(out: Path, vault: Vault, say: Say = print) -> dict[str, Any]:
     """Opens the seals of sessions that were diagnosed, and of no others; scores; writes summary.json and report.html."""
     names = [n for n in vault.commitments if asked(out / "results" / n) is not None]
-    scores = [scored(out, vault, name) for name in names]
+    scores = sorted([*scored_before(out), *(scored(out, vault, name) for name in names)], key=lambda s: s.name)
     result = summary(scores, vault.count) | {"sha256_of_all": vault.digest(), "seed_drawn_by": vault.drawn_by}
     if len(scores) == vault.count:  # the seed opens everything
         result["seed"] = str(vault.seed)

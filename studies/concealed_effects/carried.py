@@ -1,0 +1,56 @@
+"""A trial that takes longer than one machine is there: what the repository keeps of its beginning, and another goes on with.
+
+Scores of what was diagnosed, the seed, and the hashes that were committed to: what is left is made anew from the seed and
+compared with its hash. Who reads the seed here could open the seals, as on one machine; the hash proves that nothing was changed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from studies.concealed_effects.score import Score
+from studies.concealed_effects.sealed import Vault
+from workbench.robot.files import read_text, write_whole
+
+CARRIED = Path(__file__).parent / "results" / "under_way.json"
+SCORED = "scored_before.json"
+"""In OUT: the scores that came with it."""
+
+
+def carry(vault: Vault, scores: Sequence[Mapping[str, Any]], path: Path = CARRIED) -> Path | None:
+    """Writes what another machine needs, scores as in a trial's summary; of one that is done, nothing."""
+    if len(scores) == vault.count:
+        path.unlink(missing_ok=True)
+        return None
+    kept = {"seed": str(vault.seed), "drawn_by": vault.drawn_by, "commitments": vault.commitments,
+            "sessions": list(scores)}
+    write_whole(path, json.dumps(kept, indent=1) + "\n")
+    return path
+
+
+def take_up(out: Path, path: Path = CARRIED) -> Vault:
+    """Begins a folder with what was carried; ValueError where nothing was, or a trial was begun there."""
+    if not path.exists():
+        raise ValueError(f"{path}: no trial is under way")
+    if (out / "sealed").exists():
+        raise ValueError(f"{out}: a trial was begun here; take another folder")
+    kept = json.loads(read_text(path))
+    (out / "sealed").mkdir(parents=True)
+    plan = {"seed": int(kept["seed"]), "drawn_by": kept["drawn_by"], "count": len(kept["commitments"])}
+    with os.fdopen(os.open(out / "sealed" / "plan.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as f:
+        f.write(json.dumps(plan, indent=1) + "\n")
+    for name, digest in kept["commitments"].items():
+        write_whole(out / "sealed" / f"{name}.sha256", digest + "\n")
+    write_whole(out / SCORED, json.dumps(kept["sessions"], indent=1) + "\n")
+    return Vault(out / "sealed")
+
+
+def scored_before(out: Path) -> list[Score]:
+    """Scores that came from another machine."""
+    path = out / SCORED
+    entries: list[dict[str, Any]] = json.loads(read_text(path)) if path.exists() else []
+    return [Score.from_json(e) for e in entries]
