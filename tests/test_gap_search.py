@@ -16,6 +16,7 @@ from workbench.gap.evidence import ACROSS, gather, joint_of, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
+from workbench.gap.point_mass import PointMass
 from workbench.gap.race import Trial
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.rounds import Round

@@ -12,10 +12,8 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL = 7, 4
+TIERS, TIERS_OF_ALL = 6, 4
 """On the ground the first are what moves the robot as a whole, and joints that stand out."""
-NEVER_LAST = 5
-"""The tier, of zero offsets, after which the next is asked however good they are: a longer link moves a foot much alike."""
 LONE = 2
 """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
 ONE_PULL = ("ground_tilt", "tether_force")
@@ -105,17 +103,17 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
 def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
     """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
-    number, by several (for which a walk has to be looked at all around), then joints, zero offsets, and what is in links."""
+    number, by several (for which a walk has to be looked at all around) or by where feet stand, then joints, what links carry."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
         if not c.where:
             return 1 if many else 2
         return 2 if c.joint is not None else 3
-    if c.name in SEEN_ELSEWHERE:
-        return NEVER_LAST
-    if c.name == "link_length" or (c.name == "payload" and c.where[0] not in heavy):
-        return NEVER_LAST + 1
+    if c.name in SEEN_ELSEWHERE or c.name == "link_length":
+        return 3  # feet stand elsewhere: much like a centre of mass that does
+    if c.name == "payload" and c.where[0] not in heavy:
+        return 5
     if c.where and c.where[0] in outstanding:
         return 1
     if c.joint is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,10 @@ from workbench.gap.covariance import WIDER, Z90
 from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
-from workbench.gap.missed import Missed
 from workbench.gap.point_mass import PointMass
 from workbench.gap.rounds import Round
 from workbench.gap.search import Fit
+from workbench.robot import EffectSpec
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
@@ -25,6 +26,17 @@ LEAST_RELATIVE = 0.01
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
+
+
+class ReadOff(Protocol):
+    """An effect of one number that was read off the recordings: its mean and variance, in the contract's unit."""
+
+    @property
+    def spec(self) -> EffectSpec: ...
+    @property
+    def mean(self) -> float: ...
+    @property
+    def variance(self) -> float: ...
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
@@ -161,9 +173,10 @@ def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
     return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
 
 
-def posterior(fit: Fit, missed: Sequence[Missed] = ()) -> Posterior:
-    """Of all numbers in the contract's units; variances by the local slope between a size and its value."""
-    if not fit.effects and not missed:
+def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
+    """Of all numbers in the contract's units; variances by the local slope between a size and its value. read_off: effects of one
+    number that no fit told."""
+    if not fit.effects and not read_off:
         return Posterior()
     names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))
     mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
@@ -175,12 +188,12 @@ def posterior(fit: Fit, missed: Sequence[Missed] = ()) -> Posterior:
     covariance = slopes @ inner @ slopes.T
     lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     covariance[lost] = covariance[:, lost] = np.inf
-    for m in missed:  # a share's variance
-        names += list(parameter_names([m.spec]))
-        mean = np.append(mean, m.probability)
+    for r in read_off:
+        names += list(parameter_names([r.spec]))
+        mean = np.append(mean, r.mean)
         wider = np.zeros((len(mean), len(mean)))
         wider[:-1, :-1] = covariance
-        wider[-1, -1] = m.probability * (1 - m.probability) / m.of
+        wider[-1, -1] = r.variance
         covariance = wider
     return Posterior(tuple(names), mean, covariance)
 

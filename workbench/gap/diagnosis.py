@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.gap.built import Build, build_of
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
-from workbench.gap.conclusions import Residuals, finding, posterior, rejected, unexplained, verdict_of
+from workbench.gap.conclusions import Residuals, change, finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.constancy import drifts
 from workbench.gap.contest import Standing, contest
 from workbench.gap.doubts import doubted
@@ -21,7 +22,7 @@ from workbench.gap.findings import Diagnosis
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
-from workbench.gap.registered import Progress, no_progress, read_takes, register_takes
+from workbench.gap.registered import LeftOut, Progress, ReadTake, no_progress, read_takes, register_takes
 from workbench.gap.search import Fit, Search
 from workbench.gap.selection import select, too_little_left
 from workbench.gap.session import Base, Session
@@ -57,19 +58,22 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=STEP)
-    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
-    by_name = {t.spec.name: r for t, r in zip(takes, rollouts)}
-    unfitted = {name: r.nominal for name, r in by_name.items()}
-    registered, unregistered = register_takes(session, takes, unfitted, progress)
-    evidence = gather(registered, by_name)
+    seen = _seen(session, takes, config, n_jobs, progress)
+    evidence = seen.evidence
     _enough(session, evidence)
     jury = Jury(evidence, config, n_jobs, memory)
-    nominal = Search(jury, session.model).evaluated([])
+    nominal = begun = Search(jury, session.model).evaluated([])
     gap = ledger(evidence, nominal.residuals)
-    jury, missed = with_missed(jury, session.model, nominal.residuals)
-    looked_at = searched(jury.evidence, nominal.residuals)
-    search = Search(jury.on(looked_at), session.model)
-    pool = candidates(session.model, evidence) + special(session.model, evidence, nominal.residuals)
+    build = _believed(build_of(session.model, evidence, nominal.residuals), jury, session.model, nominal) if gap else Build()
+    known = session.with_model(build.added_to(session.model))
+    if build.measured:  # what steps and contact models leave open is another robot's
+        evidence = _seen(known, [replace(t, model=known.model_of(t.spec)) for t in takes], config, n_jobs, progress).evidence
+        jury = Jury(evidence, config, n_jobs, memory)
+        begun = Search(jury, known.model).evaluated([])
+    jury, missed = with_missed(jury, known.model, begun.residuals)
+    looked_at = searched(jury.evidence, begun.residuals)
+    search = Search(jury.on(looked_at), known.model)
+    pool = build.asked(candidates(known.model, evidence)) + special(known.model, evidence, begun.residuals)
     chosen = select(search, pool, progress, thorough)
     fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
@@ -77,14 +81,16 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
     standings = doubted(search, fit, standings, floors, [d.effect for d in changing])
-    fitted = fit.model(session.model)
+    fitted = fit.model(known.model)
     model = replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed)))
     after, rough = fit.residuals, floors
     if any(np.isfinite(e.until) for e in looked_at):
         progress("rolling out whole takes", None)
         after = jury.residuals([Question(fitted, tuple(range(len(evidence))))])[0]
         rough = floors_everywhere(looked_at, floors)
-    findings = tuple(m.finding() for m in missed) + tuple(
+    measured = tuple(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
+                     for m in build.measured)
+    findings = measured + tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
     left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
@@ -95,13 +101,37 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     diagnosis = Diagnosis(
         verdict=verdict, model=model, nominal=session.model, gap=gap, findings=findings,
         rejected=rejected(looked_at, fit, chosen.rounds, standings, nominal.residuals), unexplained=left,
-        posterior=posterior(fit, missed),
+        posterior=posterior(fit, (*build.measured, *missed)),
         next_experiment=None if experiment is None else experiment.entry(MOTION),
         provenance=provenance(session.model, config, time.monotonic() - began)
         | {"seed": 0, "rollouts": search.jury.rollouts} | share_of(looked_at),
-        stopped=chosen.stopped, left_out=unreadable + unregistered)
-    stories = _stories(jury, unfitted, nominal.residuals, after, fitted if findings else None)
+        stopped=chosen.stopped, left_out=unreadable + seen.left_out)
+    stories = _stories(jury, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Takes beside a model's rollouts: evidence, the rollouts by take, and takes that were left out with the reason."""
+
+    evidence: list[TakeEvidence]
+    nominal: dict[str, Take]
+    left_out: LeftOut
+
+
+def _seen(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> _Seen:
+    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
+    by_name = {t.spec.name: r for t, r in zip(takes, rollouts)}
+    nominal = {name: r.nominal for name, r in by_name.items()}
+    registered, left_out = register_takes(session, takes, nominal, progress)
+    return _Seen(gather(registered, by_name), nominal, left_out)
+
+
+def _believed(build: Build, jury: Jury, model: RobotModel, nominal: Fit) -> Build:
+    """What was measured, if with that in the model the takes are told better."""
+    there = Search(jury, build.added_to(model)).evaluated([]) if build.measured else nominal
+    better = there.cost["fit"] + there.cost["choose"] < nominal.cost["fit"] + nominal.cost["choose"]
+    return build if better else replace(build, measured=())
 
 
 def _enough(session: Session, evidence: Sequence[TakeEvidence]) -> None:

@@ -43,6 +43,14 @@ class Missed:
         return self.count / self.of
 
     @property
+    def mean(self) -> float:
+        return self.probability
+
+    @property
+    def variance(self) -> float:
+        return self.probability * (1 - self.probability) / self.of
+
+    @property
     def spec(self) -> EffectSpec:
         """The effect, for a model."""
         return EffectSpec("dropped_command", (self.joint,), {"probability": self.probability})

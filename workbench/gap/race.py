@@ -33,7 +33,7 @@ BEHIND = 0.6
 REMEMBERED = 0.15
 """Share of the best gain, as signatures of a race beside fewer effects foretell it, from which on an effect is looked at."""
 MOST_FITTED = 5
-"""Effects judged by all channels that are fitted at a time: those of which signatures foretell most."""
+"""Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Part = Generator[list[Question], list[dict[int, Array]], T]
@@ -66,14 +66,14 @@ Signatures = dict[tuple[object, ...], Seen]
 @dataclass(frozen=True)
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
-    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge; least:
-    what must be foretold of one that is fitted; early: what there is without them leaves, by takes and how long these are looked
-    at."""
+    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
+    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; early: what there is
+    without them leaves, by takes and how long these are looked at."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
-    wide: list[float] = field(default_factory=list)
+    wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0
     early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
@@ -113,8 +113,12 @@ class Trying:
         if not alive:
             return out
         sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
-        (final,) = yield [self._question(alive, sizes)]
-        return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
+        final = self._question(alive, sizes)
+        if self.walking:  # coarse steps say where to go; what a walk makes of small differences, they do not
+            final = replace(final, step=1.0)
+        (answer,) = yield [final]
+        left = answer if self.walking else self._told(answer)
+        return out + [self._judged(b, x, left) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
         """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
@@ -204,10 +208,11 @@ class Trying:
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
         """Of the group, those that are not told to be far behind a rival."""
         race = self.race
-        race.wide.extend(g for j, g in zip(self.joints, gains) if j is None)
+        alike = race.wide.setdefault(self.coarse, [])
+        alike.extend(g for j, g in zip(self.joints, gains) if j is None)
         _tell(race.foretold, self.joints, gains)
         yield []  # until all have said what they foretell
-        last = sorted(race.wide, reverse=True)[:MOST_FITTED][-1] if race.wide else 0.0
+        last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
                 if g > race.least and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.asked import LONE, NEVER_LAST, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
 from workbench.gap.evidence import BODY, joint_of
@@ -126,7 +126,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and tier != NEVER_LAST and _says_it(search, current, trials[0], takes, tier):
+            if trials and _says_it(search, current, trials[0], takes, tier):
                 break
         closed = LAST_CLOSED if astray else LEAST_CLOSED
         worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds, current)]

@@ -36,6 +36,11 @@ class JointFrame:
         return -self.X_MB_R.T @ self.X_MB_p
 
     @property
+    def axis_of_parent(self) -> Array:
+        """The joint's axis, (3,) unit, in its parent link's frame."""
+        return self.X_PF_R @ self.axis
+
+    @property
     def axis_B(self) -> Array:
         """The joint's axis, (3,) unit, in its child link's frame B."""
         return self.X_MB_R.T @ self.axis
