@@ -139,6 +139,8 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
         low, high = c.bounds()
         assert (low <= 0).all()
         assert (high >= 1).all()
+        if isinstance(c, PointMass):  # its numbers are never held
+            continue
         held = replace(c, held=(True,) * len(c.neutral))
         assert held.size == 0
         assert held.values(np.empty(0)) == pytest.approx(c.typical)
