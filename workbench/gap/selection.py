@@ -43,6 +43,9 @@ CLEARLY = 5.0
 ENOUGH = 0.6
 """Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
 before joints are asked, as a joint's effect can look like one of the whole robot's."""
+NEARLY_ALL_WALKING = 0.97
+"""NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
+back, which closes up to 0.93; true effects close more."""
 MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
 """Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
 it ends where little changes."""
@@ -179,7 +182,9 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
     surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
         return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > ENOUGH
-    return t.closed > (NEARLY_ALL if surely else ENOUGH)
+    if not surely:
+        return t.closed > ENOUGH
+    return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
 
 
 def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]) -> float:
