@@ -12,7 +12,7 @@ from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL = 6, 4
+TIERS, TIERS_OF_ALL = 7, 5
 """On the ground the first are what moves the robot as a whole, and joints that stand out."""
 LONE = 2
 """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
@@ -103,7 +103,7 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
 def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
     """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
-    number, by several (for which a walk has to be looked at all around) or by where feet stand, then joints, what links carry."""
+    number, by where feet stand, by several (for which a walk has to be looked at all around), then joints, what links carry."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
@@ -113,12 +113,12 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
     if c.name in SEEN_ELSEWHERE or c.name == "link_length":
         return 3  # feet stand elsewhere: much like a centre of mass that does
     if c.name == "payload" and c.where[0] not in heavy:
-        return 5
+        return 6
     if c.where and c.where[0] in outstanding:
         return 1
     if c.joint is not None:
-        return 4
-    return 3 if c.size > 1 else 2
+        return 5
+    return 4 if c.size > 1 else 2
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
