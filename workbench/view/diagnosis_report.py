@@ -187,7 +187,7 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     said = sentence_of(finding)
     parts: list[Part] = [Text(said)]
     if finding.evidence not in said:
-        parts.append(Text(finding.evidence))
+        parts.append(Text(finding.evidence.removeprefix(said).strip()))
     sure = f"{100 * finding.confidence:.0f} %"
     for a in finding.alternatives:
         parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {100 * a.confidence:.0f} %.** These recordings alone do not rule "
