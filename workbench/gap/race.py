@@ -34,6 +34,8 @@ REMEMBERED = 0.15
 """Share of the best gain, as signatures of a race beside fewer effects foretell it, from which on an effect is looked at."""
 MOST_FITTED = 5
 """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
+NEARBY = (1.0, 0.7, 1.4)
+"""Shares of a size that coarse steps found, at which a walk is looked at in the search's own step."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Part = Generator[list[Question], list[dict[int, Array]], T]
@@ -113,12 +115,20 @@ class Trying:
         if not alive:
             return out
         sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
-        final = self._question(alive, sizes)
-        if self.walking:  # coarse steps say where to go; what a walk makes of small differences, they do not
-            final = replace(final, step=1.0)
-        (answer,) = yield [final]
-        left = answer if self.walking else self._told(answer)
-        return out + [self._judged(b, x, left) for b, x in zip(alive, sizes)]
+        if self.coarse and self.walking:
+            return out + (yield from self._finely_judged(alive, sizes))
+        (final,) = yield [self._question(alive, sizes)]
+        return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
+
+    def _finely_judged(self, alive: list[int], sizes: list[Array]) -> Asking:
+        """Trials at the best of sizes nearby: coarse steps say where to go, not what a walk makes of small differences."""
+        bounds = [self.group[b].bounds() for b in alive]
+        shares = NEARBY if any(len(x) for x in sizes) else NEARBY[:1]
+        points = [[np.clip(share * x, *ends) for x, ends in zip(sizes, bounds)] for share in shares]
+        answers = yield [replace(self._question(alive, p), step=1.0) for p in points]
+        costs = [[float(r @ r) for r in self._left(a)] for a in answers]
+        best = [int(np.argmin([cost[b] for cost in costs])) for b in alive]
+        return [self._judged(b, points[n][k], answers[n]) for k, (b, n) in enumerate(zip(alive, best))]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
         """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
