@@ -7,13 +7,12 @@ compared with its hash. Who reads the seed here could open the seals, as on one 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from studies.concealed_effects.score import Score
-from studies.concealed_effects.sealed import Vault
+from studies.concealed_effects.sealed import Vault, write_plan
 from workbench.robot.files import read_text, write_whole
 
 CARRIED = Path(__file__).parent / "results" / "under_way.json"
@@ -40,9 +39,7 @@ def take_up(out: Path, path: Path = CARRIED) -> Vault:
         raise ValueError(f"{out}: a trial was begun here; take another folder")
     kept = json.loads(read_text(path))
     (out / "sealed").mkdir(parents=True)
-    plan = {"seed": int(kept["seed"]), "drawn_by": kept["drawn_by"], "count": len(kept["commitments"])}
-    with os.fdopen(os.open(out / "sealed" / "plan.json", os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as f:
-        f.write(json.dumps(plan, indent=1) + "\n")
+    write_plan(out / "sealed", {"seed": int(kept["seed"]), "drawn_by": kept["drawn_by"], "count": len(kept["commitments"])})
     for name, digest in kept["commitments"].items():
         write_whole(out / "sealed" / f"{name}.sha256", digest + "\n")
     write_whole(out / SCORED, json.dumps(kept["sessions"], indent=1) + "\n")

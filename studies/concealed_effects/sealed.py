@@ -21,6 +21,14 @@ from workbench.robot import InputError
 from workbench.robot.files import read_text, write_whole
 
 COUNT = 100
+PLAN = "plan.json"
+
+
+def write_plan(folder: Path, plan: Mapping[str, int | str]) -> None:
+    """A new plan, readable by its owner alone."""
+    handle = os.open(folder / PLAN, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(handle, "w") as f:
+        f.write(json.dumps(plan, indent=1) + "\n")
 
 
 class Vault:
@@ -31,13 +39,11 @@ class Vault:
         count: of sessions (default: 100). seed: for tests and development; a trial leaves it to the operating system."""
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
-        path = folder / "plan.json"
+        path = folder / PLAN
         if not path.exists():
             plan = {"seed": int.from_bytes(os.urandom(16), "big") if seed is None else seed,
                     "drawn_by": "os.urandom" if seed is None else "hand", "count": COUNT if count is None else count}
-            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-            with os.fdopen(handle, "w") as f:
-                f.write(json.dumps(plan, indent=1) + "\n")
+            write_plan(folder, plan)
         plan = json.loads(read_text(path))
         self.seed, self.count, self.drawn_by = int(plan["seed"]), int(plan["count"]), str(plan["drawn_by"])
         if count not in (None, self.count) or seed not in (None, self.seed):

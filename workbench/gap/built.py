@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
-from workbench.gap.candidate import Candidate
+from workbench.gap.candidate import Candidate, Key
 from workbench.gap.contest import SUREST
 from workbench.gap.covariance import Z90
 from workbench.gap.evidence import TakeEvidence, joint_of
@@ -28,7 +28,6 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
-Key = tuple[str, tuple[str, ...]]
 LEAST_ALONG = 0.5
 """Cosine between a link's length and what of it two axes tell."""
 ROUGH, ROUGH_TURN = 1e-4, np.deg2rad(0.25)
@@ -37,7 +36,6 @@ SURE = 5.0
 """Standard deviations from which on a link is not as drawn."""
 LEAST_CHANGE, LEAST_TURNED = 5e-4, np.deg2rad(1.5)
 """Changes of length [m] and turned horns [rad] below which no gait shows anything: what is told to be nearer is as drawn."""
-
 SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
 
 
@@ -159,7 +157,7 @@ def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]
         tilt = quat.matrix(m.rest_rotation) @ poses[model.base][1][0].T
         for s in between:
             f = k.frames[s.joint]
-            axis = start[model.base][1][0].T @ start[f.parent][1][0] @ f.X_PF_R @ f.axis
+            axis = start[model.base][1][0].T @ start[f.parent][1][0] @ f.axis_of_parent
             seen, drawn = turned(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _drawn(k, s)
             if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
                 turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))

@@ -14,6 +14,8 @@ from workbench.effects.base import Effect, Parameter
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
+Key = tuple[str, tuple[str, ...]]
+"""What an effect is, and where."""
 ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
 """What a search from neutral cannot find: a stop shows nothing until the joint meets it, a mount's axis has to be known first;
 `special` reads them off the recordings."""
@@ -45,8 +47,7 @@ class Candidate:
         return self.effect.name
 
     @property
-    def key(self) -> tuple[str, tuple[str, ...]]:
-        """What it is and where."""
+    def key(self) -> Key:
         return self.effect.name, self.where
 
     @property

@@ -24,8 +24,8 @@ NEARLY_ALL = 0.9
 shoulder, nor sets of them."""
 HALF = 0.5
 """Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
-FITTED, ALIKE = {2: 1, 3: 6}, 2.0
-"""Effects in a set, and how many such sets are fitted: of those that leave less than ALIKE times what the best does, as lines
+FITTED, AS_GOOD = {2: 1, 3: 6}, 2.0
+"""Effects in a set, and how many such sets are fitted: of those that leave less than AS_GOOD times what the best does, as lines
 foretell roughly."""
 
 
@@ -112,7 +112,7 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
             break
         if size > 1 and ranked[0][0] < HALF * best:
-            out += [trials for left, trials in ranked[:FITTED[size]] if left < ALIKE * ranked[0][0]]
+            out += [trials for left, trials in ranked[:FITTED[size]] if left < AS_GOOD * ranked[0][0]]
         best = min(best, ranked[0][0])
     return out
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidate import Candidate
+from workbench.gap.candidate import Candidate, Key
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import Chosen, Round
@@ -17,7 +17,7 @@ from workbench.gap.search import Fit, Report, Search
 from workbench.gap.selection import CLOSE, MOST_RIVALS, completed
 
 Array = NDArray[np.float64]
-Seats = dict[tuple[str, tuple[str, ...]], tuple[Round, Trial]]
+Seats = dict[Key, tuple[Round, Trial]]
 """By effect, when it was taken and on what."""
 TEMPER = 4.0
 """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where walks do not

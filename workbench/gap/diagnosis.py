@@ -129,7 +129,9 @@ def _seen(session: Session, takes: Sequence[ReadTake], config: SimulationConfig,
 
 def _believed(build: Build, jury: Jury, model: RobotModel, nominal: Fit) -> Build:
     """What was measured, if with that in the model the takes are told better."""
-    there = Search(jury, build.added_to(model)).evaluated([]) if build.measured else nominal
+    if not build.measured:
+        return build
+    there = Search(jury, build.added_to(model)).evaluated([])
     better = there.cost["fit"] + there.cost["choose"] < nominal.cost["fit"] + nominal.cost["choose"]
     return build if better else replace(build, measured=())
 

@@ -214,7 +214,7 @@ def channel_names(t: RegisteredTake) -> tuple[str, ...]:
         k = t.model.kinematics
         neutral = k.forward(np.zeros((1, len(k.joints))))
         for i, j in enumerate(joints):
-            axis = np.abs(neutral[k.frames[j].parent][1][0] @ k.frames[j].X_PF_R @ k.frames[j].axis)  # in the base's axes
+            axis = np.abs(neutral[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent)  # in the base's axes
             if np.isfinite(t.recorded.off_axis[:, i]).any():
                 across += [f"{j}{ACROSS}{'xyz'[k]}" for k in np.sort(np.argsort(axis)[:2])]
     return (*joints, *across, *(BODY if t.recorded.base == "free" else ()))

@@ -213,7 +213,7 @@ def gravity_torque(model: RobotModel, joint: str, q: Array) -> Array:
     poses = k.forward(q, model.joints)
     f = k.frames[joint]
     p_WP, R_WP = poses[f.parent]
-    origin, axis = p_WP + R_WP @ f.X_PF_p, R_WP @ (f.X_PF_R @ f.axis)
+    origin, axis = p_WP + R_WP @ f.X_PF_p, R_WP @ f.axis_of_parent
     out = np.zeros(len(q))
     for link in k.links:
         if joint in k.chain(link):

@@ -103,7 +103,7 @@ class BodyMoves:
         """-1 where hip and knee turn about the same axis, so that one has to go back as the other goes on; else 1."""
         k = self.model.kinematics
         poses = k.forward(np.zeros((1, len(k.joints))))
-        hip, knee = (poses[k.frames[j].parent][1][0] @ k.frames[j].X_PF_R @ k.frames[j].axis for j in joints[-2:])
+        hip, knee = (poses[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent for j in joints[-2:])
         return -1.0 if float(hip @ knee) > 0 else 1.0
 
     def _missed(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.candidate import Candidate, with_effects
+from workbench.gap.candidate import Candidate, Key, with_effects
 from workbench.gap.covariance import covariance_of
 from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question
@@ -68,7 +68,7 @@ class Fit:
         x = self.x if x is None else x
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
-    def sizes_by_key(self) -> dict[tuple[str, tuple[str, ...]], Array]:
+    def sizes_by_key(self) -> dict[Key, Array]:
         """Of each effect, by what it is and where."""
         return {c.key: x for c, x in self.sizes()}
 

@@ -75,7 +75,7 @@ def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], resi
     rows, sigma = [], 1.0
     tree = model.kinematics
     neutral, frame = tree.forward(np.zeros((1, len(tree.joints)))), tree.frames[joint]
-    servo = neutral[frame.parent][1][0] @ frame.X_PF_R @ frame.axis
+    servo = neutral[frame.parent][1][0] @ frame.axis_of_parent
     for i, e in enumerate(evidence):
         columns = [k for k, c in enumerate(e.channels) if c.startswith(joint + ACROSS)]
         if len(columns) == 2 and any(e.channels[k] in ill[i] for k in columns):

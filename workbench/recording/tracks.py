@@ -135,7 +135,7 @@ def seen_joints(tracks: Tracks, model: RobotModel, base: str) -> tuple[list[Seen
             problems.append(f"joints {' and '.join(between)}: not told apart, as no link between them is tracked")
             continue
         f = k.frames[between[0]]
-        axis = to_base @ neutral[f.parent] @ f.X_PF_R @ f.axis
+        axis = to_base @ neutral[f.parent] @ f.axis_of_parent
         joints.append(SeenJoint(f.name, row.get(at), i, axis))
     order = {name: n for n, name in enumerate(k.joints)}
     return sorted(joints, key=lambda j: order[j.name]), problems
