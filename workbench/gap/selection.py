@@ -43,6 +43,8 @@ CLEARLY = 5.0
 ENOUGH = 0.6
 """Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
 before joints are asked, as a joint's effect can look like one of the whole robot's."""
+OWN_GAP = 0.9
+"""The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play there closes three quarters."""
 NEARLY_ALL_WALKING = 0.97
 """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
 back, which closes up to 0.93; true effects close more."""
@@ -55,7 +57,7 @@ MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
 ALIKE = 0.25
-"""Joints whose best gain is this share of the greatest are taken in the same round."""
+"""Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
 
 
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False) -> Chosen:
@@ -181,7 +183,7 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
     surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
-        return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > ENOUGH
+        return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > OWN_GAP
     if not surely:
         return t.closed > ENOUGH
     return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
@@ -229,7 +231,8 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
         return [[t] for t in worth[:MOST_RIVALS + 1] if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
     elsewhere: list[Trial] = []
     for t in worth[1:]:
-        if t.joint not in {None, best.joint, *(o.joint for o in elsewhere)} and t.gain["choose"] > ALIKE * best.gain["choose"]:
+        alike = t.gain["choose"] > ALIKE * best.gain["choose"] or t.closed > NEARLY_ALL
+        if alike and t.joint not in {None, best.joint, *(o.joint for o in elsewhere)}:
             elsewhere.append(t)
     rivals = [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
               and t.gain["choose"] > HALFWAY * best.gain["choose"]]
