@@ -44,7 +44,7 @@ ENOUGH = 0.6
 """Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
 before joints are asked, as a joint's effect can look like one of the whole robot's."""
 OWN_GAP = 0.9
-"""The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play there closes three quarters."""
+"""The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play closes three quarters."""
 NEARLY_ALL_WALKING = 0.97
 """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
 back, which closes up to 0.93; true effects close more."""
