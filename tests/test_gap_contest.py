@@ -10,7 +10,7 @@ from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import Rival, Standing, _misfit, contest
+from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, contest
 from workbench.gap.doubts import doubted
 from workbench.gap.jury import Jury
 from workbench.gap.point_mass import PointMass
@@ -90,6 +90,15 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.45)
     assert told(mass, [1.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.9)
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [np.inf, 0.1, 0.1, 0.1]) == pytest.approx(0.9)  # nothing is known of it
+
+
+@pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, WALKS_SAY), (-5000.0, -WALKS_SAY)])
+def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
+    """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
+    search = SimpleNamespace(held=(0,), fitted=(0, 1), grounded=lambda takes: (1,),
+                             jury=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
+    fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})
+    assert _better_held(search, fit, rival) == pytest.approx(adds - 20.0)
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

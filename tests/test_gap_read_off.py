@@ -8,10 +8,12 @@ import pytest
 
 from tests.gap_sessions import record_arm
 from tests.test_gap_search import CONFIG
+from workbench.effects.schedules import without_poses
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
 from workbench.gap.jury import Jury, Question
 from workbench.gap.missed import LEAST_CLOSED, SURELY, _least_closed, _read, _stands_at_an_end, with_missed
+from workbench.gap.passed_over import passed_over
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
 from workbench.gap.special import special
@@ -80,6 +82,22 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     assert share.low < share.value < share.high
     after = nominal_residuals(quiet, jury)
     assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))
+
+
+@pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])
+def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet, lost):
+    e = quiet[1].evidence[0]
+    times = np.arange(0.0, e.take.commands.end - 0.1, 0.15)
+    swing = np.deg2rad(np.tile([18.0, 6.0, -9.0, -9.0, 15.0], 40)[:len(times)])
+    first = np.zeros(len(times), dtype=int)
+    quick = replace(e.take.commands, times=times, goals=np.outer(swing, np.ones(len(e.take.commands.joints))),
+                    speeds=e.take.commands.speeds[first], enabled=e.take.commands.enabled[first],
+                    poses=e.take.commands.poses[first])
+    played = without_poses(quick, quick.column("one"), lost)
+    there = recorded_with(quiet, quiet[0], played)
+    jury = there.on([replace(there.evidence[0], take=replace(e.take, commands=quick))])
+    found = passed_over(jury, quiet[0], nominal_residuals(quiet, jury))
+    assert found == ({(0, "one"): lost} if lost else {})
 
 
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):

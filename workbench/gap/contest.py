@@ -34,6 +34,10 @@ NUMBER, NUMBER_SHARE = 40.0, 0.03
 """What each number that a name has more than another must bring, of the same: TEMPER times the logarithm of how many frames speak
 (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a model,
 differ by some hundredths of it, and a name with more numbers makes more of that."""
+WALKS_SAY = 2 * TEMPER
+"""The most of chi squared that walks add to what held takes say of a name: odds of e to one. Small differences send a walk
+elsewhere, and a wrong name may happen to go that way.
+"""
 STEPS = 4
 """Of a fit: names that differ by little are told apart at their best alone."""
 SUREST = 0.98
@@ -74,7 +78,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         put = iter(search.side_by_side([_put(search, fit, i, t) for i, there in enumerate(near) for t in there],
                                        partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
         rivals = [[next(put) for _ in there] for there in near]
-        challengers = [(_lead(fit, r, seats[c.key][1]), r, c) for c, there in zip(fit.effects, rivals) for r in there]
+        challengers = [(_lead(search, fit, r, seats[c.key][1]), r, c) for c, there in zip(fit.effects, rivals) for r in there]
         if turn == len(fit.effects) or not challengers:
             break
         lead, best, replaced = max(challengers, key=lambda challenger: challenger[0])
@@ -93,7 +97,7 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     walked = taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(fit.effects[i])
     temper = max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) if walked else TEMPER
     temper *= _misfit(search, fit)
-    leads = np.array([0.0, *(_lead(fit, r, taken) for r in rivals)])
+    leads = np.array([0.0, *(_lead(search, fit, r, taken) for r in rivals)])
     weight = np.exp(0.5 * (leads - leads.max()) / temper)
     p = weight / weight.sum()
     closed = completed(search, *seats[fit.effects[i].key], fit)
@@ -109,12 +113,25 @@ def _misfit(search: Search, fit: Fit) -> float:
     return max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
 
 
-def _lead(fit: Fit, rival: Fit, taken: Trial) -> float:
+def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
     """By how much a fit with a rival in an effect's place is better, of chi squared, numbers priced."""
     price = max(NUMBER, NUMBER_SHARE * taken.gain["choose"])
     own = [c.key for c in rival.effects]
     (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
-    return fit.cost["choose"] - rival.cost["choose"] + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
+    better = fit.cost["choose"] - rival.cost["choose"]
+    if search.is_settled(fit.effects[replaced]):
+        better = _better_held(search, fit, rival)
+    return better + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
+
+
+def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
+    """By how much a rival of an effect that held takes told is better: these take the word first."""
+    def better(takes: Sequence[int]) -> float:
+        was, now = (search.jury.cost({i: f.residuals[i] for i in takes}, "choose") for f in (fit, rival))
+        return was - now
+
+    walks = better(search.grounded(search.fitted)) * TEMPER / TEMPER_WALKING
+    return better(search.held) + float(np.clip(walks, -WALKS_SAY, WALKS_SAY))
 
 
 def _told(fit: Fit, i: int) -> int:

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
 from workbench.effects.registry import known_effects
-from workbench.effects.schedules import without_poses
 from workbench.gap.evidence import TakeEvidence, joint_error
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
+from workbench.gap.passed_over import LEAST_STEP, passed_over, without
 from workbench.gap.special import AT_STOP
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
-LEAST_STEP = np.deg2rad(2.0)
-"""A pose that moves a joint by less does not tell whether it came [rad]."""
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
@@ -69,8 +67,10 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
     if "dropped_command" not in known_effects():
         return jury, ()
     found: list[Missed] = []
+    moving = passed_over(jury, nominal, residuals)
     for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
-        read = {i: _read(e, joint, residuals[i]) for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
+        read = {i: _with(_read(e, joint, residuals[i]), moving.get((i, joint), ()))
+                for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
         count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
         least = _least_closed(jury, {i: len(r[0]) for i, r in read.items()})
         if least is None or count > 0.6 * of:
@@ -78,7 +78,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, r in read.items() for k in r[0]):
             continue
         lost = {i: r[0] for i, r in read.items()}
-        tried = replaced(jury, {i: _without(jury.evidence[i], joint, k) for i, k in lost.items() if k})
+        tried = replaced(jury, {i: without(jury.evidence[i], {joint: k}) for i, k in lost.items() if k})
         after = tried.residuals([Question(nominal, tuple(range(len(jury.evidence))))])[0]
         here = tuple(i for i, k in lost.items() if k)
         was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
@@ -155,8 +155,6 @@ def _read(e: TakeEvidence, joint: str, residual: Array) -> tuple[list[int], list
     return missed, telling
 
 
-def _without(e: TakeEvidence, joint: str, missed: Sequence[int]) -> TakeEvidence:
-    """The take as played without some commands to a joint."""
-    commands = e.take.commands
-    assert commands is not None
-    return replace(e, take=replace(e.take, commands=without_poses(commands, commands.column(joint), missed)))
+def _with(read: tuple[list[int], list[int]], more: Sequence[int]) -> tuple[list[int], list[int]]:
+    """What was read, with poses that were missed in motion."""
+    return sorted({*read[0], *more}), sorted({*read[1], *more})

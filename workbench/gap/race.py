@@ -30,8 +30,9 @@ WORTH = 0.3
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
-REMEMBERED = 0.15
-"""Share of the best gain, as signatures of a race beside fewer effects foretell it, from which on an effect is looked at."""
+REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
+"""Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect is
+looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
 MOST_FITTED = 5
 """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
 NEARBY = (1.0, 0.7, 1.4)
@@ -137,9 +138,8 @@ class Trying:
         if guesses is not None:
             _tell(self.race.remembered, self.joints, guesses[1])
         yield []  # until all have said what they remember
-        if guesses is None or guesses[1][0] >= max(self.race.least, REMEMBERED * _best(self.race.remembered, None)):
-            return None
-        return guesses
+        enough = max(REMEMBERED_LEAST * self.race.least, REMEMBERED * _best(self.race.remembered, None))
+        return None if guesses is None or guesses[1][0] >= enough else guesses
 
     def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""

@@ -1,0 +1,116 @@
+"""Poses that a servo never got while it was on its way: a fast gait leaves no rest by which to tell, but simulation does.
+
+Where a joint that went as the model has it begins to stay behind with a pose, that pose is left out of what is played, and is
+taken for missed if the joint then goes as recorded, until it stays behind again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.schedules import without_poses
+from workbench.gap.evidence import TakeEvidence
+from workbench.gap.jury import Jury, Question
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+Lost = dict[tuple[int, str], tuple[int, ...]]
+"""Poses by take and joint."""
+LEAST_STEP = np.deg2rad(2.0)
+"""A pose that moves a joint by less does not tell whether it came [rad]."""
+CALM, BEHIND = 4.0, 7.0
+"""Standard deviations within which a joint goes as the model has it, and beyond which it stays behind."""
+BEFORE, LAG = 0.03, 0.05
+"""Times [s] before a command that show how the joint went until then, and by which what it does shows later."""
+EXPLAINED = 0.8
+"""Share of what a joint lacks until the next command that leaving out the pose must explain."""
+MOST, TURNS = 0.5, 12
+"""Share of poses that may be missed: of more, something else is the matter. Poses that may be missed one after another."""
+
+
+def without(e: TakeEvidence, lost: Mapping[str, Sequence[int]]) -> TakeEvidence:
+    """The take as played without some poses, by joint."""
+    commands = e.take.commands
+    assert commands is not None
+    for joint, poses in lost.items():
+        commands = without_poses(commands, commands.column(joint), poses)
+    return replace(e, take=replace(e.take, commands=commands))
+
+
+def passed_over(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> Lost:
+    """Poses that were missed in motion. residuals: of the nominal robot, by take."""
+    lost: Lost = {}
+    cleared: set[tuple[int, str, int]] = set()
+    now = dict(residuals)
+    for _ in range(TURNS):
+        new = _suspects(jury, now, lost, cleared)
+        if not new:
+            break
+        after = _played(jury, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
+        guilty = {(i, j): tuple(k for k in poses if _explained(jury.evidence[i], j, k, now[i], after[i]))
+                  for (i, j), poses in new.items()}
+        cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
+        found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
+        if not found:
+            break
+        lost |= found
+        now = after if guilty == new else _played(jury, nominal, lost, residuals)
+    return lost
+
+
+def _played(jury: Jury, nominal: RobotModel, lost: Lost, residuals: Mapping[int, Array]) -> dict[int, Array]:
+    """What is left without these poses."""
+    by_take = {i: {j: poses for (n, j), poses in lost.items() if n == i} for i in {i for i, _ in lost}}
+    there = jury.on([without(e, by_take[i]) if i in by_take else e for i, e in enumerate(jury.evidence)])
+    return dict(residuals) | there.residuals([Question(nominal, tuple(sorted(by_take)))])[0]
+
+
+def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tuple[int, str, int]]) -> Lost:
+    """Poses with which joints that were well begin to stay behind."""
+    out: Lost = {}
+    for i, e in enumerate(jury.evidence):
+        for joint in e.joints if e.take.commands is not None else ():
+            gone = lost.get((i, joint), ())
+            steps = _steps(e, joint, gone)
+            behind = tuple(k for k, way in steps.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
+            if behind and len(behind) + len(gone) <= MOST * (len(steps) + len(gone)):
+                out[i, joint] = behind
+    return out
+
+
+def _steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
+    """Poses that move a joint and that it got, and by how much [rad]."""
+    commands = without(e, {joint: gone}).take.commands
+    assert commands is not None
+    ways = np.diff(commands.goals[:, commands.column(joint)], prepend=0.0)
+    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= LEAST_STEP and k not in gone}
+
+
+def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) -> bool:
+    """Whether a joint was well when a command came, and stays behind until the next does."""
+    own = -np.sign(way) * residual[:, e.channels.index(joint)]
+    came, until = _between(e, k)
+    time = e.take.recorded.since_start
+    was, then = own[(time > came - BEFORE) & (time <= came)], own[(time > came) & (time <= until)]
+    was, then = was[np.isfinite(was)], then[np.isfinite(then)]
+    return bool(len(then)) and bool(np.all(np.abs(was) < CALM)) and bool(then.max() > max(BEHIND, -then.min()))
+
+
+def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
+    """Whether a joint goes as recorded without a pose, until the next came."""
+    came, until = _between(e, k)
+    time, channel = e.take.recorded.since_start, e.channels.index(joint)
+    own = (time > came) & (time <= until) & np.isfinite(before[:, channel])
+    was, now = (float(np.sum(r[own, channel] ** 2)) for r in (before, after))
+    return was - now > EXPLAINED * (was - own.sum())
+
+
+def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
+    """When a command came [s], and until when what it did shows alone."""
+    commands = e.take.commands
+    assert commands is not None
+    return float(commands.times[k]), float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end) + LAG
