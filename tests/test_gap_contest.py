@@ -10,7 +10,7 @@ from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, contest
+from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, _told, contest
 from workbench.gap.doubts import doubted
 from workbench.gap.jury import Jury
 from workbench.gap.point_mass import PointMass
@@ -99,6 +99,14 @@ def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
                              jury=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
     fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})
     assert _better_held(search, fit, rival) == pytest.approx(adds - 20.0)
+
+
+def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
+    _, search = worn
+    mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
+    fit = replace(search.evaluated([]), effects=(mass,), x=np.ones(4), covariance=np.full((4, 4), np.inf))
+    assert _told(fit, 0) == 4
+    assert _told(replace(fit, covariance=np.diag([1.0, 1.0, 1.0, np.inf])), 0) == 3
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):

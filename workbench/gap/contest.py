@@ -135,8 +135,10 @@ def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
 
 
 def _told(fit: Fit, i: int) -> int:
-    """Numbers of an effect that the data tell: where along its axis a joint carries a mass makes no name better."""
-    return int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
+    """Numbers of an effect that the data tell: where along its axis a joint carries a mass makes no name better. All of one that
+    was too far behind to be fitted."""
+    told = int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
+    return told or fit.effects[i].size
 
 
 def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
