@@ -157,6 +157,7 @@ def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, dr
 @pytest.mark.parametrize(("estimate", "said"), [
     (Estimate(3.1, 2.7, 3.5, "deg"), "3.1 deg (2.7 to 3.5)"),
     (Estimate(0.45, 0.4, 0.5, "1"), "0.45 (0.4 to 0.5)"),
+    (Estimate(1.02697, 1.0265, 1.0274, "1"), "1.027 (1.0265 to 1.0274)"),
     (Estimate(50.0, 20.0, inf, "N m/rad"), "50 N m/rad (at least 20)"),
     (Estimate(0.1, -inf, 0.3, "N m"), "0.1 N m (at most 0.3)"),
     (Estimate(0.1, -inf, inf, "N m"), "0.1 N m (not bounded by the data)"),

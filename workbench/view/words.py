@@ -101,10 +101,12 @@ def _one(value: float, low: float, high: float, unit: str, largest: float | None
     """largest: of the values that it is to be read beside, which sets the unit and the decimals; its own if left out."""
     largest = abs(value) if largest is None else largest
     unit, scale = _readable(largest, unit)
+    half = (high - low) / 2
+    digits = 2 + math.floor(math.log10(abs(value) / half)) if value and 0 < half < math.inf else 3  # that show an interval
 
     def number(x: float) -> str:
         if largest == abs(value):
-            return f"{scale * x:.3g}"
+            return f"{scale * x:.{min(max(3, digits), 7)}g}"
         decimals = max(0, 2 - math.floor(math.log10(scale * largest))) if largest > 0 else 2
         return f"{scale * x:.{decimals}f}"
 
