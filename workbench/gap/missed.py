@@ -13,7 +13,7 @@ from workbench.effects.registry import known_effects
 from workbench.gap.evidence import TakeEvidence, joint_error
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
-from workbench.gap.passed_over import LEAST_STEP, passed_over, without
+from workbench.gap.passed_over import LEAST_STEP, end_of, passed_over, played_without
 from workbench.gap.special import AT_STOP
 from workbench.robot import EffectSpec, RobotModel
 
@@ -78,7 +78,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, r in read.items() for k in r[0]):
             continue
         lost = {i: r[0] for i, r in read.items()}
-        tried = replaced(jury, {i: without(jury.evidence[i], {joint: k}) for i, k in lost.items() if k})
+        tried = played_without(jury, {(i, joint): k for i, k in lost.items() if k})
         after = tried.residuals([Question(nominal, tuple(range(len(jury.evidence))))])[0]
         here = tuple(i for i, k in lost.items() if k)
         was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
@@ -120,15 +120,8 @@ def _seen(e: TakeEvidence, joint: str) -> Array:
 
 def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
     """The last frames before the next command comes."""
-    commands, time = e.take.commands, e.take.recorded.since_start
-    assert commands is not None
-    end = commands.times[k + 1] if k + 1 < len(commands.times) else commands.end
+    time, end = e.take.recorded.since_start, end_of(e, k)
     return np.asarray((time > end - 0.06) & (time <= end))
-
-
-def replaced(jury: Jury, evidence: Mapping[int, TakeEvidence]) -> Jury:
-    """The same jury on some other takes."""
-    return jury.on([evidence.get(i, e) for i, e in enumerate(jury.evidence)])
 
 
 def _read(e: TakeEvidence, joint: str, residual: Array) -> tuple[list[int], list[int]]:

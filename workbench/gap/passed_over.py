@@ -32,13 +32,22 @@ MOST, TURNS = 0.5, 12
 """Share of poses that may be missed: of more, something else is the matter. Poses that may be missed one after another."""
 
 
-def without(e: TakeEvidence, lost: Mapping[str, Sequence[int]]) -> TakeEvidence:
-    """The take as played without some poses, by joint."""
+def played_without(jury: Jury, lost: Mapping[tuple[int, str], Sequence[int]]) -> Jury:
+    """The jury whose takes are played without some poses, by take and joint."""
+    evidence = list(jury.evidence)
+    for (i, joint), poses in lost.items():
+        take = evidence[i].take
+        assert take.commands is not None
+        commands = without_poses(take.commands, take.commands.column(joint), poses)
+        evidence[i] = replace(evidence[i], take=replace(take, commands=commands))
+    return jury.on(evidence)
+
+
+def end_of(e: TakeEvidence, k: int) -> float:
+    """When the next command comes [s]."""
     commands = e.take.commands
     assert commands is not None
-    for joint, poses in lost.items():
-        commands = without_poses(commands, commands.column(joint), poses)
-    return replace(e, take=replace(e.take, commands=commands))
+    return float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end)
 
 
 def passed_over(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> Lost:
@@ -64,9 +73,8 @@ def passed_over(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
 
 def _played(jury: Jury, nominal: RobotModel, lost: Lost, residuals: Mapping[int, Array]) -> dict[int, Array]:
     """What is left without these poses."""
-    by_take = {i: {j: poses for (n, j), poses in lost.items() if n == i} for i in {i for i, _ in lost}}
-    there = jury.on([without(e, by_take[i]) if i in by_take else e for i, e in enumerate(jury.evidence)])
-    return dict(residuals) | there.residuals([Question(nominal, tuple(sorted(by_take)))])[0]
+    takes = tuple(sorted({i for i, _ in lost}))
+    return dict(residuals) | played_without(jury, lost).residuals([Question(nominal, takes)])[0]
 
 
 def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tuple[int, str, int]]) -> Lost:
@@ -84,9 +92,10 @@ def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tup
 
 def _steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     """Poses that move a joint and that it got, and by how much [rad]."""
-    commands = without(e, {joint: gone}).take.commands
+    commands = e.take.commands
     assert commands is not None
-    ways = np.diff(commands.goals[:, commands.column(joint)], prepend=0.0)
+    column = commands.column(joint)
+    ways = np.diff(without_poses(commands, column, gone).goals[:, column], prepend=0.0)
     return {k: float(way) for k, way in enumerate(ways) if abs(way) >= LEAST_STEP and k not in gone}
 
 
@@ -113,4 +122,4 @@ def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
     """When a command came [s], and until when what it did shows alone."""
     commands = e.take.commands
     assert commands is not None
-    return float(commands.times[k]), float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end) + LAG
+    return float(commands.times[k]), end_of(e, k) + LAG
