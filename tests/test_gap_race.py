@@ -52,6 +52,21 @@ def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     assert guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
 
 
+def test_between_sizes_that_were_seen_a_guess_stays_where_these_lead():
+    c = Candidate.of(known_effects()["servo_gain"], ("flm",), (1.0,))
+    probes = scan(c, (1.0, 4.0), False)
+    lag = np.sin(np.linspace(0, 6, 40))
+
+    def shown(x):
+        return lag * (1 / c.values(np.atleast_1d(x))[0] - 1)
+
+    r0 = -shown(2.6)  # a line through the first alone says 4.3, where four times as much is missing
+    x, gain = guess(c, r0, probes, [r0 + shown(p) for p in probes], 5.0)
+    assert 1.0 < x[0] < 2.6
+    assert gain == pytest.approx(r0 @ r0)
+    assert np.sum((r0 + shown(x)) ** 2) < 0.6 * (r0 @ r0)
+
+
 def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_not_scaled():
     c = Candidate.of(known_effects()["stribeck_friction"], ("flm",), (0.0, 20.0))
     probes = scan(c, (1.0, 4.0), False)

@@ -8,13 +8,18 @@ import pytest
 
 from tests.gap_sessions import record_arm
 from tests.test_gap_search import CONFIG
+from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
+from workbench.gap.anew import Played, read_anew
+from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
+from workbench.gap.findings import Change
 from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import LEAST_CLOSED, SURELY, _least_closed, _read, _stands_at_an_end, with_missed
-from workbench.gap.passed_over import passed_over
+from workbench.gap.missed import LEAST_CLOSED, SURELY, Missed, _least_closed, _read, _stands_at_an_end, with_missed
+from workbench.gap.passed_over import passed_over, played_without
 from workbench.gap.registered import read_takes, register_takes
+from workbench.gap.search import Search
 from workbench.gap.session import load_session
 from workbench.gap.special import special
 from workbench.robot import EffectSpec
@@ -82,6 +87,18 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     assert share.low < share.value < share.high
     after = nominal_residuals(quiet, jury)
     assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))
+
+
+def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet):
+    slow = Candidate.of(known_effects()["command_delay"], ("one",), (0.0,))
+    x = np.array([6.0])
+    jury = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
+    wrong = Missed("one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
+    search = Search(played_without(jury, {(0, "one"): (1,)}), quiet[0])
+    current = search.evaluated([(slow, x)])
+    assert read_anew(search, current, Played(jury, (wrong,))).missed == ()
+    assert search.jury.cost(search.evaluated([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
+    assert search.jury.evidence[0].take.commands is jury.evidence[0].take.commands
 
 
 @pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])

@@ -279,6 +279,27 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
     assert not selection.too_little_left(search, fit(two=10.0), (0,), [first])
 
 
+def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+
+    def fit(**sizes):
+        left = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            left[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: left})
+
+    first = Round(fit(three=100.0, two=15.0), (), (Trial(taken, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
+    search.settled = replace(search.evaluated([(taken, np.ones(1))]), residuals=nominal.residuals)
+    monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
+    assert not selection.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert selection.too_little_left(search, fit(three=13.0), (0,), [first])
+    search.settled = None
+    assert selection.too_little_left(search, fit(two=13.0), (0,), [first])
+
+
 def test_what_is_well_hides_no_gap_and_closes_none(worn):
     jury = worn[1].jury
     e = jury.evidence[0]

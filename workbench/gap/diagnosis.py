@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.gap.anew import Played, as_looked_at
 from workbench.gap.built import Build, build_of
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
@@ -70,11 +71,17 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         evidence = _seen(known, [replace(t, model=known.model_of(t.spec)) for t in takes], config, n_jobs, progress).evidence
         jury = Jury(evidence, config, n_jobs, memory)
         begun = Search(jury, known.model).evaluated([])
-    jury, missed = with_missed(jury, known.model, begun.residuals)
+    sent = jury
+    jury, missed = with_missed(sent, known.model, begun.residuals)
     looked_at = searched(jury.evidence, begun.residuals)
-    search = Search(jury.on(looked_at), known.model)
+    search = Search(begun_with := jury.on(looked_at), known.model)
     pool = build.asked(candidates(known.model, evidence)) + special(known.model, evidence, begun.residuals)
-    chosen = select(search, pool, progress, thorough)
+    chosen = select(search, pool, progress, thorough, Played(sent, missed))
+    missed = chosen.missed
+    if search.jury is not begun_with:
+        evidence = as_looked_at(jury.evidence, search.jury.evidence)
+        jury = jury.on(evidence)
+        nominal = Search(jury, session.model).evaluated([])
     fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,13 +44,27 @@ def guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array
     if np.linalg.matrix_rank(np.array(probes)[:, ~c.shapes]) > 1:  # several numbers, not one at several sizes
         return _bent_guess(r0, np.array(probes), np.array(seen), (low, high), 2 * far)
     best = (probes[0], -np.inf)
-    for p, v in zip(probes, seen):
-        S = v - r0
-        power = float(S @ S)
-        size = float(np.clip(-(S @ r0) / power, -far, far)) if power > 1e-9 else 0.0
-        x = np.clip(np.where(c.shapes, p, size * p), low, high)
-        size = float(x[~c.shapes] @ p[~c.shapes] / max(float(p[~c.shapes] @ p[~c.shapes]), 1e-9))
-        gain = whole - float(np.sum((r0 + S * size) ** 2))
+    size = np.array([float(p[~c.shapes][0]) for p in probes])
+    for shape, way in {(tuple(p[c.shapes]), np.sign(v)) for p, v in zip(probes, size)}:
+        alike = [k for k in np.argsort(np.abs(size)) if np.sign(size[k]) == way and tuple(probes[k][c.shapes]) == shape]
+        x, gain = _between(r0, [(0.0, r0), *((size[k], seen[k]) for k in alike)], far, (low[~c.shapes][0], high[~c.shapes][0]))
+        if gain > best[1]:
+            best = (np.where(c.shapes, probes[alike[0]], x), gain)
+    return best
+
+
+def _between(r0: Array, seen: Sequence[tuple[float, Array]], far: float, bounds: tuple[float, float]) -> tuple[float, float]:
+    """A size, and what it takes away, by lines between those that were seen (with what each left, from none on), and the first
+    and the last of these drawn out: a servo at half its gain lags twice as much, at a fifth five times."""
+    (_, first), last = seen[1], seen[-1]
+    drawn_out = [((-far * seen[1][0], r0 - far * (first - r0)), seen[0]), (last, (far * last[0], r0 + far * (last[1] - r0)))]
+    best = (seen[1][0], -np.inf)
+    for (a, ra), (b, rb) in [*drawn_out, *pairwise(seen)]:
+        D = rb - ra
+        x = a - float(D @ ra) / max(float(D @ D), 1e-9) * (b - a)
+        x = float(np.clip(np.clip(x, min(a, b), max(a, b)), *bounds))
+        left = ra + (x - a) / (b - a) * D
+        gain = float(r0 @ r0 - left @ left)
         if gain > best[1]:
             best = (x, gain)
     return best

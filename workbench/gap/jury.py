@@ -50,7 +50,7 @@ class Jury:
         self.memory = memory
         self.rollouts = 0
         self.work = 0.0
-        self._known: dict[str, Array] = {}
+        self._known: dict[str, NDArray[np.float32]] = {}
 
     def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
@@ -62,7 +62,7 @@ class Jury:
             asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
             self.work += sum(self._length(i, self._until(i, q)) for _, i, _ in asked.values()) / q.step
             new |= asked
-        self._known |= {key: np.full_like(self.evidence[i].recorded, np.nan)
+        self._known |= {key: np.full_like(self.evidence[i].recorded, np.nan, dtype=np.float32)
                         for key, (q, i, _) in new.items() if not self._until(i, q)}
         new = {key: what for key, what in new.items() if not self._recalled(key)}
         # the longest first, so that no core waits at the end
@@ -74,7 +74,7 @@ class Jury:
             q, i, _ = new[key]
             e = self.evidence[i]
             self._keep(key, np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan))
-        return [{i: self.evidence[i].residual(self._known[key], q.model, q.step >= 1) for i, key in by_take.items()}
+        return [{i: self.evidence[i].residual(self._known[key].astype(float), q.model, q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
     def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
@@ -206,7 +206,8 @@ class Jury:
             self._known[key] = np.load(path)
         return key in self._known
 
-    def _keep(self, key: str, simulated: Array) -> None:
+    def _keep(self, key: str, answer: Array) -> None:
+        simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
         self._known[key] = simulated
         if self.memory is not None:
             part = self.memory / f"{key}.part.npy"

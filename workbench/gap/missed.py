@@ -28,13 +28,17 @@ the ground a joint may be kept from going."""
 
 @dataclass(frozen=True)
 class Missed:
-    """One joint's missed poses. of: how many would have moved it, in all takes."""
+    """One joint's missed poses, by take. of: how many would have moved it, in all takes."""
 
     joint: str
-    count: int
+    poses: Mapping[int, tuple[int, ...]]
     of: int
     fit: Change
     validation: Change
+
+    @property
+    def count(self) -> int:
+        return sum(map(len, self.poses.values()))
 
     @property
     def probability(self) -> float:
@@ -87,7 +91,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         if was - now > least * (was - frames) and was - now > 100:
             fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
                                   joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
-            found.append(Missed(joint, count, of, fit, unseen))
+            found.append(Missed(joint, {i: tuple(k) for i, k in lost.items() if k}, of, fit, unseen))
             jury, residuals = tried, after
     return jury, tuple(found)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from workbench.gap.missed import Missed
 from workbench.gap.race import Trial
 from workbench.gap.search import Fit
 
@@ -31,10 +32,11 @@ class Round:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The effects that stay, fitted together, and how they were found."""
+    """The effects that stay, fitted together, and how they were found; missed: poses that servos never got."""
 
     fit: Fit
     rounds: tuple[Round, ...]
+    missed: tuple[Missed, ...] = ()
 
     @property
     def stopped(self) -> bool:

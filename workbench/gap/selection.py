@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from workbench.gap.anew import Played, goes_otherwise, read_anew, weigh_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
@@ -60,13 +61,18 @@ ALIKE = 0.25
 """Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
 
 
-def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False) -> Chosen:
-    """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides."""
+def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: Played | None = None
+           ) -> Chosen:
+    """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
+    left out of what is played; looked at anew, as walks are, in what becomes the search's jury."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
         current = _phase(search, pool, current, search.held, rounds, report, most)
+    if current.effects:
+        report("looking anew", None)
+        current, nominal, rounds, played = _anew(search, current, nominal, rounds, played)
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
         astray = _part_answered(search, nominal, current)
@@ -79,7 +85,24 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
             kept = search.resettled(kept)
         if kept is not current or _left_walking(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(kept, tuple(rounds))
+    return Chosen(kept, tuple(rounds), played.missed if played else ())
+
+
+def _anew(search: Search, current: Fit, nominal: Fit, rounds: list[Round], played: Played | None
+          ) -> tuple[Fit, Fit, list[Round], Played | None]:
+    """What was found with the base held, what there was before, and how it came, as takes that are looked at anew judge it."""
+    jury = search.jury
+    if played is not None:
+        played = read_anew(search, current, played)
+    if search.jury is not jury:
+        current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, MOST_STEPS)
+        nominal = search.evaluated([])
+    if search.grounded(search.fitted) and goes_otherwise(search, nominal, current):
+        weigh_anew(search, current)
+    if search.jury is jury:
+        return current, nominal, rounds, played
+    there = replace(search.evaluated(current.sizes()), covariance=current.covariance, slopes=current.slopes)
+    return there, search.evaluated([]), [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds], played
 
 
 def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
@@ -206,19 +229,27 @@ def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
-    """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot,
-    with the base held beyond what these may err by in each channel."""
+    """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
+    that walks told, and beyond what others, as all with the base held, may err by in each channel."""
     jury, left = search.jury, 0.0
     walks = jury.walks(takes)
-    before = current if walks else before_rough(rounds, current)
+    before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
+    settled = _settling(search, rounds)
+    if walks and search.settled is not None and settled:
+        before, share = settled[0].before, ROUGH_SHARE
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
-            left += sum(jury.beyond(now, use, was, LEAST_SHARE) for use in ("fit", "choose")) / 3  # a third chooses
+            left += sum(jury.beyond(now, use, was, share) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
         return left < ALL_CLOSED * LEAST_GAIN
-    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None)
+    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
     return left < max(LEAST_WALKING, ROUGH_SHARE * brought)
+
+
+def _settling(search: Search, rounds: Sequence[Round]) -> list[Round]:
+    """Those in which something was taken that held takes told."""
+    return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
 
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
@@ -252,7 +283,7 @@ def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence
         return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
     brought = sum(a.gain["choose"] for a in taken(rounds)
                   if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
-    settled = [r for r in rounds if any(search.is_settled(a.candidate) for a in taken([r]))]
+    settled = _settling(search, rounds)
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
     return gain > max(least, WALKING_SHARE * brought)
