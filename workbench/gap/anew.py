@@ -12,8 +12,12 @@ from workbench.gap.compare_session import Run, roll_out
 from workbench.gap.evidence import TakeEvidence, weighed
 from workbench.gap.jury import Jury, Question
 from workbench.gap.missed import Missed, with_missed
+from workbench.gap.race import Trial
+from workbench.gap.rounds import Round
 from workbench.gap.search import Fit, Search
 
+STEPS = 4
+"""Of a fit to takes that are played or weighed otherwise."""
 OTHERWISE = 4.0
 """Mean square, over sigma, of what effects change of takes on the ground, from which on these are weighed anew."""
 
@@ -24,6 +28,46 @@ class Played:
 
     sent: Jury
     missed: tuple[Missed, ...] = ()
+
+
+def looked_at_anew(search: Search, current: Fit, nominal: Fit, rounds: list[Round], played: Played | None
+                   ) -> tuple[Fit, Fit, list[Round], Played | None]:
+    """What was found with the base held, what there was before, and how it came, as takes that are looked at anew judge it."""
+    jury = search.jury
+    if played is not None:
+        played = read_anew(search, current, played)
+    if search.jury is not jury:
+        current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, STEPS)
+        nominal = search.evaluated([])
+    if search.grounded(search.fitted) and goes_otherwise(search, nominal, current):
+        weigh_anew(search, current)
+    if search.jury is jury:
+        return current, nominal, rounds, played
+    return judged(search, current), search.evaluated([]), [replace(r, before=judged(search, r.before)) for r in rounds], played
+
+
+def weighed_again(search: Search, current: Fit, takes: tuple[int, ...], rounds: list[Round], since: int) -> Fit:
+    """`current` fitted to walks that it weighs; all rounds as these judge them, and what was tried from the one `since` on in
+    shares of what is found now."""
+    was = rounds[since].before.cost["choose"] - current.cost["choose"]
+    weigh_anew(search, current)
+    if search.settled is not None:
+        search.settled = judged(search, search.settled)
+    rounds[:] = [replace(r, before=judged(search, r.before)) for r in rounds]
+    current = search.refitted(judged(search, current), takes, STEPS)
+    share = (rounds[since].before.cost["choose"] - current.cost["choose"]) / max(was, 1.0)
+    rounds[since:] = [replace(r, trials=tuple(_scaled(t, share) for t in r.trials),
+                              accepted=tuple(_scaled(t, share) for t in r.accepted)) for r in rounds[since:]]
+    return current
+
+
+def _scaled(t: Trial, share: float) -> Trial:
+    return replace(t, gain={use: share * g for use, g in t.gain.items()}, by_channel=share * t.by_channel)
+
+
+def judged(search: Search, fit: Fit) -> Fit:
+    """A fit as the search's takes judge it now."""
+    return replace(search.evaluated(fit.sizes()), covariance=fit.covariance, slopes=fit.slopes)
 
 
 def read_anew(search: Search, current: Fit, played: Played) -> Played:

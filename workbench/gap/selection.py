@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.anew import Played, goes_otherwise, read_anew, weigh_anew
+from workbench.gap.anew import Played, goes_otherwise, looked_at_anew, weighed_again
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
@@ -34,8 +34,8 @@ LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
 """Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
 held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
 a second effect must not live on that."""
-ROUGH_SHARE = 0.1
-"""The same of a channel's gap on the ground, where engines differ more, and of what is left there, for another round."""
+ROUGH_SHARE, LEFT_SHARE = 0.1, 0.03
+"""The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
 several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
@@ -72,7 +72,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         current = _phase(search, pool, current, search.held, rounds, report, most)
     if current.effects:
         report("looking anew", None)
-        current, nominal, rounds, played = _anew(search, current, nominal, rounds, played)
+        current, nominal, rounds, played = looked_at_anew(search, current, nominal, rounds, played)
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
         astray = _part_answered(search, nominal, current)
@@ -86,23 +86,6 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         if kept is not current or _left_walking(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
     return Chosen(kept, tuple(rounds), played.missed if played else ())
-
-
-def _anew(search: Search, current: Fit, nominal: Fit, rounds: list[Round], played: Played | None
-          ) -> tuple[Fit, Fit, list[Round], Played | None]:
-    """What was found with the base held, what there was before, and how it came, as takes that are looked at anew judge it."""
-    jury = search.jury
-    if played is not None:
-        played = read_anew(search, current, played)
-    if search.jury is not jury:
-        current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, MOST_STEPS)
-        nominal = search.evaluated([])
-    if search.grounded(search.fitted) and goes_otherwise(search, nominal, current):
-        weigh_anew(search, current)
-    if search.jury is jury:
-        return current, nominal, rounds, played
-    there = replace(search.evaluated(current.sizes()), covariance=current.covariance, slopes=current.slopes)
-    return there, search.evaluated([]), [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds], played
 
 
 def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
@@ -132,12 +115,16 @@ def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
            most_work: float, astray: bool = False) -> Fit:
-    stopped = False
+    stopped, weighed, since = False, current, len(rounds)
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
         beyond = _remaining(search, current, before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
+        if search.jury.walks(takes) and len(rounds) > since and goes_otherwise(search, weighed, current):
+            report("weighing walks anew", None)
+            weighed = current = weighed_again(search, current, takes, rounds, since)
+            continue
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:
@@ -244,7 +231,7 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
     if not walks:
         return left < ALL_CLOSED * LEAST_GAIN
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
-    return left < max(LEAST_WALKING, ROUGH_SHARE * brought)
+    return left < max(LEAST_WALKING, LEFT_SHARE * brought)
 
 
 def _settling(search: Search, rounds: Sequence[Round]) -> list[Round]:
