@@ -8,7 +8,7 @@ import pytest
 
 from tests.gap_sessions import record_arm
 from workbench.effects.registry import known_effects
-from workbench.gap import asked, selection
+from workbench.gap import asked, selection, worth
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import roll_out, run_of
@@ -257,8 +257,8 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
         gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
         return Trial(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
 
-    assert selection._worthwhile(search, trial("two"), (0,), [first], search.settled)
-    assert not selection._worthwhile(search, trial("three"), (0,), [first], search.settled)
+    assert worth.worthwhile(search, trial("two"), (0,), [first], search.settled)
+    assert not worth.worthwhile(search, trial("three"), (0,), [first], search.settled)
 
 
 def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
@@ -274,9 +274,9 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
         return replace(nominal, residuals={0: left})
 
     first = Round(fit(three=100.0), (), (Trial(taken, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
-    assert selection.too_little_left(search, fit(three=10.0), (0,), [first])
-    assert not selection.too_little_left(search, fit(three=40.0), (0,), [first])
-    assert not selection.too_little_left(search, fit(two=10.0), (0,), [first])
+    assert worth.too_little_left(search, fit(three=10.0), (0,), [first])
+    assert not worth.too_little_left(search, fit(three=40.0), (0,), [first])
+    assert not worth.too_little_left(search, fit(two=10.0), (0,), [first])
 
 
 def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
@@ -294,10 +294,29 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_
     first = Round(fit(three=100.0, two=15.0), (), (Trial(taken, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
     search.settled = replace(search.evaluated([(taken, np.ones(1))]), residuals=nominal.residuals)
     monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
-    assert not selection.too_little_left(search, fit(two=13.0), (0,), [first])
-    assert selection.too_little_left(search, fit(three=13.0), (0,), [first])
+    assert not worth.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert worth.too_little_left(search, fit(three=13.0), (0,), [first])
     search.settled = None
-    assert selection.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert worth.too_little_left(search, fit(two=13.0), (0,), [first])
+
+
+@pytest.mark.parametrize(("name", "left", "share"), [
+    ("backlash", {}, worth.LEAST_CLOSED), ("backlash", {"three": 2.0}, worth.NEARLY_ALL),
+    ("backlash", {"two": 2.0}, worth.LEAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
+    ("dead_band", {"three": 30.0}, worth.LAST_CLOSED)])
+def test_beside_a_joint_that_rattles_an_effect_on_the_ground_has_to_be_nearly_all(worn, name, left, share):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+
+    def fit(effects, **sizes):
+        there = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            there[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: there}, effects=effects)
+
+    given = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == (name, ("three",)))
+    assert worth.least_closed(search, fit((), three=40.0), fit((given,), **left)) == share
 
 
 def test_what_is_well_hides_no_gap_and_closes_none(worn):
@@ -383,11 +402,11 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
 
 
 def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
-    monkeypatch.setattr(selection, "standing_out", lambda *_: set())
+    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
     c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
     fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
         search = SimpleNamespace(held=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, jury=SimpleNamespace(
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
         r = Round(fit, (), ())
-        assert selection.completed(search, r, Trial(c, np.ones(1), {}, None), fit) == 1.0
+        assert worth.completed(search, r, Trial(c, np.ones(1), {}, None), fit) == 1.0

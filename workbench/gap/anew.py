@@ -18,7 +18,7 @@ from workbench.gap.search import Fit, Search
 
 STEPS = 4
 """Of a fit to takes that are played or weighed otherwise."""
-OTHERWISE = 4.0
+OTHERWISE = 1.0
 """Mean square, over sigma, of what effects change of takes on the ground, from which on these are weighed anew."""
 
 

@@ -14,7 +14,8 @@ from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import Chosen, Round
 from workbench.gap.search import Fit, Report, Search
-from workbench.gap.selection import CLOSE, MOST_RIVALS, completed
+from workbench.gap.selection import CLOSE, MOST_RIVALS
+from workbench.gap.worth import completed
 
 Array = NDArray[np.float64]
 Seats = dict[Key, tuple[Round, Trial]]

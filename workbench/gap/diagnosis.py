@@ -25,11 +25,12 @@ from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
 from workbench.gap.registered import LeftOut, Progress, ReadTake, no_progress, read_takes, register_takes
 from workbench.gap.search import Fit, Search
-from workbench.gap.selection import select, too_little_left
+from workbench.gap.selection import select
 from workbench.gap.session import Base, Session
 from workbench.gap.share import floors_everywhere, searched, share_of
 from workbench.gap.special import special
 from workbench.gap.story import TakeStory
+from workbench.gap.worth import too_little_left
 from workbench.motion.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel

@@ -18,27 +18,25 @@ from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
 from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Part, Trial
-from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough, taken
+from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
 from workbench.gap.search import Fit, Report, Search
+from workbench.gap.worth import (
+    ALL_CLOSED,
+    LAST_CLOSED,
+    LEAST_CLOSED,
+    LEAST_WALKING,
+    completed,
+    least_closed,
+    remaining,
+    too_little_left,
+    worthwhile,
+)
 
 MOST_ROUNDS = 6
 """With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
 MOST_WORK, MOST_ROLLOUTS = 3200.0, 60.0
 """Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
 recording."""
-LEAST_WALKING = 600.0
-"""LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
-ALL_CLOSED = 0.5
-"""Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
-"""Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
-held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
-a second effect must not live on that."""
-ROUGH_SHARE, LEFT_SHARE = 0.1, 0.03
-"""The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
-LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
-"""Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
-several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH = 0.6
@@ -75,8 +73,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         current, nominal, rounds, played = looked_at_anew(search, current, nominal, rounds, played)
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
-        astray = _part_answered(search, nominal, current)
-        current = _phase(search, pool, current, search.fitted, rounds, report, most, astray)
+        closed = least_closed(search, nominal, current)
+        current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -88,37 +86,19 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     return Chosen(kept, tuple(rounds), played.missed if played else ())
 
 
-def _remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
-               ) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
-    evidence = search.jury.evidence
-    out: dict[str, float] = {}
-    for i in takes:
-        was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = share if i in search.held else ROUGH_SHARE
-        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
-    return out
-
-
 def _left_walking(search: Search, fit: Fit) -> bool:
     """Whether walks still show a gap: of several numbers, fits begun in coarse steps may not have come to their end."""
     return any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
 
 
-def _part_answered(search: Search, nominal: Fit, current: Fit) -> bool:
-    """Whether a joint that was given an effect still goes wrong with the base held. No known name is what it lacks, and on the
-    ground it leads all others astray: only joints that stand out and what moves the robot as a whole are asked there, and taken
-    where that is most of it."""
-    given = {c.joint for c in current.effects}
-    return any(joint_of(c) in given for c in _remaining(search, current, nominal, search.held, ROUGH_SHARE))
-
-
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
-           most_work: float, astray: bool = False) -> Fit:
+           most_work: float, closed: float = LEAST_CLOSED) -> Fit:
+    """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
+    usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, weighed, since = False, current, len(rounds)
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
-        beyond = _remaining(search, current, before_rough(rounds, current), takes)
+        beyond = remaining(search, current, before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
         if search.jury.walks(takes) and len(rounds) > since and goes_otherwise(search, weighed, current):
@@ -133,7 +113,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             if seats:
                 continue
         trials: list[Trial] = []
-        for tier in range(TIERS_OF_ALL if astray else TIERS):
+        for tier in range(TIERS_OF_ALL if closed > LEAST_CLOSED else TIERS):
             stopped = search.jury.work > most_work
             if stopped:
                 break
@@ -143,8 +123,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             trials.sort(key=lambda t: -t.gain["choose"])
             if trials and _says_it(search, current, trials[0], takes, tier):
                 break
-        closed = LAST_CLOSED if astray else LEAST_CLOSED
-        worth = [t for t in trials if t.closed > closed and _worthwhile(search, t, takes, rounds, current)]
+        worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([_with(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
@@ -215,30 +194,6 @@ def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[
     return (yield from search.refitting(start, takes, steps))
 
 
-def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
-    """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
-    that walks told, and beyond what others, as all with the base held, may err by in each channel."""
-    jury, left = search.jury, 0.0
-    walks = jury.walks(takes)
-    before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
-    settled = _settling(search, rounds)
-    if walks and search.settled is not None and settled:
-        before, share = settled[0].before, ROUGH_SHARE
-    for i in takes:
-        if channel_gaps(jury.evidence[i], current.residuals[i]):
-            was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
-            left += sum(jury.beyond(now, use, was, share) for use in ("fit", "choose")) / 3  # a third chooses
-    if not walks:
-        return left < ALL_CLOSED * LEAST_GAIN
-    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
-    return left < max(LEAST_WALKING, LEFT_SHARE * brought)
-
-
-def _settling(search: Search, rounds: Sequence[Round]) -> list[Round]:
-    """Those in which something was taken that held takes told."""
-    return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
-
-
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
     robot's the best. Where a race does not tell who is ahead, each of them to be fitted."""
@@ -255,43 +210,6 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     rivals = [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
               and t.gain["choose"] > HALFWAY * best.gain["choose"]]
     return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
-
-
-def _worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round], current: Fit) -> bool:
-    """Whether an effect that was fitted beside `current` brings enough."""
-    if t.foretold:
-        return False
-    walks = search.jury.walks(takes)
-    least = LEAST_WALKING if t.joint is None and walks else LEAST_GAIN * max(1, t.candidate.size)
-    if t.joint is not None and t.closed > NEARLY_ALL:
-        least *= ALL_CLOSED
-    gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    if not walks:
-        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
-    brought = sum(a.gain["choose"] for a in taken(rounds)
-                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
-    settled = _settling(search, rounds)
-    if search.settled is not None and settled:
-        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    return gain > max(least, WALKING_SHARE * brought)
-
-
-def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
-    """An effect's gain less what those that led from `before` to `now` may err by, this share of what they brought channel by
-    channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
-    here = search.telling([t.candidate], tuple(takes))
-    was, left = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
-    may_err = share * np.maximum(was - left, 0.0)
-    return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
-
-
-def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
-    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on held takes alone, where they told it."""
-    outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
-    takes = search.held if search.is_settled(t.candidate) else search.fitted
-    before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
-    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint)
 
 
 def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:

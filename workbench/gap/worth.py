@@ -1,0 +1,114 @@
+"""Whether enough is left for another effect, and whether an effect brings enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from workbench.gap.asked import standing_out
+from workbench.gap.company import NEARLY_ALL
+from workbench.gap.evidence import joint_of
+from workbench.gap.ledger import channel_gaps
+from workbench.gap.race import Trial
+from workbench.gap.rounds import LEAST_GAIN, Round, before_rough, taken
+from workbench.gap.search import Fit, Search
+
+LEAST_WALKING = 600.0
+"""LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
+ALL_CLOSED = 0.5
+"""Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
+LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
+"""Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
+held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
+a second effect must not live on that."""
+ROUGH_SHARE, LEFT_SHARE = 0.1, 0.03
+"""The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
+LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
+"""Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
+several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
+
+
+def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
+               ) -> dict[str, float]:
+    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
+    evidence = search.jury.evidence
+    out: dict[str, float] = {}
+    for i in takes:
+        was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
+        least = share if i in search.held else ROUGH_SHARE
+        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
+    return out
+
+
+def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
+    """Share that an effect on the ground must take away, beside what held takes told. More, where a joint that was given an
+    effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray. Nearly all, where
+    it has play: how a link lies in that is chance, and sends a walk elsewhere."""
+    ill = {joint_of(c) for i in search.held for c in channel_gaps(search.jury.evidence[i], current.residuals[i])}
+    if any(c.effect.free_play and c.joint in ill for c in current.effects):
+        return NEARLY_ALL
+    given = {c.joint for c in current.effects}
+    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ROUGH_SHARE))
+    return LAST_CLOSED if part else LEAST_CLOSED
+
+
+def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
+    """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
+    that walks told, and beyond what others, as all with the base held, may err by in each channel."""
+    jury, left = search.jury, 0.0
+    walks = jury.walks(takes)
+    before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
+    settled = _settling(search, rounds)
+    if walks and search.settled is not None and settled:
+        before, share = settled[0].before, ROUGH_SHARE
+    for i in takes:
+        if channel_gaps(jury.evidence[i], current.residuals[i]):
+            was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
+            left += sum(jury.beyond(now, use, was, share) for use in ("fit", "choose")) / 3  # a third chooses
+    if not walks:
+        return left < ALL_CLOSED * LEAST_GAIN
+    brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
+    return left < max(LEAST_WALKING, LEFT_SHARE * brought)
+
+
+def _settling(search: Search, rounds: Sequence[Round]) -> list[Round]:
+    """Those in which something was taken that held takes told."""
+    return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
+
+
+def worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round], current: Fit) -> bool:
+    """Whether an effect that was fitted beside `current` brings enough."""
+    if t.foretold:
+        return False
+    walks = search.jury.walks(takes)
+    least = LEAST_WALKING if t.joint is None and walks else LEAST_GAIN * max(1, t.candidate.size)
+    if t.joint is not None and t.closed > NEARLY_ALL:
+        least *= ALL_CLOSED
+    gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
+    if not walks:
+        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
+    brought = sum(a.gain["choose"] for a in taken(rounds)
+                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
+    settled = _settling(search, rounds)
+    if search.settled is not None and settled:
+        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
+    return gain > max(least, WALKING_SHARE * brought)
+
+
+def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
+    """An effect's gain less what those that led from `before` to `now` may err by, this share of what they brought channel by
+    channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
+    here = search.telling([t.candidate], tuple(takes))
+    was, left = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
+    may_err = share * np.maximum(was - left, 0.0)
+    return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
+
+
+def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
+    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
+    that was judged or stood out; on held takes alone, where they told it."""
+    outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
+    takes = search.held if search.is_settled(t.candidate) else search.fitted
+    before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
+    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint)
