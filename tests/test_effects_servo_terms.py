@@ -287,7 +287,8 @@ def test_a_term_that_does_nothing_changes_nothing(tmp_path, plant):
         rig.put(0.1)
     for _ in range(10):
         nominal, idle = (rig.run(0.05) for rig in rigs)
-        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if plant["time_step"] else 1e-3)
+        exact = bool(plant["time_step"])  # a speed near nothing is known to the integrator's accuracy, not to a share of itself
+        np.testing.assert_allclose(idle, nominal, rtol=1e-12 if exact else 1e-3, atol=0.0 if exact else plant["accuracy"])
 
 
 def test_logged_torque_is_what_turns_the_arm(tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.gap.anew import Played, as_looked_at
+from workbench.gap.anew import Played, played_as
 from workbench.gap.built import Build, build_of
 from workbench.gap.candidates import candidates
 from workbench.gap.compare_session import provenance, roll_out, run_of
@@ -80,9 +80,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     chosen = select(search, pool, progress, thorough, Played(sent, missed))
     missed = chosen.missed
     if search.jury is not begun_with:
-        evidence = as_looked_at(jury.evidence, search.jury.evidence)
-        jury = jury.on(evidence)
-        nominal = Search(jury, session.model).evaluated([])
+        jury = jury.on(played_as(jury.evidence, search.jury.evidence))
     fit, standings = contest(search, chosen, progress)
     progress("numbers at a finer step", None)
     fit = search.refined(fit) if fit.effects else fit

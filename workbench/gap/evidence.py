@@ -8,7 +8,7 @@ fractions of one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,20 +55,19 @@ def joint_of(channel: str) -> str:
 
 @dataclass(frozen=True)
 class TakeEvidence:
-    """One registered take: recorded channels (N, c), their noise and sigma (c,), and which frames serve for what.
+    """One registered take: recorded channels (N, c), their sigma (c,), and which frames serve for what.
 
-    Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. noise: of
-    measurement; sigma: that, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
-    the search's step is wrong by on the robot that was `weighed`, which is taken to be the same with more effects. start_is_free:
-    whether the first command's time was estimated, so that every model may shift it; else by no more than LOOP. contact (N, c):
-    the weighed robot with the other contact model less that with this one. until: how long after the first command models are
-    asked about it [s]; 0: not at all.
+    Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
+    measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
+    the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
+    the first command's time was estimated, so that every model may shift it; else by no more than LOOP. contact (N, c): the
+    nominal robot with the other contact model less that with this one. until: how long after the first command models are asked
+    about it [s]; 0: not at all.
     """
 
     take: RegisteredTake
     channels: tuple[str, ...]
     recorded: Array
-    noise: Array
     sigma: Array
     offset: Array
     uses: Mapping[str, Mask]
@@ -233,6 +232,12 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     joints = t.recorded.joints
     recorded = channels_of(t.recorded, names)
     moving = t.recorded.time >= t.measurement.starts_at
+    nominal = channels_of(t.observed(r.nominal), names)
+    finer = [channels_of(t.observed(f), names) for f in r.finer]
+    finest = finer[-1] if finer else nominal
+    floor = _apart(finest, finer[:-1] or [nominal], moving)
+    others = [channels_of(t.observed(o), names) for o in r.other_contact]
+    spread = _apart(nominal, others, moving)
     noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
     resting = recorded[t.recorded.resting]
     noise = np.where(np.isnan(noise), [t.measurement.noise.get(c, np.nan) for c in names], noise)
@@ -242,29 +247,17 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     across = [i for i, c in enumerate(names) if ACROSS in c]
     if across:  # one camera system sees all bodies alike
         noise[across] = np.nanmedian(noise[across])
+    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
     weight = np.ones(len(names))
     if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
-        weight[[names.index(c) for c in BODY]] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
-    nothing = np.zeros_like(recorded)
-    e = TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), np.nan_to_num(noise), noise, nothing,
-                     _uses(t, moving, alone), weight, t.recorded.zeroed and t.spec.starts_at is None, nothing)
-    return weighed(e, r, t.model)
-
-
-def weighed(e: TakeEvidence, r: Rollouts, model: RobotModel) -> TakeEvidence:
-    """Evidence with sigma, the step's error and that of contact as rollouts of a model, with floors, have them."""
-    nominal = channels_of(e.take.observed(r.nominal, model), e)
-    finer = [channels_of(e.take.observed(f, model), e) for f in r.finer]
-    others = [channels_of(e.take.observed(o, model), e) for o in r.other_contact]
-    finest = finer[-1] if finer else nominal
-    floor = _apart(finest, finer[:-1] or [nominal], e.moving)
-    spread = _apart(nominal, others, e.moving)
-    sigma = np.sqrt(e.noise**2 + floor**2 + spread**2)
-    if e.take.recorded.base == "free":
-        body = [e.channels.index(c) for c in BODY]
+        body = [names.index(c) for c in BODY]
         sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
+        weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
+    sigma = np.maximum(sigma, 1e-6)
+    offset = np.nan_to_num(finest - nominal)
     contact = np.nan_to_num(others[0] - nominal) if others else np.zeros_like(nominal)
-    return replace(e, sigma=np.maximum(sigma, 1e-6), offset=np.nan_to_num(finest - nominal), contact=contact)
+    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
+                        t.recorded.zeroed and t.spec.starts_at is None, contact)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:

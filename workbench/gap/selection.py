@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from workbench.gap.anew import Played, goes_otherwise, looked_at_anew, weighed_again
+from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
@@ -62,15 +62,16 @@ ALIKE = 0.25
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: Played | None = None
            ) -> Chosen:
     """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
-    left out of what is played; looked at anew, as walks are, in what becomes the search's jury."""
+    left out of what is played; read anew by what held takes told, which may change the search's jury."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
         current = _phase(search, pool, current, search.held, rounds, report, most)
-    if current.effects:
+    if current.effects and played is not None:
         report("looking anew", None)
-        current, nominal, rounds, played = looked_at_anew(search, current, nominal, rounds, played)
+        current, played = played_anew(search, current, rounds, played)
+        nominal = search.evaluated([])
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
         closed = least_closed(search, nominal, current)
@@ -95,16 +96,12 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
            most_work: float, closed: float = LEAST_CLOSED) -> Fit:
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
-    stopped, weighed, since = False, current, len(rounds)
+    stopped = False
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
         if not beyond or too_little_left(search, current, takes, rounds):
             break
-        if search.jury.walks(takes) and len(rounds) > since and goes_otherwise(search, weighed, current):
-            report("weighing walks anew", None)
-            weighed = current = weighed_again(search, current, takes, rounds, since)
-            continue
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:

@@ -22,7 +22,7 @@ LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
 """Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
 held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
 a second effect must not live on that."""
-ROUGH_SHARE, LEFT_SHARE = 0.1, 0.03
+ROUGH_SHARE, LEFT_SHARE = 0.1, 0.05
 """The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
