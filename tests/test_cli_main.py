@@ -31,6 +31,11 @@ def test_each_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]
     assert len(out.split("\n\n")[1]) > 60  # a description, not only arguments
 
 
+def test_the_package_is_the_command() -> None:
+    says = [sys.executable, "-m", "workbench", "--version"]
+    assert subprocess.run(says, check=True, capture_output=True, text=True).stdout.startswith("workbench ")
+
+
 def test_help_comes_at_once_and_loads_no_heavy_module() -> None:
     code = ("import sys, time; t = time.perf_counter(); from workbench.cli.main import make_parser; make_parser().format_help();"
             "print(time.perf_counter() - t, *sorted({m.partition('.')[0] for m in sys.modules}))")
