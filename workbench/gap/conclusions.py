@@ -141,9 +141,10 @@ def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round]
 def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
     """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on.
 
-    floors: by take, numerical floor (c,) over sigma of the fitted model, which may be rougher than the nominal one's."""
+    residuals: of takes that are judged. floors: by take, numerical floor (c,) over sigma of the fitted model, which may be
+    rougher than the nominal one's."""
     out = []
-    for i, e in enumerate(evidence):
+    for i, e in ((i, evidence[i]) for i in sorted(residuals)):
         for c, r in ratios(e, residuals[i], "validate").items():
             column = e.channels.index(c)
             wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0

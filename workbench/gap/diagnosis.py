@@ -98,9 +98,10 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
                      for m in build.measured)
     findings = measured + tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
-    left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
+    judged = {i: r for i, r in after.items() if i not in chosen.judged_until}  # nothing is missing there
+    left = (*unexplained(evidence, judged, rough), *(d.left(evidence) for d in changing)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
+    slight = not findings and not left and (bool(chosen.judged_until) or too_little_left(search, fit, search.fitted, ()))
     verdict = verdict_of(bool(gap) and not slight, findings, left)
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)
@@ -111,7 +112,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         next_experiment=None if experiment is None else experiment.entry(MOTION),
         provenance=provenance(session.model, config, time.monotonic() - began)
         | {"seed": 0, "rollouts": search.jury.rollouts} | share_of(looked_at),
-        stopped=chosen.stopped, left_out=unreadable + seen.left_out)
+        stopped=chosen.stopped, left_out=unreadable + seen.left_out,
+        judged_until=tuple((evidence[i].name, round(until, 2)) for i, until in chosen.judged_until.items()))
     stories = _stories(jury, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
 

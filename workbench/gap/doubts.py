@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
 """RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
 gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
+RATTLES = 0.7
+"""At least that factor for a link that cameras saw rock across its servo's axis: which way it lies is chance, each moment as far
+from a right model as it has play."""
 CHANGING = 0.5
 """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
 ALIKE_FLOOR, HARDLY = 0.15, 0.5
@@ -38,7 +41,10 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         told_held = search.is_settled(c) or search.held == search.fitted
         own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
         worst = max((r for r in own if told_held and r == r), default=0.0)
-        factor = next((factor for most, factor in LEFT if worst <= most), LEAST) * (CHANGING if c in changing else 1.0)
+        factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
+        if c.read_off and c.effect.free_play:
+            factor = max(factor, RATTLES)
+        factor *= CHANGING if c in changing else 1.0
         slight = _hardly_another_floor(c, x) or _at_its_limit(c, x) or _may_be_nothing(c, x, fit.covariance[own_x, own_x])
         factor *= HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))

@@ -13,6 +13,7 @@ import numpy as np
 
 from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.brink import judged_until
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
 from workbench.gap.evidence import BODY, joint_of
@@ -65,6 +66,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     left out of what is played; read anew by what held takes told, which may change the search's jury."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
+    brink: dict[int, float] = {}
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
         current = _phase(search, pool, current, search.held, rounds, report, most)
@@ -74,8 +76,10 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         nominal = search.evaluated([])
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
-        closed = least_closed(search, nominal, current)
-        current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
+        brink = judged_until(search.jury, current.model(search.nominal), current.residuals, search.grounded(search.fitted))
+        if not brink:
+            closed = least_closed(search, nominal, current)
+            current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -84,7 +88,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
             kept = search.resettled(kept)
         if kept is not current or _left_walking(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(kept, tuple(rounds), played.missed if played else ())
+    return Chosen(kept, tuple(rounds), played.missed if played else (), brink)
 
 
 def _left_walking(search: Search, fit: Fit) -> bool:

@@ -112,6 +112,9 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    what += [f"Take {name} is judged for {seconds:.1f} s: from then on a millimetre of the body's balance or 5 % of friction "
+             "sends this robot elsewhere, and what the recording shows beyond tells nothing."
+             for name, seconds in diagnosis.judged_until]
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)
