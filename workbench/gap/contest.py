@@ -160,9 +160,8 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
-    """The fit with a rival in effect i's place, its numbers fitted there, on the ground with those of all that walks told: what
-    came beside one name makes up for what it lacks. The same effect elsewhere begins at the size that the other has, if that is
-    better."""
+    """The fit with a rival in effect i's place and its numbers fitted there; the same effect elsewhere begins at the size that
+    the other has, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)
@@ -170,6 +169,5 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
-    if search.is_settled(fit.effects[i]):
-        return (yield from search.refitting(there, search.held, STEPS, free=[len(others)]))
-    return (yield from search.refitting(there, search.fitted, STEPS))
+    takes = search.held if search.is_settled(fit.effects[i]) else search.fitted
+    return (yield from search.refitting(there, takes, STEPS, free=[len(others)]))
