@@ -50,9 +50,10 @@ def main() -> int:
         print(f"{c['what']}: {c['got']} (asked: {c['asked']})")
     print(f"{result['diagnosed']} of {result['planned']} sessions, {result['failed']} failed")
     if args.keep:
-        keep(result)
         under_way = carry(vault, result["sessions"])
-        print(f"wrote {RESULTS} and the table in {README}" + (f"; {under_way} for another machine" if under_way else ""))
+        if under_way is None:
+            keep(result)
+        print(f"wrote {under_way} for another machine" if under_way else f"wrote {RESULTS} and the table in {README}")
     return 0 if result["met"] else 1
 
 
@@ -70,7 +71,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help=f"seconds for a diagnosis (default: {LIMIT:g})")
     parser.add_argument("--again", action="store_true", help="ask again what failed before")
     parser.add_argument("--report", action="store_true", help="only score what is diagnosed, and write the report")
-    parser.add_argument("--keep", action="store_true", help="the same, and put the summary into the repository")
+    parser.add_argument("--keep", action="store_true",
+                        help="the same, and put the summary into the repository; of a part, what goes on with it")
     parser.add_argument("--take-up", action="store_true", help="in a new OUT, go on with the part of a trial that is kept here")
     parser.add_argument("--verify", metavar="NAME", help="make a session anew and compare it with its seal")
     parser.add_argument("--seed", type=int, help="for development only; a report says that it was chosen by hand")
