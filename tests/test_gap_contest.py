@@ -10,7 +10,7 @@ from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, _told, contest
+from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, _told, _twin, contest
 from workbench.gap.doubts import doubted
 from workbench.gap.jury import Jury
 from workbench.gap.point_mass import PointMass
@@ -92,6 +92,18 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [np.inf, 0.1, 0.1, 0.1]) == pytest.approx(0.9)  # nothing is known of it
 
 
+@pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),
+                                                    (0.0, "payload", False)])
+def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
+    """Take 0 is held; chi squared of each take stands for its residuals."""
+    search = SimpleNamespace(held=(0,), fitted=(0, 1), jury=SimpleNamespace(
+        cost=lambda residuals, use: sum(residuals.values()), expected=lambda takes, use: 1000.0))
+    tilt, other = (SimpleNamespace(name=n, effect=known_effects()[n]) for n in ("ground_tilt", name))
+    fit = SimpleNamespace(effects=(tilt,), residuals={0: 100.0, 1: 900.0}, cost={"choose": 1000.0})
+    rival = SimpleNamespace(effects=(other,), residuals={0: 100.0 + held, 1: 2000.0})
+    assert _twin(search, fit, 0, rival) is told
+
+
 @pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, WALKS_SAY), (-5000.0, -WALKS_SAY)])
 def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
     """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
@@ -121,3 +133,8 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
     search = SimpleNamespace(fitted=(0,), jury=SimpleNamespace(expected=lambda takes, use: 100.0))
     assert _misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
     assert _misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0
+
+
+def test_twins_name_each_other():
+    known = known_effects()
+    assert all(known[e.twin].twin == e.name for e in known.values() if e.twin)

@@ -68,6 +68,8 @@ class Effect:
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
     limit: ClassVar[str] = ""
     """The effect that it becomes, where a number that only shapes it comes to its end."""
+    twin: ClassVar[str] = ""
+    """The effect from which no walk tells it: both move the robot alike, by less apart than engines are."""
     free_play: ClassVar[str] = ""
     """The parameter that says how far a link turns freely against its servo, if it does [rad in SI]."""
 

@@ -16,6 +16,7 @@ class GroundTilt(Effect):
     name = "ground_tilt"
     layer = "ground"
     places = ("robot",)
+    twin = "tether_force"
     parameters = (
         Parameter("forward", "deg", -30.0, 30.0, 1.0, si=DEGREE),
         Parameter("left", "deg", -30.0, 30.0, 1.0, si=DEGREE),)

@@ -14,6 +14,7 @@ class TetherForce(Effect):
     name = "tether_force"
     layer = "ground"
     places = ("robot",)
+    twin = "ground_tilt"
     parameters = (Parameter("force", "N", -20.0, 20.0, 0.3, vector=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

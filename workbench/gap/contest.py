@@ -41,6 +41,8 @@ elsewhere, and a wrong name may happen to go that way.
 """
 STEPS = 4
 """Of a fit: names that differ by little are told apart at their best alone."""
+TWIN = 1.0 / 3.0
+"""The least odds of a finding's twin that walks tell, where it came near enough to be put in its place."""
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
@@ -99,13 +101,22 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     temper = max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) if walked else TEMPER
     temper *= _misfit(search, fit)
     leads = np.array([0.0, *(_lead(search, fit, r, taken) for r in rivals)])
-    weight = np.exp(0.5 * (leads - leads.max()) / temper)
+    twins = np.array([False, *(walked and _twin(search, fit, i, r) for r in rivals)])
+    weight = np.maximum(np.exp(0.5 * (leads - leads.max()) / temper), np.where(twins, TWIN, 0.0))
     p = weight / weight.sum()
     closed = completed(search, *seats[fit.effects[i].key], fit)
     sure = SUREST * next((factor for share, factor in CLOSED if closed >= share), LEAST)
     told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
             for r, q in zip(rivals, p[1:])]
     return Standing(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
+
+
+def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
+    """Whether a rival moves the robot as effect i does, and held takes do not tell which it is."""
+    if rival.effects[-1].name != fit.effects[i].effect.twin:
+        return False
+    was, now = (search.jury.cost({k: f.residuals[k] for k in search.held}, "choose") for f in (fit, rival))
+    return bool(now - was < BETTER * _misfit(search, fit))
 
 
 def _misfit(search: Search, fit: Fit) -> float:
