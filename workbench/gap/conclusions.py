@@ -144,7 +144,8 @@ def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: 
     residuals: of takes that are judged. floors: by take, numerical floor (c,) over sigma of the fitted model, which may be
     rougher than the nominal one's."""
     out = []
-    for i, e in ((i, evidence[i]) for i in sorted(residuals)):
+    for i in sorted(residuals):
+        e = evidence[i]
         for c, r in ratios(e, residuals[i], "validate").items():
             column = e.channels.index(c)
             wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0

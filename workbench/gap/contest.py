@@ -115,8 +115,7 @@ def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
     """Whether a rival moves the robot as effect i does, and held takes do not tell which it is."""
     if rival.effects[-1].name != fit.effects[i].effect.twin:
         return False
-    was, now = (search.jury.cost({k: f.residuals[k] for k in search.held}, "choose") for f in (fit, rival))
-    return bool(now - was < BETTER * _misfit(search, fit))
+    return -_better(search, fit, rival, search.held) < BETTER * _misfit(search, fit)
 
 
 def _misfit(search: Search, fit: Fit) -> float:
@@ -138,12 +137,14 @@ def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
 
 def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
     """By how much a rival of an effect that held takes told is better: these take the word first."""
-    def better(takes: Sequence[int]) -> float:
-        was, now = (search.jury.cost({i: f.residuals[i] for i in takes}, "choose") for f in (fit, rival))
-        return was - now
+    walks = _better(search, fit, rival, search.grounded(search.fitted)) * TEMPER / TEMPER_WALKING
+    return _better(search, fit, rival, search.held) + float(np.clip(walks, -WALKS_SAY, WALKS_SAY))
 
-    walks = better(search.grounded(search.fitted)) * TEMPER / TEMPER_WALKING
-    return better(search.held) + float(np.clip(walks, -WALKS_SAY, WALKS_SAY))
+
+def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
+    """How much less chi squared a rival leaves on these takes."""
+    was, now = (search.jury.cost({i: f.residuals[i] for i in takes}, "choose") for f in (fit, rival))
+    return was - now
 
 
 def _told(fit: Fit, i: int) -> int:
