@@ -11,8 +11,9 @@ from workbench.effects.registry import known_effects
 from workbench.gap import asked, selection, worth
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
+from workbench.gap.channels import ACROSS, joint_of
 from workbench.gap.compare_session import roll_out, run_of
-from workbench.gap.evidence import ACROSS, gather, joint_of, ratios, smoothed
+from workbench.gap.evidence import gather, ratios, smoothed
 from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
@@ -301,10 +302,10 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_
 
 
 @pytest.mark.parametrize(("name", "left", "share"), [
-    ("backlash", {}, worth.LEAST_CLOSED), ("backlash", {"three": 2.0}, worth.NEARLY_ALL),
-    ("backlash", {"two": 2.0}, worth.LEAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
+    ("backlash", {}, worth.LEAST_CLOSED), ("backlash", {"three": 2.0}, worth.LEAST_CLOSED),
+    ("backlash", {"three": 30.0}, worth.LAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
     ("dead_band", {"three": 30.0}, worth.LAST_CLOSED)])
-def test_beside_a_joint_that_rattles_an_effect_on_the_ground_has_to_be_nearly_all(worn, name, left, share):
+def test_beside_a_joint_that_no_name_fits_an_effect_on_the_ground_has_to_be_half(worn, name, left, share):
     session, whole, nominal = worn
     search = Search(whole.jury, session.model)
     names = whole.jury.evidence[0].channels

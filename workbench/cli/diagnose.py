@@ -48,9 +48,6 @@ def run(args: argparse.Namespace) -> int:
             predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
     for name, reason in told.diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
-    for name, seconds in told.diagnosis.judged_until:
-        print(f"workbench diagnose: take '{name}' is judged for {seconds:.1f} s: from then on next to nothing sends it elsewhere",
-              file=sys.stderr)
     if told.diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {told.diagnosis.verdict}")

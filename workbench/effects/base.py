@@ -67,7 +67,8 @@ class Effect:
     under_load: ClassVar[bool] = False
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
     limit: ClassVar[str] = ""
-    """The effect that it becomes, where a number that only shapes it comes to its end."""
+    """The effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none does,
+    where it is small."""
     twin: ClassVar[str] = ""
     """The effect from which no walk tells it: both move the robot alike, by less apart than engines are."""
     free_play: ClassVar[str] = ""

@@ -13,6 +13,7 @@ class Payload(Effect):
     name = "payload"
     layer = "inertia"
     places = ("link",)
+    limit = "com_shift"
     parameters = (
         Parameter("mass", "kg", 0.0, 5.0, 0.05),
         Parameter("position", "m", -0.5, 0.5, 0.02, vector=True),

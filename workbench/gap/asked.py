@@ -8,7 +8,7 @@ import numpy as np
 
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import heavy_links
-from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.channels import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
 from workbench.gap.candidate import Candidate, Key
+from workbench.gap.channels import joint_of
 from workbench.gap.contest import SUREST
 from workbench.gap.covariance import Z90
-from workbench.gap.evidence import TakeEvidence, joint_of
+from workbench.gap.evidence import TakeEvidence
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.ledger import channel_gaps
 from workbench.recording import quaternions as quat

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.channels import BODY, joint_of
 from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Round
 from workbench.gap.search import Fit, Search

@@ -16,6 +16,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
+from workbench.simulation.steady import BaseStates
 
 LEAD = 0.3
 """Rest before the first command of each rollout [s]."""
@@ -32,7 +33,7 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class Run:
-    """What is to be simulated. start: where it begins other than at rest in neutral."""
+    """What is to be simulated. start: where it begins other than at rest in neutral; steadied: where its base is put back to."""
 
     name: str
     model: RobotModel
@@ -40,6 +41,7 @@ class Run:
     duration: float
     base: str
     start: Start | None = None
+    steadied: BaseStates | None = None
 
 
 def compare_session(session: Session, config: SimulationConfig | None = None, *, progress: Progress = no_progress,
@@ -77,7 +79,8 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["finer"] = [replace(own, time_step=own.time_step / k, log_period=own.logged_every) for k in (2, 4)]
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
-        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name, start=run.start))
+        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name, start=run.start,
+                          steadied=run.steadied))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
@@ -106,8 +109,8 @@ def _cost(job: Job) -> float:
     return steps * (2 if job.config.contact == "hydroelastic" else 1)
 
 
-def run_of(t: ReadTake) -> Run:
-    return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state())
+def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
+    return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
 
 
 def _compared(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:

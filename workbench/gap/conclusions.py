@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate
+from workbench.gap.channels import ACROSS, BODY, joint_of
 from workbench.gap.contest import Rival, Standing
 from workbench.gap.covariance import WIDER, Z90
-from workbench.gap.evidence import ACROSS, BODY, TakeEvidence, joint_error, joint_of, ratios
+from workbench.gap.evidence import TakeEvidence, joint_error, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
 from workbench.gap.point_mass import PointMass

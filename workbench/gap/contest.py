@@ -166,9 +166,9 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) ->
 
 
 def _at_its_end(c: Candidate, x: Array) -> bool:
-    """Whether a number that only shapes an effect is as far as it may go."""
+    """Whether a number that only shapes an effect, if there is one, is as far as it may go."""
     low, high = c.bounds()
-    return bool(np.any(c.shapes & ((x < low + SHAPE_END) | (x > high - SHAPE_END))))
+    return not c.shapes.any() or bool(np.any(c.shapes & ((x < low + SHAPE_END) | (x > high - SHAPE_END))))
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:

@@ -12,12 +12,13 @@ import numpy as np
 from workbench.gap.anew import Played, played_as
 from workbench.gap.built import Build, build_of
 from workbench.gap.candidates import candidates
+from workbench.gap.channels import ACROSS
 from workbench.gap.compare_session import provenance, roll_out, run_of
 from workbench.gap.conclusions import Residuals, change, finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.constancy import drifts
 from workbench.gap.contest import Standing, contest
 from workbench.gap.doubts import doubted
-from workbench.gap.evidence import ACROSS, BLOCK, USES, TakeEvidence, gather
+from workbench.gap.evidence import BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis
 from workbench.gap.jury import Jury, Question
@@ -29,6 +30,7 @@ from workbench.gap.selection import select
 from workbench.gap.session import Base, Session
 from workbench.gap.share import floors_everywhere, searched, share_of
 from workbench.gap.special import special
+from workbench.gap.steadied import base_states
 from workbench.gap.story import TakeStory
 from workbench.gap.worth import too_little_left
 from workbench.motion.motion import Motion
@@ -39,6 +41,8 @@ from workbench.simulation import SimulationConfig
 STEP = 2e-3
 """Of the search's rollouts [s]; what this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
 MOTION = "next_experiment.csv"
+WORSE = 0.05
+"""Share of all that is missing that may come with what was measured."""
 TIED = 0.05
 """Probability from which on a rival is worth an experiment."""
 
@@ -98,10 +102,9 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
                      for m in build.measured)
     findings = measured + tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
-    judged = {i: r for i, r in after.items() if i not in chosen.judged_until}  # nothing is missing there
-    left = (*unexplained(evidence, judged, rough), *(d.left(evidence) for d in changing)) if gap else ()
+    left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and (bool(chosen.judged_until) or too_little_left(search, fit, search.fitted, ()))
+    slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
     verdict = verdict_of(bool(gap) and not slight, findings, left)
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)
@@ -112,15 +115,14 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         next_experiment=None if experiment is None else experiment.entry(MOTION),
         provenance=provenance(session.model, config, time.monotonic() - began)
         | {"seed": 0, "rollouts": search.jury.rollouts} | share_of(looked_at),
-        stopped=chosen.stopped, left_out=unreadable + seen.left_out,
-        judged_until=tuple((evidence[i].name, round(until, 2)) for i, until in chosen.judged_until.items()))
+        stopped=chosen.stopped, left_out=unreadable + seen.left_out)
     stories = _stories(jury, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return Told(diagnosis, stories, None if experiment is None else experiment.motion)
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """Takes beside a model's rollouts: evidence, the rollouts by take, and takes that were left out with the reason."""
+    """Takes beside a model's rollouts: evidence, by take the rollout of a robot left to itself, takes left out and why."""
 
     evidence: list[TakeEvidence]
     nominal: dict[str, Take]
@@ -128,20 +130,22 @@ class _Seen:
 
 
 def _seen(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> _Seen:
-    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
-    by_name = {t.spec.name: r for t, r in zip(takes, rollouts)}
-    nominal = {name: r.nominal for name, r in by_name.items()}
+    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs, floors=False)
+    nominal = {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}
     registered, left_out = register_takes(session, takes, nominal, progress)
-    return _Seen(gather(registered, by_name), nominal, left_out)
+    steadied = {t.spec.name: base_states(t.recorded) for t in registered}
+    judged = roll_out([run_of(t, steadied[t.spec.name]) for t in registered], config, progress=progress, n_jobs=n_jobs)
+    return _Seen(gather(registered, {t.spec.name: r for t, r in zip(registered, judged)}, steadied), nominal, left_out)
 
 
 def _believed(build: Build, jury: Jury, model: RobotModel, nominal: Fit) -> Build:
-    """What was measured, if with that in the model the takes are told better."""
+    """What was measured, unless with that in the model the takes are told worse; not always better, as beside what else is
+    missing the right leg may walk the wrong way."""
     if not build.measured:
         return build
     there = Search(jury, build.added_to(model)).evaluated([])
-    better = there.cost["fit"] + there.cost["choose"] < nominal.cost["fit"] + nominal.cost["choose"]
-    return build if better else replace(build, measured=())
+    worse = (there.cost["fit"] + there.cost["choose"]) / (nominal.cost["fit"] + nominal.cost["choose"]) - 1.0
+    return build if worse < WORSE else replace(build, measured=())
 
 
 def _enough(session: Session, evidence: Sequence[TakeEvidence]) -> None:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate
+from workbench.gap.channels import joint_of
 from workbench.gap.contest import LEAST, Standing
 from workbench.gap.covariance import WIDER, Z90
-from workbench.gap.evidence import joint_of, ratios
+from workbench.gap.evidence import ratios
 from workbench.gap.search import Fit, Search
 
 Array = NDArray[np.float64]

@@ -1,9 +1,4 @@
-"""What the recordings show, channel by channel, with what noise and numerics alone would make of each.
-
-Joint angles enter frame by frame, and beside each what its joint's rotation has across the servo's axis. Of the body, height and
-tilt enter as they are, path and heading as what they gain in a quarter of a second: walking is chaotic over seconds, not over
-fractions of one.
-"""
+"""What the recordings show, channel by channel, with what noise and numerics alone would make of each."""
 
 from __future__ import annotations
 
@@ -12,29 +7,28 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
+from workbench.gap.channels import ACROSS, BODY, GAIN_SPAN, channel_names, channels_of, joint_of
 from workbench.gap.compare_session import Rollouts
 from workbench.gap.comparison import noise_of
 from workbench.gap.metrics import rms
 from workbench.gap.registered import RegisteredTake
+from workbench.gap.steadied import unsettled
 from workbench.recording.take import Take
 from workbench.recording.yaw import weighted_median
 from workbench.robot import RobotModel
+from workbench.simulation.steady import BaseStates
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-GAIN_SPAN = 0.25
-"""Span over which path and heading are compared [s]."""
 BLOCK = 0.4
 """Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
 USES = ("fit", "choose", "fit", "validate")
 PART = 0.1
 """With the base held, what is neither fitted nor validated is every third part [s] of what does not validate: a joint forgets
 within one, and may meet its stop but once."""
-BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
 LATE, SHIFTS = 0.1, 4
@@ -42,15 +36,8 @@ LATE, SHIFTS = 0.1, 4
 sets out so unlike the nominal one that its start was estimated 62 ms early."""
 LOOP = 2e-3
 """Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that."""
-ACROSS = "~"
-"""Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
 SMOOTHED = 0.065
 """Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
-
-
-def joint_of(channel: str) -> str:
-    """The joint that a channel tells of; the channel's own name where it is the body's."""
-    return channel.partition(ACROSS)[0]
 
 
 @dataclass(frozen=True)
@@ -61,8 +48,10 @@ class TakeEvidence:
     measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
     the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
     the first command's time was estimated, so that every model may shift it; else by no more than LOOP. contact (N, c): the
-    nominal robot with the other contact model less that with this one. until: how long after the first command models are asked
-    about it [s]; 0: not at all.
+    nominal robot with the other contact model less that with this one. noisy (c,): share of sigma squared that is
+    measurement noise, which alone every model leaves. rough (N, c): times sigma, where steps and contact models part by more
+    than on the whole, as when a robot is about to tip over. steadied: where every model's base is put back to. until: how
+    long after the first command models are asked about it [s]; 0: not at all.
     """
 
     take: RegisteredTake
@@ -74,6 +63,9 @@ class TakeEvidence:
     weight: Array
     start_is_free: bool
     contact: Array
+    noisy: Array | float = 1.0
+    rough: Array | float = 1.0
+    steadied: BaseStates | None = None
     until: float = np.inf
 
     @property
@@ -109,14 +101,14 @@ class TakeEvidence:
 
     def simulated(self, rollout: Take, model: RobotModel) -> Array:
         """A rollout's channels (N, c) as this take would have shown them."""
-        return channels_of(self.take.observed(rollout, model), self)
+        return channels_of(self.take.observed(rollout, model), self.channels)
 
     def residual(self, simulated: Array, model: RobotModel, corrected: bool = True) -> Array:
         """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. model: that was simulated;
         corrected: for the search's step."""
         simulated = simulated + self.offset if corrected else simulated
         simulated = self._shifted(self._lying_in_its_play(simulated, model))
-        return (self.recorded - simulated) / self.sigma
+        return (self.recorded - simulated) / self._frame_sigma
 
     def early(self, residual: Array, until: float) -> Array:
         """Residuals (N, c) as a rollout that ends `until` [s] after the first command leaves them: later frames are NaN, and say
@@ -124,7 +116,11 @@ class TakeEvidence:
         if self.since[-1] <= until:
             return residual
         seen = np.where(self.since[:, None] <= until, residual, np.nan)
-        return (self.recorded - self._shifted(self.recorded - seen * self.sigma)) / self.sigma
+        return (self.recorded - self._shifted(self.recorded - seen * self._frame_sigma)) / self._frame_sigma
+
+    @property
+    def _frame_sigma(self) -> Array:
+        return np.asarray(self.sigma * self.rough)
 
     def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
         """A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
@@ -163,75 +159,23 @@ class TakeEvidence:
         return np.where(np.isfinite(simulated), shifted, np.nan)
 
 
-def channels_of(take: Take, e: TakeEvidence | tuple[str, ...]) -> Array:
-    """Channels (N, c) of an observed take; of evidence, or by the joints and axes named."""
-    names = e if isinstance(e, tuple) else e.channels
-    body = body_channels(take) if BODY[0] in names else None
-    out = np.zeros((len(take), len(names)))
-    for i, name in enumerate(names):
-        joint, _, axis = name.partition(ACROSS)
-        if name in BODY:
-            assert body is not None
-            out[:, i] = body[:, BODY.index(name)]
-        elif axis:
-            if take.off_axis is not None:
-                out[:, i] = take.off_axis[:, take.column(joint), "xyz".index(axis)]
-        else:
-            out[:, i] = take.q[:, take.column(joint)]
-    return out
-
-
-def body_channels(take: Take) -> Array:
-    """Gains in path (in the heading's frame) and heading over GAIN_SPAN, height, roll and pitch: (N, 6) [m, rad]."""
-    assert take.p_WB is not None
-    assert take.quat_WB is not None
-    n = len(take)
-    out = np.full((n, 6), np.nan)
-    good = np.isfinite(take.quat_WB).all(axis=1) & np.isfinite(take.p_WB).all(axis=1)
-    if not good.any():
-        return out
-    angles = np.full((n, 3), np.nan)
-    angles[good] = Rotation.from_quat(take.quat_WB[good], scalar_first=True).as_euler("ZYX")
-    angles[good, 0] = np.unwrap(angles[good, 0])
-    step = max(1, round(GAIN_SPAN / float(np.median(np.diff(take.time)))))
-    gain = np.full((n, 3), np.nan)
-    gain[:-step, :2] = take.p_WB[step:, :2] - take.p_WB[:-step, :2]
-    gain[:-step, 2] = angles[step:, 0] - angles[:-step, 0]
-    c, s = np.cos(angles[:, 0]), np.sin(angles[:, 0])
-    out[:, 0] = c * gain[:, 0] + s * gain[:, 1]
-    out[:, 1] = -s * gain[:, 0] + c * gain[:, 1]
-    out[:, 2] = gain[:, 2]
-    out[:, 3] = take.p_WB[:, 2] - np.nanmean(take.p_WB[take.resting, 2]) if take.resting.any() else take.p_WB[:, 2]
-    out[:, 4], out[:, 5] = angles[:, 2], angles[:, 1]
-    return out
-
-
-def channel_names(t: RegisteredTake) -> tuple[str, ...]:
-    """What a take shows: its joints, what lies across them, its body."""
-    joints = t.recorded.joints
-    across = []
-    if t.recorded.off_axis is not None:
-        k = t.model.kinematics
-        neutral = k.forward(np.zeros((1, len(k.joints))))
-        for i, j in enumerate(joints):
-            axis = np.abs(neutral[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent)  # in the base's axes
-            if np.isfinite(t.recorded.off_axis[:, i]).any():
-                across += [f"{j}{ACROSS}{'xyz'[k]}" for k in np.sort(np.argsort(axis)[:2])]
-    return (*joints, *across, *(BODY if t.recorded.base == "free" else ()))
-
-
-def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts]) -> list[TakeEvidence]:
-    """The evidence of registered takes; rollouts: of the nominal model at the search's step, with floors, by take name."""
+def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts],
+           steadied: Mapping[str, BaseStates | None] | None = None) -> list[TakeEvidence]:
+    """The evidence of registered takes; rollouts: of the nominal model at the search's step, put back to `steadied`, with floors,
+    by take name."""
     known = noise_of([t.recorded for t in takes])
     alone = not any(t.spec.use == "validate" for t in takes)
-    return [_evidence(t, rollouts[t.spec.name], known.joints, alone) for t in takes]
+    return [_evidence(t, rollouts[t.spec.name], known.joints, alone, (steadied or {}).get(t.spec.name)) for t in takes]
 
 
-def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, float], alone: bool) -> TakeEvidence:
+def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, float], alone: bool, steadied: BaseStates | None
+              ) -> TakeEvidence:
     names = channel_names(t)
     joints = t.recorded.joints
     recorded = channels_of(t.recorded, names)
     moving = t.recorded.time >= t.measurement.starts_at
+    if steadied is not None:
+        moving &= ~unsettled(steadied, t.recorded.since_start)
     nominal = channels_of(t.observed(r.nominal), names)
     finer = [channels_of(t.observed(f), names) for f in r.finer]
     finest = finer[-1] if finer else nominal
@@ -254,10 +198,22 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
         sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
         weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
     sigma = np.maximum(sigma, 1e-6)
+    apart = [*(f - finest for f in (*finer[:-1], nominal)), *(o - nominal for o in others)]
+    rough = _rough(sigma, noise, apart, t) if others else 1.0
     offset = np.nan_to_num(finest - nominal)
     contact = np.nan_to_num(others[0] - nominal) if others else np.zeros_like(nominal)
-    return TakeEvidence(t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
-                        t.recorded.zeroed and t.spec.starts_at is None, contact)
+    return TakeEvidence(
+        t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
+        t.recorded.zeroed and t.spec.starts_at is None, contact, np.nan_to_num(noise) ** 2 / sigma**2, rough, steadied)
+
+
+def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:
+    """Times sigma (c,), by frame (N, c): at least 1, and more where steps and contact models part within a block."""
+    frames = max(1, round(BLOCK / float(np.median(np.diff(t.recorded.time)))))
+    kernel = np.ones(frames) / frames
+    worst = np.nan_to_num(np.max(np.square(np.nan_to_num(np.array(apart))), axis=0))
+    local = np.column_stack([np.convolve(c, kernel, mode="same") for c in worst.T])
+    return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.evidence import BODY, GAIN_SPAN, LEAST_BODY_SIGMA, body_channels
+from workbench.gap.channels import BODY, GAIN_SPAN, body_channels
+from workbench.gap.evidence import LEAST_BODY_SIGMA
 from workbench.gap.experiment_rivals import Pair, Rival
 from workbench.recording.take import Take
 from workbench.robot import RobotModel

@@ -170,9 +170,8 @@ class NextExperiment:
 @dataclass(frozen=True)
 class Diagnosis:
     """All that a session says. model: nominal with the findings' effects; posterior: of their parameters. left_out: damaged
-    takes, (name, reason). stopped: whether the search came to its limit of work. judged_until: walks of which all that is missing
-    comes so long after the first command [s]: from then on next to nothing sends the robot elsewhere. provenance: workbench,
-    drake, model_sha256, seed, seconds; searched: of long sessions, the seconds by take that the search looked at."""
+    takes, (name, reason). stopped: whether the search came to its limit of work. provenance: workbench, drake,
+    model_sha256, seed, seconds; searched: of long sessions, the seconds by take that the search looked at."""
 
     verdict: Verdict
     model: RobotModel
@@ -186,7 +185,6 @@ class Diagnosis:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
-    judged_until: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -203,8 +201,6 @@ class Diagnosis:
         }
         if self.stopped:
             out["stopped"] = True
-        if self.judged_until:
-            out["judged_until"] = [{"take": name, "seconds": seconds} for name, seconds in self.judged_until]
         if self.left_out:
             out["left_out"] = [{"take": name, "reason": reason} for name, reason in self.left_out]
         return out

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Layer
-from workbench.gap.evidence import ACROSS, BODY, SMOOTHED, TakeEvidence, joint_of, ratios, smoothed
+from workbench.gap.channels import ACROSS, BODY, joint_of
+from workbench.gap.evidence import SMOOTHED, TakeEvidence, ratios, smoothed
 from workbench.gap.findings import GapEntry
 from workbench.gap.footfalls import foot_phases
 

@@ -26,17 +26,16 @@ CALM = 0.5
 """Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
 them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
 """
-WORTH = 0.3
-"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted."""
+WORTH, WORTH_WALKING = 0.3, 0.5
+"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
+where that is cheap, and on a walk."""
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
 """Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect is
 looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
-MOST_FITTED = 5
+MOST_FITTED = 3
 """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
-NEARBY = (1.0, 0.7, 1.4)
-"""Shares of a size that coarse steps found, at which a walk is looked at in the search's own step."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
 Part = Generator[list[Question], list[dict[int, Array]], T]
@@ -116,20 +115,11 @@ class Trying:
         if not alive:
             return out
         sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
-        if self.coarse and self.walking:
-            return out + (yield from self._finely_judged(alive, sizes))
-        (final,) = yield [self._question(alive, sizes)]
-        return out + [self._judged(b, x, self._told(final)) for b, x in zip(alive, sizes)]
-
-    def _finely_judged(self, alive: list[int], sizes: list[Array]) -> Asking:
-        """Trials at the best of sizes nearby: coarse steps say where to go, not what a walk makes of small differences."""
-        bounds = [self.group[b].bounds() for b in alive]
-        shares = NEARBY if any(len(x) for x in sizes) else NEARBY[:1]
-        points = [[np.clip(share * x, *ends) for x, ends in zip(sizes, bounds)] for share in shares]
-        answers = yield [replace(self._question(alive, p), step=1.0) for p in points]
-        costs = [[float(r @ r) for r in self._left(a)] for a in answers]
-        best = [int(np.argmin([cost[b] for cost in costs])) for b in alive]
-        return [self._judged(b, points[n][k], answers[n]) for k, (b, n) in enumerate(zip(alive, best))]
+        finely = self.coarse and self.walking  # coarse steps say where to go, not what a walk makes of small differences
+        question = self._question(alive, sizes)
+        (final,) = yield [replace(question, step=1.0) if finely else question]
+        final = final if finely else self._told(final)
+        return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
         """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
@@ -223,16 +213,15 @@ class Trying:
         _tell(race.foretold, self.joints, gains)
         yield []  # until all have said what they foretell
         last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
+        worth = WORTH_WALKING if self.walking else WORTH
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > race.least and g >= WORTH * _best(race.foretold, j) and (j is not None or g >= last)]
+                if g > race.least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
         bounds = [self.group[b].bounds() for b in alive]
-        points = [[share * x for x in starts] for share in ((1.0, 0.5) if self.walking else (1.0,))]
-        self.without, *answers = yield [self._question([], []), *(self._question(alive, p) for p in points)]
-        firsts = [self._left(self._told(a)) for a in answers]
-        nearest = [int(np.argmin([f[b] @ f[b] for f in firsts])) for b in alive]
+        self.without, answer = yield [self._question([], []), self._question(alive, starts)]
+        first = self._left(self._told(answer))
 
         def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
                      ) -> Part[list[Solved]]:
@@ -240,8 +229,7 @@ class Trying:
             return (yield from through(fit, lambda p: self._question(alive, p),
                                        lambda answer: [self._left(self._told(answer))[b] for b in alive]))
 
-        solved = yield from improved([points[n][k] for k, n in enumerate(nearest)],
-                                     [firsts[n][b] for b, n in zip(alive, nearest)], 1)
+        solved = yield from improved(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
         _tell(self.race.reached, [self.joints[b] for b in alive], gains)
         yield []  # until all have come as far

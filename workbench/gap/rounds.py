@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from workbench.gap.missed import Missed
 from workbench.gap.race import Trial
@@ -32,13 +32,11 @@ class Round:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The effects that stay, fitted together, and how they were found; missed: poses that servos never got; judged_until: of
-    walks of which all that is missing comes after they were on the brink, when that was [s], by take."""
+    """The effects that stay, fitted together, and how they were found; missed: poses that servos never got."""
 
     fit: Fit
     rounds: tuple[Round, ...]
     missed: tuple[Missed, ...] = ()
-    judged_until: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def stopped(self) -> bool:

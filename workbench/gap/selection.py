@@ -13,10 +13,9 @@ import numpy as np
 
 from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
-from workbench.gap.brink import judged_until
 from workbench.gap.candidate import Candidate
+from workbench.gap.channels import BODY, joint_of
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
-from workbench.gap.evidence import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
@@ -66,7 +65,6 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     left out of what is played; read anew by what held takes told, which may change the search's jury."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
-    brink: dict[int, float] = {}
     most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
         current = _phase(search, pool, current, search.held, rounds, report, most)
@@ -76,10 +74,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         nominal = search.evaluated([])
     if search.held != search.fitted:
         search.settled = current = search.retimed(current)
-        brink = judged_until(search.jury, current.model(search.nominal), current.residuals, search.grounded(search.fitted))
-        if not brink:
-            closed = least_closed(search, nominal, current)
-            current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
+        closed = least_closed(search, nominal, current)
+        current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -88,7 +84,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
             kept = search.resettled(kept)
         if kept is not current or _left_walking(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(kept, tuple(rounds), played.missed if played else (), brink)
+    return Chosen(kept, tuple(rounds), played.missed if played else ())
 
 
 def _left_walking(search: Search, fit: Fit) -> bool:

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
-from workbench.gap.evidence import ACROSS, TakeEvidence, smoothed
+from workbench.gap.channels import ACROSS
+from workbench.gap.evidence import TakeEvidence, smoothed
 from workbench.gap.ledger import channel_gaps
 from workbench.robot import RobotModel
 

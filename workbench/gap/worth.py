@@ -7,22 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from workbench.gap.asked import standing_out
+from workbench.gap.channels import joint_of
 from workbench.gap.company import NEARLY_ALL
-from workbench.gap.evidence import joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Round, before_rough, taken
 from workbench.gap.search import Fit, Search
 
-LEAST_WALKING = 600.0
+LEAST_WALKING = 300.0
 """LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 ALL_CLOSED = 0.5
 """Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE, WALKING_SHARE = 0.01, 0.05
+LEAST_SHARE, WALKING_SHARE = 0.01, 0.02
 """Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
 held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
 a second effect must not live on that."""
-ROUGH_SHARE, LEFT_SHARE = 0.1, 0.05
+ROUGH_SHARE, LEFT_SHARE = 0.04, 0.02
 """The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
 """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
@@ -43,11 +43,7 @@ def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...],
 
 def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
     """Share that an effect on the ground must take away, beside what held takes told. More, where a joint that was given an
-    effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray. Nearly all, where
-    it has play: how a link lies in that is chance, and sends a walk elsewhere."""
-    ill = {joint_of(c) for i in search.held for c in channel_gaps(search.jury.evidence[i], current.residuals[i])}
-    if any(c.effect.free_play and c.joint in ill for c in current.effects):
-        return NEARLY_ALL
+    effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray."""
     given = {c.joint for c in current.effects}
     part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ROUGH_SHARE))
     return LAST_CLOSED if part else LEAST_CLOSED

@@ -15,6 +15,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Array, Simulation, Start
+from workbench.simulation.steady import BaseStates
 
 KEPT_STATIONS = 3
 
@@ -35,6 +36,7 @@ class Job:
     times: Array | None = None
     start: Start | tuple[Array, Array] | None = None
     elapsed: float = 0.0
+    steadied: BaseStates | None = None
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
@@ -75,5 +77,5 @@ def run_job(job: Job) -> Take:
     while len(_stations) > KEPT_STATIONS:
         _stations.popitem(last=False)
     take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, start=job.start,
-                              elapsed=job.elapsed, name=job.name)
+                              elapsed=job.elapsed, steadied=job.steadied, name=job.name)
     return take if job.times is None else replace(take, torque=None, contact={}).resampled(job.times)

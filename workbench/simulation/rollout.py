@@ -26,6 +26,7 @@ from workbench.simulation.gantry import gantry_coordinates
 from workbench.simulation.logs import RunLogs
 from workbench.simulation.playback import bridged_base, play_back
 from workbench.simulation.reference import linear_trajectory, reference_columns
+from workbench.simulation.steady import BaseSetter, BaseStates
 from workbench.simulation.structure import Structure
 
 Array = NDArray[np.float64]
@@ -73,15 +74,16 @@ class Simulation:
 
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
             trajectory: tuple[Array, Array] | None = None, path: Take | None = None,
-            start: Start | tuple[Array, Array] | None = None, elapsed: float = 0.0, name: str = "simulation") -> Take:
+            start: Start | tuple[Array, Array] | None = None, elapsed: float = 0.0, steadied: BaseStates | None = None,
+            name: str = "simulation") -> Take:
         """Plays `commands`, or follows `trajectory` (times (K,) [s], angles (K, n) [rad] in self.joints' order; drive "ideal";
         default: smoothly through the commands' poses).
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
         this one (base "path"). start: angles and velocities (n,) [rad, rad/s] in self.joints' order at the first command, in
         place of rest in neutral (base "fixed" or "path"): the links', or the servos' own by Start; there is no lead then.
-        elapsed [s]: how long the robot has played before these commands, for effects that grow with it. Returns a Take with
-        time 0 at the first command.
+        elapsed [s]: how long the robot has played before these commands, for effects that grow with it. steadied: where a free
+        base is put back to as it goes. Returns a Take with time 0 at the first command.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -104,11 +106,14 @@ class Simulation:
             self._put(Start(*start), commands)
         self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
-        sampled, forces = self._advance(commands, lead, lead + duration)
+        setter = None if steadied is None else BaseSetter(self.plant, self.diagram.scene_graph(), self._base, self._plant_context)
+        sampled, forces = self._advance(commands, lead, lead + duration, steadied, setter)
         t, state = self._logs.read("state")
         time = t - lead
         q, v = self._logs.joints(state)
         p_WB, quat_WB = self._logs.base_path(state)
+        if setter is not None:
+            p_WB, quat_WB = setter.in_one_piece(t, p_WB, quat_WB)
         contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
         take = Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
                     p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
@@ -259,8 +264,10 @@ class Simulation:
             times, rows = np.concatenate([s * lead, times]), np.vstack([np.outer(s * s * (3 - 2 * s), rows[0]), rows])
         self._update_reference(times, rows)
 
-    def _advance(self, commands: Commands | None, lead: float, end: float) -> tuple[Array, dict[str, Array]]:
-        """Runs to `end`, changing commands at their times; returns the times and values of foot forces."""
+    def _advance(self, commands: Commands | None, lead: float, end: float, steadied: BaseStates | None, setter: BaseSetter | None
+                 ) -> tuple[Array, dict[str, Array]]:
+        """Runs to `end`, changing commands and the base's state at their times; returns the times and values of foot forces."""
+        puts = {} if steadied is None else {self._whole_steps(lead + t): k for k, t in enumerate(steadied.times.tolist())}
         commanded = commands is not None and self.config.drive == "servo"
         times = commands.times.tolist() if commands is not None and commanded else []
         changes = {self._on_grid(lead + t): k for k, t in enumerate(times)}
@@ -272,8 +279,12 @@ class Simulation:
         sampled: list[float] = []
         self.simulator.Initialize()
         due = set(samples.tolist())
-        for t in sorted(due | {c for c in changes if c < end} | {self._on_grid(end)}):
+        for t in sorted(due | {c for c in (*changes, *puts) if c < end} | {self._on_grid(end)}):
             self.simulator.AdvanceTo(t)
+            if t in puts:
+                assert steadied is not None
+                assert setter is not None
+                setter.put(steadied, puts[t], t)
             if t in due:
                 forces.append(self._foot_forces(self._plant_context))
                 sampled.append(t)

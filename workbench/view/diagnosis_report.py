@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.channels import BODY, joint_of
 from workbench.gap.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
+from workbench.gap.steadied import WINDOW
 from workbench.gap.story import TakeStory
 from workbench.view.error_figures import LIMIT
 from workbench.view.figures import body_path, film_strip
@@ -109,12 +110,12 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
     if stories:
         what.append(f"Judged on stretches of {listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
+    if any(s.recorded.base == "free" for s in stories):
+        what.append(f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {WINDOW:g} s; "
+                    "paths and 3D show it left to itself.")
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
-    what += [f"Take {name} is judged for {seconds:.1f} s: from then on a millimetre of the body's balance or 5 % of friction "
-             "sends this robot elsewhere, and what the recording shows beyond tells nothing."
-             for name, seconds in diagnosis.judged_until]
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)

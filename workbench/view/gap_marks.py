@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, Rgba, Sphere
 from pydrake.math import RigidTransform
 
-from workbench.gap.evidence import BODY, joint_of
+from workbench.gap.channels import BODY, joint_of
 from workbench.robot.model import RobotModel
 from workbench.view.heat import BIN, cells, colours, shares
 from workbench.view.keys import kept_keys

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named
-from workbench.gap.evidence import ACROSS, BODY, joint_of
+from workbench.gap.channels import ACROSS, BODY, joint_of
 from workbench.gap.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.robot import EffectSpec
 

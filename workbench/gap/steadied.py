@@ -1,0 +1,63 @@
+"""Walks in windows: every model walks on from where the recorded robot was, so that what it lacks shows before chaos does.
+
+At the beginning of each window the base is put back beside the recorded one; what shows until feet have found the floor again
+says nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from workbench.recording.take import Take
+from workbench.simulation.steady import BaseStates
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+WINDOW = 0.6
+"""[s]. Over as much even a robot that is about to tip over goes where another engine sends it, too."""
+SETTLES = 0.1
+"""After which feet have found the floor again [s]: a millimetre's fall takes 15 ms."""
+SMOOTHED = 7
+"""Frames over which pose and velocity are read off, by a parabola: 60 ms at 120 Hz."""
+
+
+def edges(since: Array) -> Array:
+    """Where windows begin (K,) [s], of a take whose frames are at `since` (N,) [s] after the first command."""
+    return np.arange(WINDOW, float(since[-1]) - WINDOW / 4, WINDOW)
+
+
+def base_states(recorded: Take) -> BaseStates | None:
+    """Where the base of a walk was at its windows' beginnings; None where it is held or was not tracked. Windows whose
+    beginning no camera saw begin at none."""
+    if recorded.base != "free" or recorded.p_WB is None or recorded.quat_WB is None:
+        return None
+    seen: Mask = np.asarray(np.isfinite(np.hstack([recorded.p_WB, recorded.quat_WB])).all(axis=1))
+    since = recorded.since_start
+    half = SMOOTHED // 2
+    frames = [int(np.argmin(np.abs(since - t))) for t in edges(since)]
+    frames = [i for i in frames if half <= i < len(since) - half and seen[i - half:i + half + 1].all()]
+    if not frames:
+        return None
+    near = [slice(i - half, i + half + 1) for i in frames]
+    states = [_state(since[n] - since[i], recorded.p_WB[n], recorded.quat_WB[n]) for i, n in zip(frames, near)]
+    quat, v, w = (np.array(column) for column in zip(*states))
+    return BaseStates(since[frames], quat, v, w)
+
+
+def _state(t: Array, p_WB: Array, quat_WB: Array) -> tuple[Array, Array, Array]:
+    """Turn quat (4,) and velocities v, w (3,) in the middle of some frames, t (n,) [s] from there, by parabolas through them."""
+    powers = np.stack([np.ones_like(t), t, t * t], axis=1)
+    _, v, _ = np.linalg.lstsq(powers, p_WB, rcond=None)[0]
+    turns = Rotation.from_quat(quat_WB, scalar_first=True)
+    middle = turns[len(t) // 2]
+    turn, w, _ = np.linalg.lstsq(powers, (turns * middle.inv()).as_rotvec(), rcond=None)[0]
+    return (Rotation.from_rotvec(turn) * middle).as_quat(scalar_first=True), v, w
+
+
+def unsettled(states: BaseStates, since: Array) -> Mask:
+    """Frames (N,) that tell nothing, as feet have yet to find the floor."""
+    frame = float(np.median(np.diff(since)))
+    after = since[:, None] - states.times
+    return np.asarray(((after > -frame) & (after < SETTLES)).any(axis=1))
