@@ -104,7 +104,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
     left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and too_little_left(search, fit, search.fitted, ())
+    slight = not findings and not left and too_little_left(search, fit, search.fitted, (), everywhere=False)
     verdict = verdict_of(bool(gap) and not slight, findings, left)
     experiment = _experiment(session, evidence, fit, standings, n_jobs, progress)
     progress("rolling out the fitted model", None)

@@ -126,15 +126,17 @@ class Jury:
         left = self.vector(residuals, use, joint)
         return float(left @ left)
 
-    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None, share: float = 0.0) -> float:
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None, share: float = 0.0,
+               everywhere: bool = False) -> float:
         """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
-        has gone of it since `before`. On walks, which steps and contact models rarely make as wrong as they may, beyond noise,
-        and of all channels, as what moves the robot shows a little in each."""
+        has gone of it since `before`. everywhere: of walks beyond noise, as steps and contact models rarely make them as wrong as
+        they may, and of all channels, as what moves the robot shows a little in each."""
         cost, expected = self.by_channel(residuals, use)
         was = cost if before is None else self.by_channel(before, use)[0]
         may_err = share * np.maximum(was - cost, 0.0)
-        walking = np.repeat([self.walks((i,)) for i in sorted(residuals)], [r.shape[1] for _, r in sorted(residuals.items())])
-        noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, r.shape[1]) for i, r in sorted(residuals.items())])
+        widths = [r.shape[1] for _, r in sorted(residuals.items())]
+        walking = np.repeat([everywhere and self.walks((i,)) for i in sorted(residuals)], widths)
+        noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, n) for i, n in zip(sorted(residuals), widths)])
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
 

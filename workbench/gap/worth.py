@@ -49,9 +49,11 @@ def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
     return LAST_CLOSED if part else LEAST_CLOSED
 
 
-def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round]) -> bool:
+def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round], everywhere: bool = True
+                    ) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
-    that walks told, and beyond what others, as all with the base held, may err by in each channel."""
+    that walks told, and beyond what others, as all with the base held, may err by in each channel. everywhere: of walks, not in
+    channels with a gap alone."""
     jury, left = search.jury, 0.0
     walks = jury.walks(takes)
     before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
@@ -61,7 +63,7 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
-            left += sum(jury.beyond(now, use, was, share) for use in ("fit", "choose")) / 3  # a third chooses
+            left += sum(jury.beyond(now, use, was, share, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
         return left < ALL_CLOSED * LEAST_GAIN
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
