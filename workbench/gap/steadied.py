@@ -29,8 +29,8 @@ def edges(since: Array) -> Array:
 
 
 def base_states(recorded: Take) -> BaseStates | None:
-    """Where the base of a walk was at its windows' beginnings; None where it is held or was not tracked. Windows whose
-    beginning no camera saw begin at none."""
+    """Where the base of a walk was at its windows' beginnings; None where it is held or was not tracked. A window
+    whose beginning no camera saw is left out: the one before goes on."""
     if recorded.base != "free" or recorded.p_WB is None or recorded.quat_WB is None:
         return None
     seen: Mask = np.asarray(np.isfinite(np.hstack([recorded.p_WB, recorded.quat_WB])).all(axis=1))
