@@ -168,12 +168,19 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
-    maps = [Picture(gap_map(s), f"{s.name}: each row a joint or a motion of the body, darker where it is further from the model. "
-                                "Green on top: stretches that no choice saw.") for s in sorted(stories, key=_worst, reverse=True)]
+    maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(stories, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
         parts.append(Details("The same map of the other takes", maps[1:]))
     return Section("Where the recordings leave the model", parts)
+
+
+def _map_caption(story: TakeStory) -> str:
+    said = (f"{story.name}: each row a joint or a motion of the body, darker where it is further from the model. "
+            "Green on top: stretches that no choice saw. Grey: not seen")
+    if story.recorded.base == "free":
+        said += f", or the model's body had just been put back beside the recorded one, as every {WINDOW:g} s"
+    return said + "."
 
 
 def _worst(story: TakeStory) -> float:
