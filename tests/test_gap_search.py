@@ -373,6 +373,19 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
         assert [g for g in asked_of if g] == groups
 
 
+def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while_held(worn, monkeypatch):
+    """A stop may lie beyond what was moved then, and gravity may have left a loose mount on one side."""
+    _, search, nominal = worn
+    well = next(iter(asked._when_held(search, nominal)[0]))
+    monkeypatch.setattr(search, "grounded", lambda takes: takes)
+    mount = Candidate.of(known_effects()["loose_mount"], (well,), (0.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0),
+                         (False, True, True, True))
+    band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
+    groups = [g for tier in range(asked.TIERS)
+              for g in asked.asked(search, [mount, band], nominal, {well: 3.0}, search.held, tier)[0]]
+    assert groups == [[mount]]
+
+
 def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn):
     session, search, nominal = worn
     pool = candidates(session.model, search.jury.evidence)

@@ -43,7 +43,10 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     outstanding = standing_out(search, current, takes)
 
     def settled(c: Candidate) -> bool:
-        """What servos lack at any load, and what hangs on their links, would show with the base held, too."""
+        """What servos lack at any load, and what hangs on their links, would show with the base held, too; not a stop that is not
+        reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings."""
+        if c.read_off:
+            return False
         if c.effect.layer == "inertia":
             return search.nominal.kinematics.joint_of(c.where[0]) in well
         if c.effect.under_load or c.name in SEEN_ELSEWHERE or c.effect.layer == "ground":
