@@ -178,6 +178,28 @@ def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_aga
     assert len(asked) <= 1 + 3 + 2 * 8
 
 
+def test_a_fit_that_goes_on_does_not_step_again_where_it_stepped_in_vain():
+    def left(x):
+        return np.arctan(8.0 * (x - 1.0))  # the slope at the start sends a full step far beyond
+
+    def ended(x, r, n, asked, since=()):
+        fit = fit_blocks([x], [r], [(np.array([0.0]), np.array([9.0]))], n, since=since)
+
+        def answer(wanted):
+            asked.extend(float(point[0][0]) for _, point in wanted)
+            return [[left(point[0])] for _, point in wanted]
+        return together({0: fit}, answer)[0][0]
+
+    start = np.array([1.4])
+    whole, first, second = list[float](), list[float](), list[float]()
+    once = ended(start, left(start), 3, whole)
+    begun = ended(start, left(start), 1, first)
+    assert begun.missed
+    gone_on = ended(begun.x, begun.r, 2, second, [begun])
+    assert [*first, *second] == whole
+    assert gone_on.x == pytest.approx(once.x)
+
+
 def test_a_move_too_small_to_tell_a_slope_leaves_it_as_it_is():
     low = np.array([1.0 - 1e-170])
 

@@ -32,11 +32,14 @@ SETTLED = 3e-3
 
 @dataclass(frozen=True)
 class Solved:
-    """One block's end. x: sizes; r: what they leave; J: of r with respect to x, there or a step before."""
+    """One block's end. x: sizes; r: what they leave; J: of r with respect to x, there or a step before; damping: of the next
+    step; missed: whether one from measured slopes led nowhere."""
 
     x: Array
     r: Array
     J: Array
+    damping: float = 1e-3
+    missed: bool = False
 
     @property
     def cost(self) -> float:
@@ -44,14 +47,14 @@ class Solved:
 
 
 def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
-               slopes: Sequence[Array] | None = None) -> Asks:
+               since: Sequence[Solved] = ()) -> Asks:
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
-    block, one for each number), or `slopes` that are known, then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants
-    where there is one number). Walking answers small changes with noise: there strides are long (WALKING)."""
+    block, one for each number), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
+    Walking answers small changes with noise: there strides are long (WALKING). since: fits that ended at `start`, and go on."""
     rough = bool(np.any(np.asarray(stride) != HELD))
     blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
-    for b, J in zip(blocks, slopes or ()):
-        b.J, b.updated = J, True
+    for b, s in zip(blocks, since):
+        b.J, b.updated, b.damping, b.missed = s.J, True, s.damping, s.missed
     for _ in range(iterations):
         if not any(b.open for b in blocks):
             break
@@ -69,7 +72,7 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
         for k, b in enumerate(blocks):
             if b.open:
                 b.take([(t[k], a[k]) for t, a in zip(trials, answers)])
-    return [Solved(b.x, b.r, b.J) for b in blocks]
+    return [Solved(b.x, b.r, b.J, b.damping, b.missed) for b in blocks]
 
 
 @dataclass(eq=False)

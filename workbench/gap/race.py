@@ -223,9 +223,8 @@ class Trying:
         self.without, answer = yield [self._question([], []), self._question(alive, starts)]
         first = self._left(self._told(answer))
 
-        def improved(start: list[Array], leaves: list[Array], n: int, slopes: Sequence[Array] | None = None
-                     ) -> Part[list[Solved]]:
-            fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, slopes)
+        def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
+            fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, since)
             return (yield from through(fit, lambda p: self._question(alive, p),
                                        lambda answer: [self._left(self._told(answer))[b] for b in alive]))
 
@@ -234,7 +233,7 @@ class Trying:
         _tell(self.race.reached, [self.joints[b] for b in alive], gains)
         yield []  # until all have come as far
         if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
-            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, [s.J for s in solved])
+            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
 
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
