@@ -362,6 +362,18 @@ def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_t
         assert selection._says_it(search, None, trial, (0,), tier) is enough
 
 
+@pytest.mark.parametrize(("spring", "stop", "chosen"), [(5.6e7, 3.9e7, ["joint_stop"]), (5.6e7, 2.0e7, ["parallel_spring"]),
+                                                        (3.0e7, 3.9e7, ["joint_stop"])])
+def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it(spring, stop, chosen):
+    """Beside a load and a weak elbow a spring closed more of a shoulder's gap than the stop at which all recordings end."""
+    known = known_effects()
+    at_stop = Candidate.of(known["joint_stop"], ("one",), (-180.0, 57.0), (-180.0, 6.0), (True, False))
+    stiff = Candidate.of(known["parallel_spring"], ("one",), (0.0,))
+    trials = [Trial(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))]
+    choices = selection._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
+    assert [[t.candidate.name for t in c] for c in choices] == [chosen]
+
+
 def test_beside_a_pull_no_tilt_is_asked(worn):
     _, search, nominal = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))

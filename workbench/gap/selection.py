@@ -199,13 +199,17 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     best = worth[0]
     if best.joint is None:
         return [[t] for t in worth[:MOST_RIVALS + 1] if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
+    # recordings that end at a stop show it, whatever else keeps a stiff spring ahead of it for now
+    shown = next((t for t in worth if t.candidate.read_off and t.joint == best.joint
+                  and t.gain["choose"] > HALFWAY * best.gain["choose"]), None)
+    best = shown or best
     elsewhere: list[Trial] = []
-    for t in worth[1:]:
+    for t in worth:
         alike = t.gain["choose"] > ALIKE * best.gain["choose"] or t.closed > NEARLY_ALL
         if alike and t.joint not in {None, best.joint, *(o.joint for o in elsewhere)}:
             elsewhere.append(t)
-    rivals = [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
-              and t.gain["choose"] > HALFWAY * best.gain["choose"]]
+    rivals = [] if shown else [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
+                               and t.gain["choose"] > HALFWAY * best.gain["choose"]]
     return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
 
 
