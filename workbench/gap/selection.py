@@ -126,7 +126,8 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
-        together = [] if stopped else _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+        read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
+        together = [] if stopped or read_off else _fitted(search, current, several(search, current, trials, takes, beyond), takes)
         if together and priced(together[0][0]) < HALF * priced(after):
             after = together[0][0]
             seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
