@@ -28,9 +28,9 @@ def at(times: list[float], turn: Rotation, v: tuple[float, float, float] = (0, 0
     return BaseStates(np.array(times), np.tile(turn.as_quat(scalar_first=True), (n, 1)), np.tile(v, (n, 1)), np.zeros((n, 3)))
 
 
-def setter(station: Simulation) -> BaseSetter:
+def setter(station: Simulation, states: BaseStates) -> BaseSetter:
     station.run(None, 0.01)  # at rest
-    return BaseSetter(station.plant, station.diagram.scene_graph(), station._base, station._plant_context)
+    return BaseSetter(states, station.plant, station.diagram.scene_graph(), station._base, station._plant_context)
 
 
 def test_a_walk_that_is_where_it_was_recorded_goes_on_as_it_would(station: Simulation, commands: Commands):
@@ -44,9 +44,10 @@ def test_a_walk_that_is_where_it_was_recorded_goes_on_as_it_would(station: Simul
 
 
 def test_a_robot_that_has_tipped_the_other_way_is_put_back(station: Simulation):
-    put, tilt = setter(station), Rotation.from_euler("y", 6.0, degrees=True)
+    tilt = Rotation.from_euler("y", 6.0, degrees=True)
+    put = setter(station, at([0.0], tilt, (0.1, 0.0, 0.05)))
     depth, rest = put._lowest(), put._rest
-    put.put(at([0.0], tilt, (0.1, 0.0, 0.05)), 0, 0.0)
+    put.put(0, 0.0)
     X_WB = station.plant.GetFreeBodyPose(station._plant_context, station._base)
     V_WB = station._base.EvalSpatialVelocityInWorld(station._plant_context)
     apart = Rotation.from_matrix(X_WB.rotation().matrix()) * (tilt * rest).inv()
@@ -56,8 +57,8 @@ def test_a_robot_that_has_tipped_the_other_way_is_put_back(station: Simulation):
 
 
 def test_noise_of_cameras_hardly_moves_it(station: Simulation):
-    put = setter(station)
-    put.put(at([0.0], Rotation.from_euler("x", 0.1, degrees=True), (1.0, 0.0, 0.0)), 0, 0.0)
+    put = setter(station, at([0.0], Rotation.from_euler("x", 0.1, degrees=True), (1.0, 0.0, 0.0)))
+    put.put(0, 0.0)
     X_WB = station.plant.GetFreeBodyPose(station._plant_context, station._base)
     moved = Rotation.from_matrix(X_WB.rotation().matrix()) * put._rest.inv()
     assert np.rad2deg(moved.magnitude()) < 0.01

@@ -13,7 +13,7 @@ from workbench.gap.anew import Played, played_as
 from workbench.gap.built import Build, build_of
 from workbench.gap.candidates import candidates
 from workbench.gap.channels import ACROSS
-from workbench.gap.compare_session import provenance, roll_out, run_of
+from workbench.gap.compare_session import Rollouts, provenance, roll_out, run_of
 from workbench.gap.conclusions import Residuals, change, finding, posterior, rejected, unexplained, verdict_of
 from workbench.gap.constancy import drifts
 from workbench.gap.contest import Standing, contest
@@ -37,6 +37,7 @@ from workbench.motion.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.simulation.steady import BaseStates
 
 STEP = 2e-3
 """Of the search's rollouts [s]; what this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
@@ -130,12 +131,18 @@ class _Seen:
 
 
 def _seen(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> _Seen:
-    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs, floors=False)
-    nominal = {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}
+    def rolled(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
+        runs = [run_of(t, steadied.get(t.spec.name)) for t in these]
+        return {r.name: of for r, of in zip(runs, roll_out(runs, config, progress=progress, n_jobs=n_jobs, floors=floors))}
+
+    rollouts = (rolled([t for t in takes if t.spec.base != "free"], {})
+                | rolled([t for t in takes if t.spec.base == "free"], {}, floors=False))
+    nominal = {name: r.nominal for name, r in rollouts.items()}
     registered, left_out = register_takes(session, takes, nominal, progress)
-    steadied = {t.spec.name: base_states(t.recorded) for t in registered}
-    judged = roll_out([run_of(t, steadied[t.spec.name]) for t in registered], config, progress=progress, n_jobs=n_jobs)
-    return _Seen(gather(registered, {t.spec.name: r for t, r in zip(registered, judged)}, steadied), nominal, left_out)
+    walking = [t for t in registered if t.spec.base == "free"]
+    steadied = {t.spec.name: base_states(t.recorded) for t in walking}
+    rollouts |= rolled(walking, steadied)  # held takes are judged by what they were registered with
+    return _Seen(gather(registered, rollouts, steadied), nominal, left_out)
 
 
 def _believed(build: Build, jury: Jury, model: RobotModel, nominal: Fit) -> Build:

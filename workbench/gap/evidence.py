@@ -210,9 +210,8 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
 def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:
     """Times sigma (c,), by frame (N, c): at least 1, and more where steps and contact models part within a block."""
     frames = max(1, round(BLOCK / float(np.median(np.diff(t.recorded.time)))))
-    kernel = np.ones(frames) / frames
-    worst = np.nan_to_num(np.max(np.square(np.nan_to_num(np.array(apart))), axis=0))
-    local = np.column_stack([np.convolve(c, kernel, mode="same") for c in worst.T])
+    worst = np.max(np.square(np.nan_to_num(np.array(apart))), axis=0)
+    local = _running_sum(worst, frames) / frames
     return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
 
 
@@ -235,12 +234,16 @@ def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
     return np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0)
 
 
+def _running_sum(columns: Array, frames: int) -> Array:
+    """Of each column (N, c), over `frames` around each frame; what lies beyond the ends is nothing."""
+    kernel = np.ones(max(1, frames))
+    return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
+
+
 def smoothed(residual: Array, frames: int) -> Array:
     """Running means of residuals (N, c) over `frames`, scaled to stay 1 where they are white noise of 1; NaN stays."""
     known = np.isfinite(residual)
-    kernel = np.ones(max(1, frames))
-    total = np.column_stack([np.convolve(c, kernel, mode="same") for c in np.where(known, residual, 0.0).T])
-    count = np.column_stack([np.convolve(c, kernel, mode="same") for c in known.astype(float).T])
+    total, count = _running_sum(np.where(known, residual, 0.0), frames), _running_sum(known.astype(float), frames)
     return np.where(known, total / np.sqrt(np.maximum(count, 1.0)), np.nan)
 
 

@@ -106,8 +106,9 @@ class Simulation:
             self._put(Start(*start), commands)
         self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
-        setter = None if steadied is None else BaseSetter(self.plant, self.diagram.scene_graph(), self._base, self._plant_context)
-        sampled, forces = self._advance(commands, lead, lead + duration, steadied, setter)
+        setter = None if steadied is None else BaseSetter(
+            steadied, self.plant, self.diagram.scene_graph(), self._base, self._plant_context)
+        sampled, forces = self._advance(commands, lead, lead + duration, setter)
         t, state = self._logs.read("state")
         time = t - lead
         q, v = self._logs.joints(state)
@@ -264,10 +265,10 @@ class Simulation:
             times, rows = np.concatenate([s * lead, times]), np.vstack([np.outer(s * s * (3 - 2 * s), rows[0]), rows])
         self._update_reference(times, rows)
 
-    def _advance(self, commands: Commands | None, lead: float, end: float, steadied: BaseStates | None, setter: BaseSetter | None
+    def _advance(self, commands: Commands | None, lead: float, end: float, setter: BaseSetter | None
                  ) -> tuple[Array, dict[str, Array]]:
         """Runs to `end`, changing commands and the base's state at their times; returns the times and values of foot forces."""
-        puts = {} if steadied is None else {self._whole_steps(lead + t): k for k, t in enumerate(steadied.times.tolist())}
+        puts = {} if setter is None else {self._whole_steps(lead + t): k for k, t in enumerate(setter.states.times.tolist())}
         commanded = commands is not None and self.config.drive == "servo"
         times = commands.times.tolist() if commands is not None and commanded else []
         changes = {self._on_grid(lead + t): k for k, t in enumerate(times)}
@@ -281,10 +282,8 @@ class Simulation:
         due = set(samples.tolist())
         for t in sorted(due | {c for c in (*changes, *puts) if c < end} | {self._on_grid(end)}):
             self.simulator.AdvanceTo(t)
-            if t in puts:
-                assert steadied is not None
-                assert setter is not None
-                setter.put(steadied, puts[t], t)
+            if setter is not None and t in puts:
+                setter.put(puts[t], t)
             if t in due:
                 forces.append(self._foot_forces(self._plant_context))
                 sampled.append(t)
@@ -293,7 +292,6 @@ class Simulation:
                 self._command_at(t, commands, changes[t])
         stacked = np.array(forces).reshape(len(forces), len(self._foot_forces.feet), 3)
         return np.array(sampled), {foot: stacked[:, i] for i, foot in enumerate(self._foot_forces.feet)}
-
 
     def _command_at(self, t: float, commands: Commands, k: int) -> None:
         """Sends command k at time t [s]; one that comes between two steps of a discrete plant ramps from then on, not from the

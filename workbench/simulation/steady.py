@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import SceneGraph, Sphere
+from pydrake.geometry import GeometryId, SceneGraph, SceneGraphInspector, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
@@ -20,8 +20,6 @@ from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
-
-
 BESIDE = np.deg2rad(0.5)
 """Between simulated and recorded tilt of the base [rad], where half of it is taken away: noise of cameras leaves nearly all of
 it, and a walk that goes another way nearly none."""
@@ -45,7 +43,9 @@ class BaseSetter:
     path goes on where it is, as the floor is the same everywhere. Where feet stand cameras do not see to a contact's
     penetration, so that height is what leaves the lowest point of the robot's shapes as deep as it was."""
 
-    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, base: RigidBody, plant_context: Context) -> None:
+    def __init__(self, states: BaseStates, plant: MultibodyPlant, scene_graph: SceneGraph, base: RigidBody, plant_context: Context
+                 ) -> None:
+        self.states = states
         self._plant, self._base, self._context = plant, base, plant_context
         inspector = scene_graph.model_inspector()
         bodies = plant.GetBodyIndices(base.model_instance())
@@ -54,8 +54,9 @@ class BaseSetter:
         self._rest = Rotation.from_matrix(plant.GetFreeBodyPose(plant_context, base).rotation().matrix())
         self._turned: list[tuple[float, Array, Rotation]] = []
 
-    def put(self, states: BaseStates, k: int, time: float) -> None:
-        """State number k, at a time [s] of the run."""
+    def put(self, k: int, time: float) -> None:
+        """To state number k, at a time [s] of the run."""
+        states = self.states
         X_WB = self._plant.GetFreeBodyPose(self._context, self._base)
         V_WB = self._base.EvalSpatialVelocityInWorld(self._context)
         p_WB, R_WB = X_WB.translation(), Rotation.from_matrix(X_WB.rotation().matrix())
@@ -97,11 +98,11 @@ def _heading(R_WB: Rotation) -> float:
     return float(np.arctan2(forward[1], forward[0]))
 
 
-def _corners(inspector: object, g: object) -> tuple[Array, float]:
+def _corners(inspector: SceneGraphInspector, g: GeometryId) -> tuple[Array, float]:
     """Points (3, m) of a shape in its frame and how far it reaches beyond them: a sphere's centre; a box's corners."""
-    shape = inspector.GetShape(g)  # type: ignore[attr-defined]
+    shape = inspector.GetShape(g)
     if isinstance(shape, Sphere):
         return np.zeros((3, 1)), float(shape.radius())
-    box = inspector.GetObbInGeometryFrame(g)  # type: ignore[attr-defined]
+    box = inspector.GetObbInGeometryFrame(g)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]).T
     return np.asarray(box.pose() @ (signs * box.half_width()[:, None])), 0.0
