@@ -12,7 +12,7 @@ from workbench.gap.jury import Jury, take_of
 
 Array = NDArray[np.float64]
 Z90 = 1.645
-WIDER = 1.25
+WIDER = 1.1
 """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
 engine, or the world, is not ours."""
 TEMPER_WALKING = 60.0
