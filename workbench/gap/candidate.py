@@ -21,6 +21,10 @@ ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
 `special` reads them off the recordings."""
 
 
+LEAST_SIZE, OF_VECTOR = 0.3, 0.5
+"""What a move for a slope is at least a share of: of the typical size, and of its length for one of a vector's numbers."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
@@ -74,6 +78,19 @@ class Candidate:
     def shapes(self) -> NDArray[np.bool_]:
         """Of the sizes, those of numbers that only shape the effect."""
         return np.array([p.shapes for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
+
+    @property
+    def of_vector(self) -> NDArray[np.bool_]:
+        """Of the sizes, those that are a vector's."""
+        return np.array([p.vector for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
+
+    def magnitudes(self, x: Array) -> Array:
+        """What each size is moved for a slope in shares of: a small number of a long vector, as how high a load sits, by as much
+        as the others, else what it does drowns in what contact makes of small moves."""
+        out = np.maximum(np.abs(x), LEAST_SIZE)
+        vector = self.of_vector
+        out[vector] = np.maximum(out[vector], OF_VECTOR * np.linalg.norm(x[vector]))
+        return np.asarray(out)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""

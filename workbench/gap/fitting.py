@@ -13,6 +13,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.gap.candidate import LEAST_SIZE
+
 Array = NDArray[np.float64]
 Point = list[Array]
 """Sizes, by block."""
@@ -47,10 +49,11 @@ class Solved:
 
 
 def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
-               since: Sequence[Solved] = ()) -> Asks:
+               since: Sequence[Solved] = (), magnitudes: Array | None = None) -> Asks:
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
     block, one for each number), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
-    Walking answers small changes with noise: there strides are long (WALKING). since: fits that ended at `start`, and go on."""
+    Walking answers small changes with noise: there strides are long (WALKING). magnitudes: of a lone block, what they are at
+    least shares of. since: fits that ended at `start`, and go on."""
     rough = bool(np.any(np.asarray(stride) != HELD))
     blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
     for b, s in zip(blocks, since):
@@ -61,7 +64,7 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
         stale = [b for b in blocks if b.open and not b.updated]
         if stale:
             for b in stale:
-                b.steps = _steps(b.x, b.low, b.high, stride)
+                b.steps = _steps(b.x, b.low, b.high, stride, magnitudes)
             points = [[b.moved(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
             for i, answer in enumerate((yield points)):
                 for b, r in zip(blocks, answer):
@@ -154,8 +157,8 @@ class _Block:
         self.x, self.r = there, left_there
 
 
-def _steps(x: Array, low: Array, high: Array, stride: float | Array) -> Array:
-    step = stride * np.maximum(np.abs(x), 0.3)
+def _steps(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None) -> Array:
+    step = stride * np.maximum(np.abs(x), LEAST_SIZE if magnitudes is None else magnitudes)
     return np.asarray(np.where(x + step <= high, step, -step))
 
 

@@ -75,6 +75,10 @@ class SwungMass(PointMass):
         return np.array([True, False, False])
 
     @property
+    def of_vector(self) -> NDArray[np.bool_]:
+        return ~self.shapes
+
+    @property
     def makes(self) -> NDArray[np.bool_]:
         return ~self.shapes
 

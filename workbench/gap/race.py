@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate, with_effects
-from workbench.gap.fitting import HELD, WALKING, Solved, fit_blocks, through
+from workbench.gap.fitting import HELD, WALKING, Asks, Solved, fit_blocks, through
 from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan
 from workbench.gap.jury import COARSE, Jury, Question, take_of
 from workbench.robot import RobotModel
@@ -159,7 +159,7 @@ class Trying:
             return [self.jury.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
-        (solved,) = yield from through(fit_blocks([x], tell(answer), [self.group[0].bounds()], STEPS_WALKING, WALKING), ask, tell)
+        (solved,) = yield from through(self._improved([x], tell(answer), [0], STEPS_WALKING), ask, tell)
         return solved.x
 
     def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
@@ -219,13 +219,11 @@ class Trying:
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
-        bounds = [self.group[b].bounds() for b in alive]
         self.without, answer = yield [self._question([], []), self._question(alive, starts)]
         first = self._left(self._told(answer))
 
         def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
-            fit = fit_blocks(start, leaves, bounds, n, WALKING if self.walking else HELD, since)
-            return (yield from through(fit, lambda p: self._question(alive, p),
+            return (yield from through(self._improved(start, leaves, alive, n, since), lambda p: self._question(alive, p),
                                        lambda answer: [self._left(self._told(answer))[b] for b in alive]))
 
         solved = yield from improved(starts, [first[b] for b in alive], 1)
@@ -235,6 +233,14 @@ class Trying:
         if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
             solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
+
+    def _improved(self, start: list[Array], leaves: list[Array], which: Sequence[int], n: int, since: Sequence[Solved] = ()
+                  ) -> Asks:
+        """Steps of a fit of some of the group."""
+        bounds = [self.group[b].bounds() for b in which]
+        if not self.walking:
+            return fit_blocks(start, leaves, bounds, n, HELD, since)
+        return fit_blocks(start, leaves, bounds, n, WALKING, since, self.group[which[0]].magnitudes(start[0]))
 
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
         joint = self.joints[b]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate, Key, with_effects
 from workbench.gap.covariance import covariance_of
-from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.gap.fitting import NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question
 from workbench.gap.metrics import rms
 from workbench.gap.race import Part, Race, Signatures, Trial, Trying
@@ -26,6 +26,9 @@ SEEN_ELSEWHERE = ("zero_offset",)
 
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
+FINER, FINER_STEPS = 0.5, 3
+"""In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
+does is less than what a coarse step makes of it."""
 
 
 @dataclass(frozen=True)
@@ -172,8 +175,9 @@ class Search:
         """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
         return self.side_by_side([self.refitting(current, takes, iterations, free)])[0]
 
-    def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Part[Fit]:
-        """The same as part of something that goes on beside others."""
+    def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None,
+                  step: float = 1.0) -> Part[Fit]:
+        """The same as part of something that goes on beside others. step: in which it is fitted, in search steps."""
         moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
         moving = current.numbers(moved)
         if not len(moving):
@@ -188,15 +192,21 @@ class Search:
                 x[numbers] = there
             return x
 
+        def ask(point: Sequence[Array]) -> Question:
+            return Question(with_effects(self.nominal, current.sizes(sizes(point))), takes, step)
+
         def told(answer: dict[int, Array]) -> list[Array]:
             return [self.jury.vector(answer, "fit", joint) for joint in blocks]
 
         # several numbers share what a walk shows: a short move of one drowns
         near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
-        fit = fit_blocks([current.x[n] for n in blocks.values()], told({i: current.residuals[i] for i in takes}),
-                         [(low[n], high[n]) for n in blocks.values()], iterations, near if self.jury.walks(takes) else HELD)
-        solved = yield from through(
-            fit, lambda point: Question(with_effects(self.nominal, current.sizes(sizes(point))), takes), told)
+        magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
+        start = [current.x[n] for n in blocks.values()]
+        answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
+        bounds = [(low[n], high[n]) for n in blocks.values()]
+        fit = (fit_blocks(start, told(answer), bounds, iterations, near, magnitudes=magnitudes) if self.jury.walks(takes)
+               else fit_blocks(start, told(answer), bounds, iterations))
+        solved = yield from through(fit, ask, told)
         x = sizes([s.x for s in solved])
         covariance = np.full((len(x), len(x)), np.inf)
         bent = any(current.effects[i].effect.layer != "timing" for i in moved)
@@ -240,11 +250,13 @@ class Search:
         tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
         if not fit.slopes or not np.isfinite(fit.covariance).any():
             return self._finely(fit, self.takes, fit.x)[0]
+        before, fit = fit, self._finer(fit)
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
         told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
         takes = self.held if told_held and self.held else self.takes
         seen = self._finely(fit, takes, *([fit.x] if alone is None else _around(fit, alone)))
+        seen += [] if before is fit else self._finely(fit, takes, before.x)
         move, start = self._newton(seen[0]), fit.x.copy()
         low, high = fit.bounds()
         if alone is not None:
@@ -256,6 +268,12 @@ class Search:
                 break
         (best,) = self._finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
+
+    def _finer(self, fit: Fit) -> Fit:
+        """The fit with what walks tell fitted once more in finer steps, where that is an effect of several numbers."""
+        if not any(c.size > 1 and not self.is_settled(c) for c in fit.effects) or not self.grounded(self.fitted):
+            return fit
+        return self.side_by_side([self.refitting(fit, self.fitted, FINER_STEPS, step=FINER)])[0]
 
     def _newton(self, seen: Fit) -> Array:
         """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
