@@ -63,3 +63,13 @@ def test_where_along_its_axis_a_mass_swings_is_not_known(rod):
     blind = estimates(c, x, np.diag([np.inf, 0.01, 0.01]))
     assert np.isinf(blind["mass"].high)
     assert np.isinf(blind["position"].high).sum() == 2
+
+
+def test_how_high_a_load_sits_is_told_by_moves_as_long_as_its_arm(rod):
+    """A height near nothing is moved by as much as what lies ahead, not by a share of itself."""
+    c = payload(rod, held=False)
+    mass, ahead, left, up = c.magnitudes(np.array([4.0, -12.0, 9.0, 0.1]))
+    assert (mass, ahead, left) == (4.0, 12.0, 9.0)
+    assert up == pytest.approx(0.5 * np.linalg.norm([12.0, 9.0, 0.1]))
+    alone = payload(rod, held=True).magnitudes(np.array([0.1, 0.2, 2.0]))
+    assert alone == pytest.approx([0.3, 0.5 * np.linalg.norm([0.2, 2.0]), 2.0])  # how far away it is is no part of the moments

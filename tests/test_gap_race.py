@@ -11,7 +11,7 @@ from workbench.effects.registry import known_effects
 from workbench.gap.asked import _when_held
 from workbench.gap.candidate import Candidate
 from workbench.gap.covariance import _scattered
-from workbench.gap.fitting import Solved, fit_blocks, lowest, together
+from workbench.gap.fitting import WALKING, Solved, fit_blocks, lowest, together
 from workbench.gap.guess import guess, scan
 from workbench.gap.jury import STRETCHES, Jury, Question
 from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
@@ -325,3 +325,19 @@ def test_one_number_looks_far_before_it_settles_on_a_little():
     fit = fit_blocks([np.array([1.0])], [left([1.0])], [(np.array([0.0]), np.array([9.0]))], 4, 0.08)
     (solved,) = together({0: fit}, lambda wanted: [[left(list(p)) for p in point] for _, point in wanted])[0]
     assert solved.x[0] == pytest.approx(1.4, abs=0.05)
+
+
+def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
+    """What a walk leaves answers moves of a tenth with noise, of the size of the vector with what the number does."""
+    def left(x: np.ndarray) -> np.ndarray:
+        noise = 0.3 * np.sin(40.0 * x[1])
+        return np.array([x[0] - 10.0, 0.2 * (x[1] - 6.0) + noise, 3.0])
+
+    def ends(magnitudes: np.ndarray | None) -> np.ndarray:
+        start = np.array([9.0, 0.05])
+        fit = fit_blocks([start], [left(start)], [(np.full(2, -99.0), np.full(2, 99.0))], 4, WALKING, magnitudes=magnitudes)
+        (solved,) = together({0: fit}, lambda wanted: [[left(p) for p in point] for _, point in wanted])[0]
+        return solved.x
+
+    assert ends(np.array([9.0, 9.0])) == pytest.approx([10.0, 6.0], abs=1.5)
+    assert abs(ends(None)[1] - 6.0) > 1.5
