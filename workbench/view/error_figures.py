@@ -25,7 +25,7 @@ def joint_errors(
     root of noise² + floor² is orange: there is something left to explain.
     """
     order = by_error(channels, {joint: channel.over_noise for joint, channel in channels.items()})
-    figure = new_figure(9, 0.34 * len(order) + 1.6)
+    figure = new_figure(9, 0.34 * len(order) + 2.1)
     axes = figure.subplots()
     for row, joint in enumerate(order):
         _row(axes, row, channels[joint], scale, limit)
@@ -42,7 +42,7 @@ def joint_errors(
     axes.grid(False, axis="y")
     axes.set_xlabel(f"RMS error after the first command [{unit}]")
     axes.set_title("error of each joint, the largest over noise first")
-    axes.legend(loc="lower right")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
