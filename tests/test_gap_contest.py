@@ -10,7 +10,8 @@ from tests.test_gap_search import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import WALKS_SAY, Rival, Standing, _better_held, _misfit, _told, _twin, contest
+from workbench.gap.contest import TEMPER, WALKS_SAY, Rival, Standing, _better_held, _misfit, _temper, _told, _twin, contest
+from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.doubts import doubted
 from workbench.gap.jury import Jury
 from workbench.gap.point_mass import PointMass
@@ -133,6 +134,18 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
     search = SimpleNamespace(fitted=(0,), jury=SimpleNamespace(expected=lambda takes, use: 100.0))
     assert _misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
     assert _misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0
+
+
+def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
+    """A cable hangs on another joint of a robot whose joint's names are contested with the base held."""
+    left = {None: 40000.0, "knee": 130.0}
+    jury = SimpleNamespace(expected=lambda takes, use: 100.0, walks=lambda takes: True,
+                           by_channel=lambda residuals, use, joint: (np.array([left[joint]]), np.array([100.0])))
+    search = SimpleNamespace(fitted=(0, 1), held=(0,), jury=jury, is_settled=lambda c: False)
+    fit = SimpleNamespace(cost={"choose": left[None]}, residuals={0: None, 1: None})
+    knee, whole = SimpleNamespace(joint="knee", gain={"choose": 100.0}), SimpleNamespace(joint=None, gain={"choose": 100.0})
+    assert _temper(search, fit, None, knee) == pytest.approx(1.3 * TEMPER)
+    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * TEMPER_WALKING)
 
 
 def test_twins_name_each_other():

@@ -29,8 +29,10 @@ NEAR, NEAR_HELD = 400.0, 0.05
 """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one that is
 this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
 BETTER = 30.0
-"""Of the same: a rival that does better by this much takes an effect's place; by more where the fit leaves more than a right
-model does."""
+"""Of the same: a twin that held takes find worse by this much is none; by more where the fit leaves more than a right model
+does."""
+LIKELIER = 0.5
+"""A rival whose lead is this share of what leads are divided by is a fourth likelier, and takes an effect's place."""
 NUMBER, NUMBER_SHARE = 40.0, 0.03
 """What each number that a name has more than another must bring, of the same: TEMPER times the logarithm of how many frames speak
 (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a model,
@@ -81,11 +83,12 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         put = iter(search.side_by_side([_put(search, fit, i, t) for i, there in enumerate(near) for t in there],
                                        partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
         rivals = [[next(put) for _ in there] for there in near]
-        challengers = [(_lead(search, fit, r, seats[c.key][1]), r, c) for c, there in zip(fit.effects, rivals) for r in there]
+        challengers = [(_lead(search, fit, r, seats[c.key][1]) / _temper(search, fit, c, seats[c.key][1]), r, c)
+                       for c, there in zip(fit.effects, rivals) for r in there]
         if turn == len(fit.effects) or not challengers:
             break
         lead, best, replaced = max(challengers, key=lambda challenger: challenger[0])
-        if lead < BETTER * _misfit(search, fit):
+        if lead < LIKELIER:
             break
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
@@ -97,9 +100,8 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
 
 def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
     taken = seats[fit.effects[i].key][1]
-    walked = taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(fit.effects[i])
-    temper = max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) if walked else TEMPER
-    temper *= _misfit(search, fit)
+    walked = _walked(search, fit.effects[i], taken)
+    temper = _temper(search, fit, fit.effects[i], taken)
     leads = np.array([0.0, *(_lead(search, fit, r, taken) for r in rivals)])
     twins = np.array([False, *(walked and _twin(search, fit, i, r) for r in rivals)])
     weight = np.maximum(np.exp(0.5 * (leads - leads.max()) / temper), np.where(twins, TWIN, 0.0))
@@ -118,10 +120,26 @@ def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
     return -_better(search, fit, rival, search.held) < BETTER * _misfit(search, fit)
 
 
-def _misfit(search: Search, fit: Fit) -> float:
+def _walked(search: Search, c: Candidate, taken: Trial) -> bool:
+    """Whether walks tell an effect."""
+    return taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(c)
+
+
+def _temper(search: Search, fit: Fit, c: Candidate, taken: Trial) -> float:
+    """What leads of an effect's rivals are divided by when they become probabilities."""
+    if _walked(search, c, taken):
+        return max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) * _misfit(search, fit)
+    return TEMPER * _misfit(search, fit, taken.joint)
+
+
+def _misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
     """What a fit leaves on the choosing stretches in shares of what a right model does, at least 1: by how much more than noise
-    alone would have them chi squared differences are left to chance."""
-    return max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
+    alone would have them chi squared differences are left to chance. joint: that was judged alone with the base held, and does
+    not feel what goes wrong elsewhere."""
+    if joint is None:
+        return max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
+    left, expected = search.jury.by_channel({i: fit.residuals[i] for i in search.held}, "choose", joint)
+    return max(1.0, float(left.sum()) / max(1.0, float(expected.sum())))
 
 
 def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
