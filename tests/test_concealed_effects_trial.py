@@ -155,6 +155,11 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
     assert "| effects named, exactly or as one of a tie of two | at least 90 % | 33 % (1 of 3;" in text
     keep(whole, tmp_path / "trial.json", readme)
     assert readme.read_text() == text
+    assert "changed during the trial" not in text
+    later = [s | {"code": "later"} for s in whole["sessions"][2:]]
+    changed = section(whole | {"sessions": [*whole["sessions"][:2], *later]}).replace("\n", " ")
+    assert "**The workbench changed during the trial**: 2 sessions by" in changed
+    assert "3 sessions by later, which named" in changed
     (tmp_path / "elsewhere.md").write_text("nothing")
     with pytest.raises(ValueError, match="expected the lines"):
         keep(whole, tmp_path / "trial.json", tmp_path / "elsewhere.md")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from studies.concealed_effects.score import Score
+from studies.concealed_effects.summary import bounds
 from workbench.robot.files import read_text, write_whole
 
 RESULTS = Path(__file__).parent / "results" / "trial.json"
@@ -65,9 +67,26 @@ def section(result: Mapping[str, Any] | None) -> str:
                  f"most {result['memory']['most'] / 1e9:.1f} GB. ")
     if result["gap_closed"] is not None:
         said += f"The models close {100 * result['gap_closed']:.0f} % of the gap on unseen takes (median). "
+    said += _by_version([Score.from_json(s) for s in result["sessions"]])
     drawn = "the operating system" if result["seed_drawn_by"] == "os.urandom" else "hand: this is no trial"
     said += f"Seed drawn by {drawn}; seal {result['sha256_of_all'][:16]}. Every session: concealed_effects/results/trial.json."
     return "\n".join([*rows, "", *_wrapped(said)]) + "\n"
+
+
+def _by_version(scores: Sequence[Score]) -> str:
+    """What each version of the workbench named, where it was changed on the way."""
+    versions = list(dict.fromkeys(s.code for s in scores))
+    if len(versions) < 2:
+        return ""
+    said = []
+    for code in versions:
+        own = [s for s in scores if s.code == code]
+        effects = [e for s in own for e in s.effects]
+        hits = sum(e.named for e in effects)
+        low, high = bounds(hits, len(effects))
+        said.append(f"{len(own)} sessions by {code}, which named {hits} of {len(effects)} effects "
+                    f"(95 % interval {100 * low:.0f} to {100 * high:.0f} %)")
+    return f"**The workbench changed during the trial**: {'; '.join(said)}. "
 
 
 def _wrapped(text: str, width: int = 125) -> list[str]:
