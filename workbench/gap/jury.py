@@ -140,15 +140,11 @@ class Jury:
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
 
-    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
-               since: dict[int, Array] | None = None, share: float = 0.0) -> float:
-        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing.
-        since, share: what others brought from there to `before` may err by this share of it, which is no gap to be closed."""
+    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
         cost, expected = self.by_channel(before, use, joint)
         left, _ = self.by_channel(after, use, joint)
         most = self._without_gap(before, cost, expected, joint)
-        if since is not None:
-            most = most + share * np.maximum(self.by_channel(since, use, joint)[0] - cost, 0.0)
         ill = cost > most
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 

@@ -105,9 +105,8 @@ def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, n
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on held takes alone, where they told it; beyond what effects taken before it may err by."""
+    that was judged or stood out; on held takes alone, where they told it."""
     outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
     takes = search.held if search.is_settled(t.candidate) else search.fitted
-    nominal, before, after = ({i: fit.residuals[i] for i in takes} for fit in (search.evaluated([]), r.before, now))
-    share = ROUGH_SHARE if search.jury.walks(takes) else LEAST_SHARE
-    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint, nominal, share)
+    before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
+    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint)
