@@ -59,7 +59,7 @@ def reliability_figure(bins: Sequence[Bin]) -> Figure:
         axes.plot(b.confidence, b.true / b.findings, "o", color=colour, markersize=8)
     axes.set_ylim(-0.03, 1.03)
     axes.set_ylabel("share that is true")
-    axes.legend(loc="upper left")
+    axes.legend(loc="lower right")
     below.bar([b.confidence for b in bins], [b.findings for b in bins], width=0.02, color=SIMULATED)
     for b in bins:
         below.text(b.confidence, b.findings, f" {b.findings}", ha="center", va="bottom", fontsize=10)
