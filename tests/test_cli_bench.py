@@ -9,7 +9,7 @@ import pytest
 
 from tests.command import refused, succeeds
 from workbench.gap.bench.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
-from workbench.gap.bench.diagnose_time import RACE, READING, SCAN, Stages, diagnose_time
+from workbench.gap.bench.diagnose_time import RACE, READING, Stages, diagnose_time
 from workbench.gap.bench.sysid import fit_against_mujoco_sysid
 from workbench.gap.registered import read_takes
 from workbench.motion import load_motion
@@ -145,7 +145,7 @@ def test_stages_sum_up_what_is_said() -> None:
     for what, done in (("reading recordings", None), ("explaining two (1)", 0.0), ("explaining two (1)", 0.0),
                        ("explaining two (1)", 0.5), ("explaining two (1)", 0.0), ("rivals of a", 0.0), ("coulomb or load", 0.1)):
         stages(what, done)
-    assert stages.ended() == {READING: 3.0, SCAN: 3.0 + 6.0, RACE: 4.0 + 5.0, "rivals": 7.0, "next experiment": 8.0}
+    assert stages.ended() == {READING: 3.0, RACE: 3.0 + 4.0 + 5.0 + 6.0, "rivals": 7.0, "next experiment": 8.0}
 
 
 def test_a_diagnosis_is_not_for_the_quick_form() -> None:

@@ -21,12 +21,11 @@ from workbench.simulation.bench.figure import Figure
 
 NAME = "diagnose_time"
 MEANING = "processor seconds of one diagnosis on one process: an arm of three joints, one log, one joint with more dry friction"
-READING = "reading, registering, floors of the nominal robot"
+READING, RACE = "reading, registering, floors of the nominal robot", "race, and all chosen fitted together"
+EXPERIMENT = "next experiment"
 STAGES = (("reading", READING), ("simulating", READING), ("registering", READING), ("fitting together", "fits together"),
-          ("rivals", "rivals"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))
+          ("explaining", RACE), ("rivals", "rivals"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))
 """How what `diagnose_session` says begins, and the stage that this is."""
-SCAN, RACE, EXPERIMENT = "race: scan", "race: fits, and all chosen fitted together", "next experiment"
-EXPLAINING = "explaining"
 REPEATS = 3
 
 
@@ -36,25 +35,17 @@ class Stages:
     def __init__(self, clock: Callable[[], float] = time.process_time) -> None:
         self.seconds: dict[str, float] = {}
         self._clock, self._since = clock, clock()
-        self._stage, self._said, self._turn, self._done = READING, "", 0, 0.0
+        self._stage = READING
 
     def __call__(self, what: str, done: float | None = None) -> None:
         """Something new begins, or goes on."""
         self._close()
-        done = 0.0 if done is None else done
-        self._turn = self._turn + 1 if what == self._said and done >= self._done else 0
-        self._said, self._done = what, done
-        self._stage = self._of(what)
+        self._stage = next((stage for begins, stage in STAGES if what.startswith(begins)), EXPERIMENT)
 
     def ended(self) -> dict[str, float]:
         """Seconds by stage, in the order in which they began."""
         self._close()
         return self.seconds
-
-    def _of(self, what: str) -> str:
-        if what.startswith(EXPLAINING):  # a race's first rollouts only look; it begins anew with every set of candidates
-            return RACE if self._turn else SCAN
-        return next((stage for begins, stage in STAGES if what.startswith(begins)), EXPERIMENT)
 
     def _close(self) -> None:
         now = self._clock()
