@@ -159,7 +159,7 @@ class Trying:
             return [self.jury.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
-        (solved,) = yield from through(self._improved([x], tell(answer), [0], STEPS_WALKING), ask, tell)
+        (solved,) = yield from through(self._stepping([x], tell(answer), [0], STEPS_WALKING), ask, tell)
         return solved.x
 
     def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
@@ -223,7 +223,7 @@ class Trying:
         first = self._left(self._told(answer))
 
         def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
-            return (yield from through(self._improved(start, leaves, alive, n, since), lambda p: self._question(alive, p),
+            return (yield from through(self._stepping(start, leaves, alive, n, since), lambda p: self._question(alive, p),
                                        lambda answer: [self._left(self._told(answer))[b] for b in alive]))
 
         solved = yield from improved(starts, [first[b] for b in alive], 1)
@@ -234,9 +234,9 @@ class Trying:
             solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
 
-    def _improved(self, start: list[Array], leaves: list[Array], which: Sequence[int], n: int, since: Sequence[Solved] = ()
+    def _stepping(self, start: list[Array], leaves: list[Array], which: Sequence[int], n: int, since: Sequence[Solved] = ()
                   ) -> Asks:
-        """Steps of a fit of some of the group."""
+        """n steps of a fit of some of the group, at the strides that these takes need."""
         bounds = [self.group[b].bounds() for b in which]
         if not self.walking:
             return fit_blocks(start, leaves, bounds, n, HELD, since)

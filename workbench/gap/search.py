@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate, Key, with_effects
 from workbench.gap.covariance import covariance_of
-from workbench.gap.fitting import NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.gap.fitting import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
 from workbench.gap.jury import FINE, Jury, Question
 from workbench.gap.metrics import rms
 from workbench.gap.race import Part, Race, Signatures, Trial, Trying
@@ -203,9 +203,9 @@ class Search:
         magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
         start = [current.x[n] for n in blocks.values()]
         answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
+        stride, least = (near, magnitudes) if self.jury.walks(takes) else (HELD, None)
         bounds = [(low[n], high[n]) for n in blocks.values()]
-        fit = (fit_blocks(start, told(answer), bounds, iterations, near, magnitudes=magnitudes) if self.jury.walks(takes)
-               else fit_blocks(start, told(answer), bounds, iterations))
+        fit = fit_blocks(start, told(answer), bounds, iterations, stride, magnitudes=least)
         solved = yield from through(fit, ask, told)
         x = sizes([s.x for s in solved])
         covariance = np.full((len(x), len(x)), np.inf)
@@ -255,8 +255,8 @@ class Search:
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
         told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
         takes = self.held if told_held and self.held else self.takes
-        seen = self._finely(fit, takes, *([fit.x] if alone is None else _around(fit, alone)))
-        seen += [] if before is fit else self._finely(fit, takes, before.x)
+        points = [fit.x] if alone is None else _around(fit, alone)
+        seen = self._finely(fit, takes, *points, *([] if before is fit else [before.x]))
         move, start = self._newton(seen[0]), fit.x.copy()
         low, high = fit.bounds()
         if alone is not None:
