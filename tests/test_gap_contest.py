@@ -58,6 +58,18 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
     assert doubted(search, far, standings, {0: 100 + floors[0]}) == standings  # all below the fit's own floor
 
 
+@pytest.mark.parametrize(("ill", "sure"), [(("one",), 0.9), (("one", "three"), 0.36)])
+def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill, sure):
+    _, search = worn
+    fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+    fit = replace(search.evaluated([(fade, np.array([1.0]))]), covariance=np.full((1, 1), np.inf))
+    e = search.jury.evidence[0]
+    residual = np.zeros_like(fit.residuals[0])
+    residual[:, [e.channels.index(j) for j in ill]] = 4.0
+    standing = doubted(search, replace(fit, residuals={0: residual}), [Standing(0.9, ())], {0: np.zeros(len(e.channels))})[0]
+    assert standing.probability == pytest.approx(sure)
+
+
 @pytest.mark.parametrize(("friction", "sure"), [(1.12, 0.45), (0.88, 0.45), (0.7, 0.9), (1.3, 0.9)])
 def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(worn, friction, sure):
     _, search = worn

@@ -20,7 +20,7 @@ from workbench.gap.ledger import layer_of, ledger
 from workbench.gap.point_mass import PointMass, SwungMass
 from workbench.gap.race import Trial
 from workbench.gap.registered import read_takes, register_takes
-from workbench.gap.rounds import Round
+from workbench.gap.rounds import Round, before_rough, taken
 from workbench.gap.search import Search
 from workbench.gap.session import load_session
 from workbench.simulation import SimulationConfig
@@ -436,3 +436,30 @@ def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
         r = Round(fit, (), ())
         assert worth.completed(search, r, Trial(c, np.ones(1), {}, None), fit) == 1.0
+
+
+def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_not_others(monkeypatch):
+    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
+
+    def of(name, joint):
+        return Candidate.of(known_effects()[name], (joint,), (0.0,) * len(known_effects()[name].parameters))
+
+    own_effect, other = of("coulomb_friction", "two"), of("backlash", "three")
+    fit = SimpleNamespace(residuals={0: np.ones(1)}, effects=(own_effect, other))
+    trial = Trial(own_effect, np.ones(1), {}, None)
+    for own, elsewhere, share in ((1.0, 0.6, 0.8), (0.0, 0.6, 0.6), (0.2, 0.6, 0.6)):  # a zero shows in other joints alone
+        shares = {("two", ()): own, (None, ()): 0.2, (None, ("three",)): elsewhere}
+        jury = SimpleNamespace(closed=lambda before, after, use, joint=None, without=(), of=shares: of[joint, tuple(without)])
+        search = SimpleNamespace(held=(), fitted=(0,), is_settled=lambda _: False, jury=jury)
+        assert worth.completed(search, Round(fit, (), ()), trial, fit) == pytest.approx(share)
+
+
+def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
+    def accepted(name, *where):
+        return (Trial(Candidate.of(known_effects()[name], where, (0.0,)), np.ones(1), {}, None),)
+
+    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), SimpleNamespace()
+    rounds = [Round("nominal", (), clock), Round("nominal", (), frame)]
+    assert before_rough(rounds, now) is now
+    assert before_rough([*rounds, Round("seen rightly", (), sag)], now) == "seen rightly"
+    assert taken([*rounds, Round("seen rightly", (), sag)]) == [*sag]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.gap.asked import FEW
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import joint_of
 from workbench.gap.contest import LEAST, Standing
@@ -40,8 +41,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
     out, theirs = [], {c.joint for c in fit.effects}
     for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
         told_held = search.is_settled(c) or search.held == search.fitted
-        own = [r for channel, r in left if joint_of(channel) == c.joint or (c.joint is None and joint_of(channel) not in theirs)]
-        worst = max((r for r in own if told_held and r == r), default=0.0)
+        worst = _left_at(c, left, theirs) if told_held else 0.0
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
         if c.read_off and c.effect.free_play:
             factor = max(factor, RATTLES)
@@ -50,6 +50,18 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         factor *= HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
+
+
+def _left_at(c: Candidate, left: Sequence[tuple[str, float]], theirs: Collection[str | None]) -> float:
+    """The most that is left, of ratios by channel, at an effect's place; of the whole robot one joint may err for itself."""
+    by_joint: dict[str, float] = {}
+    for channel, r in left:
+        joint = joint_of(channel)
+        if r == r and (joint == c.joint or (c.joint is None and joint not in theirs)):
+            by_joint[joint] = max(r, by_joint.get(joint, 0.0))
+    ranked = sorted(by_joint.values(), reverse=True)
+    own = not c.where and len(ranked) > FEW
+    return ranked[1] if own else max(ranked, default=0.0)
 
 
 def _hardly_another_floor(c: Candidate, x: Array) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.registry import known_effects
+from workbench.gap.channels import joint_of
 from workbench.gap.evidence import BLOCK, TakeEvidence
 from workbench.gap.ledger import GAP_RATIO, channel_gaps
 from workbench.recording.take import Take
@@ -140,12 +141,15 @@ class Jury:
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
 
-    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None) -> float:
-        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing."""
+    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
+               without: Collection[str] = ()) -> float:
+        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing.
+        without: joints whose channels do not count."""
         cost, expected = self.by_channel(before, use, joint)
         left, _ = self.by_channel(after, use, joint)
         most = self._without_gap(before, cost, expected, joint)
-        ill = cost > most
+        names = [self.evidence[i].channels[k] for i in sorted(before) for k in self.evidence[i].columns(joint)]
+        ill = (cost > most) & ~np.isin([joint_of(c) for c in names], list(without))
         return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
 
     def stretches(self, takes: Sequence[int], use: str, joint: str | None = None) -> NDArray[np.int_]:

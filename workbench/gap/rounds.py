@@ -45,15 +45,17 @@ class Chosen:
 
 
 def taken(rounds: Sequence[Round]) -> list[Trial]:
-    """What was taken of physics; engines do not differ in how cameras saw the robot, nor in when commands came."""
-    return [t for r in rounds for t in r.accepted if t.candidate.effect.layer != "measurement" and not _of_when(t)]
+    """What was taken of physics."""
+    return [t for r in rounds for t in r.accepted if not _exact(t)]
 
 
 def before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
-    """What there was before the first effect whose hundredths engines play differently: when commands come they do not."""
-    return next((r.before for r in rounds if not all(map(_of_when, r.accepted))), current)
+    """What there was before the first effect whose hundredths engines play differently."""
+    return next((r.before for r in rounds if not all(map(_exact, r.accepted))), current)
 
 
-def _of_when(t: Trial) -> bool:
-    """Whether it is about when commands come; other speeds, which no number says, make another motion."""
-    return t.candidate.effect.layer == "timing" and t.candidate.size > 0
+def _exact(t: Trial) -> bool:
+    """Whether engines do not differ in it: in how cameras saw the robot, or when commands come; other speeds, which no number
+    says, make another motion."""
+    layer = t.candidate.effect.layer
+    return layer == "measurement" or (layer == "timing" and t.candidate.size > 0)

@@ -105,8 +105,14 @@ def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, n
 
 def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on held takes alone, where they told it."""
-    outstanding = t.candidate.joint in standing_out(search, r.before, search.fitted)
+    that was judged or stood out; on held takes alone, where they told it. Of a joint that walks tell, its own gap, if it has
+    one, counts as much as all that follows from it, and not what is left to the effects of others."""
+    joint = t.candidate.joint
+    outstanding = joint in standing_out(search, r.before, search.fitted)
     takes = search.held if search.is_settled(t.candidate) else search.fitted
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
-    return search.jury.closed(before, after, "choose", t.candidate.joint if outstanding else t.joint)
+    if t.joint is not None or joint is None or outstanding:
+        return search.jury.closed(before, after, "choose", joint if outstanding else t.joint)
+    others = {c.joint for c in now.effects if c.joint is not None} - {joint}
+    everywhere = search.jury.closed(before, after, "choose", without=others)
+    return max(everywhere, (everywhere + search.jury.closed(before, after, "choose", joint)) / 2)
