@@ -81,6 +81,14 @@ def test_defaults_are_the_puppy_and_the_thesis_names(tmp_path):
     assert session.takes[0].commands(session.model) is None
 
 
+def test_a_folder_stands_for_the_session_in_it(tmp_path):
+    path = write_session(tmp_path)
+    assert load_session(tmp_path).path == path
+    path.unlink()
+    with pytest.raises(InputError, match="holds no session.yaml"):
+        load_session(tmp_path)
+
+
 def test_base_left_out_follows_the_model(tmp_path):
     content = changed(takes__0__base=MISSING, robot__base=MISSING)
     session = load_session(write_session(tmp_path, content))

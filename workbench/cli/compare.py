@@ -17,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "other, and writes comparison.json and report.html: error of each joint and of the body's path, with the recording's "
         "noise, the simulation's numerical floor and the spread between contact models.",
     )
-    parser.add_argument("a", metavar="SESSION|A", help="session.yaml; or a recording, motion or rollout")
+    parser.add_argument("a", metavar="SESSION|A", help="session.yaml or its folder; or a recording, motion or rollout")
     parser.add_argument("b", metavar="B", nargs="?", help="what to compare A with: a recording, motion or rollout")
     add_model(parser, "the session's own; of two files, the bundled puppy")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")

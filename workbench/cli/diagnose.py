@@ -17,7 +17,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "likely, keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, "
         "the session's predictions and report.html. A run that was stopped goes on where it was.",
     )
-    parser.add_argument("session", metavar="SESSION", help="session.yaml")
+    parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     parser.add_argument("--thorough", action="store_true",

@@ -16,7 +16,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         description="Plays each entry of the session's `predict` on a fitted model and writes NAME.csv: a Motive CSV as the "
         "cameras of the entry's start file would see it, or for `commands` a joint log with their times.",
     )
-    parser.add_argument("session", metavar="SESSION", help="session.yaml")
+    parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     parser.add_argument("--model", metavar="M.yaml", help="fitted model (default: the session's own, with nothing added)")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
     add_out(parser)

@@ -77,14 +77,16 @@ class Session:
 
 
 def load_session(path: str | Path) -> Session:
-    """Reads `session.yaml`.
+    """Reads `session.yaml`, or of a folder the one in it.
 
     InputError names the file, the key and what was expected: an unknown key anywhere, a missing file, a wrong type, a
     joint or link that the model lacks, a base that cannot float where a take says free, a motion that cannot be played.
     """
     path = Path(path)
     if path.is_dir():
-        raise InputError(path, "expected a session file, this is a folder")
+        if not (path / "session.yaml").exists():
+            raise InputError(path, "expected a session file; this folder holds no session.yaml")
+        path /= "session.yaml"
     top = Fields(path, read_yaml(path))
     if top.raw("format") != 1:
         raise top.error("format", "expected 1")
