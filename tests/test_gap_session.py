@@ -85,7 +85,7 @@ def test_a_folder_stands_for_the_session_in_it(tmp_path):
     path = write_session(tmp_path)
     assert load_session(tmp_path).path == path
     path.unlink()
-    with pytest.raises(InputError, match="holds no session.yaml"):
+    with pytest.raises(InputError, match=r"no session\.yaml"):
         load_session(tmp_path)
 
 
