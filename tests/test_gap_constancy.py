@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.test_gap_search import CONFIG, worn  # noqa: F401
+from tests.gap_worn import CONFIG
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.constancy import drifts
@@ -14,7 +14,7 @@ from workbench.simulation.batch import run_job
 
 
 @pytest.fixture
-def friction(worn):  # noqa: F811
+def friction(worn):
     effect = known_effects()["coulomb_friction"]
     return Candidate.of(effect, ("three",), effect.neutral(worn[0].model))
 
@@ -23,12 +23,12 @@ def fitted(search, friction):
     return search.refitted(search.evaluated([(friction, np.ones(friction.size))]), search.held, 4)
 
 
-def test_friction_that_stays_shows_no_drift(worn, friction):  # noqa: F811
+def test_friction_that_stays_shows_no_drift(worn, friction):
     search = worn[1]
     assert drifts(search, fitted(search, friction)) == []
 
 
-def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):  # noqa: F811
+def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     session, search, _ = worn
     e = search.jury.evidence[0]
 

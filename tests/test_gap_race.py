@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.test_gap_search import CONFIG, gathered
+from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.gap.asked import _when_held
 from workbench.gap.candidate import Candidate

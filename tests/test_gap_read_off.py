@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import record_arm
-from tests.test_gap_search import CONFIG
+from tests.gap_worn import CONFIG
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
 from workbench.gap.anew import Played, read_anew

@@ -1,0 +1,108 @@
+"""Which effects are asked about, where, on which takes and in which order."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from workbench.effects.registry import known_effects
+from workbench.gap import asked, selection
+from workbench.gap.candidate import Candidate
+from workbench.gap.candidates import candidates
+from workbench.gap.channels import ACROSS
+from workbench.gap.race import Trial
+from workbench.gap.search import Search
+
+
+@pytest.mark.parametrize(("gaps", "expected"), [
+    ({"one": 6.7, "two": 2.6, "pitch": 1.5}, {"one"}),
+    ({"one": 6.7, "two": 4.0}, set()),
+    ({"one": 6.7, "pitch": 5.0}, set()),
+    ({"pitch": 6.7, "one": 2.0}, set()),
+    ({"one across x": 6.7, "two": 2.0}, {"one"}),
+    ({}, set()),
+])
+def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatch, gaps, expected):
+    named = {c.replace(" across ", ACROSS): s for c, s in gaps.items()}
+    monkeypatch.setattr(asked, "channel_gaps", lambda e, residual: named)
+    search = SimpleNamespace(grounded=lambda takes: takes, jury=SimpleNamespace(evidence=[None]),
+                             nominal=SimpleNamespace(joints=("one", "two")))
+    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
+    search.grounded = lambda takes: ()
+    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
+
+
+@pytest.mark.parametrize(("base", "tier", "said"), [("fixed", 2, False), ("free", 2, False), ("free", 5, True)])
+def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
+    """What a hand carries looks like a weak shoulder."""
+    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"), grounded=lambda takes: ())
+    shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
+    for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
+        trial = Trial(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
+        assert selection._says_it(search, None, trial, (0,), tier) is enough
+
+
+@pytest.mark.parametrize(("spring", "stop", "chosen"), [(5.6e7, 3.9e7, ["joint_stop"]), (5.6e7, 2.0e7, ["parallel_spring"]),
+                                                        (3.0e7, 3.9e7, ["joint_stop"])])
+def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it(spring, stop, chosen):
+    """Beside a load and a weak elbow a spring closed more of a shoulder's gap than the stop at which all recordings end."""
+    known = known_effects()
+    at_stop = Candidate.of(known["joint_stop"], ("one",), (-180.0, 57.0), (-180.0, 6.0), (True, False))
+    stiff = Candidate.of(known["parallel_spring"], ("one",), (0.0,))
+    trials = [Trial(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))]
+    choices = selection._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
+    assert [[t.candidate.name for t in c] for c in choices] == [chosen]
+
+
+def test_beside_a_pull_no_tilt_is_asked(worn):
+    _, search, nominal = worn
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
+    pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
+    for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
+        asked_of = [asked.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.held, tier)[0]
+                    for tier in range(asked.TIERS)]
+        assert [g for g in asked_of if g] == groups
+
+
+def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while_held(worn, monkeypatch):
+    """A stop may lie beyond what was moved then, and gravity may have left a loose mount on one side."""
+    _, search, nominal = worn
+    well = next(iter(asked._when_held(search, nominal)[0]))
+    monkeypatch.setattr(search, "grounded", lambda takes: takes)
+    mount = Candidate.of(known_effects()["loose_mount"], (well,), (0.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0),
+                         (False, True, True, True))
+    band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
+    groups = [g for tier in range(asked.TIERS)
+              for g in asked.asked(search, [mount, band], nominal, {well: 3.0}, search.held, tier)[0]]
+    assert groups == [[mount]]
+
+
+def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn):
+    session, search, nominal = worn
+    pool = candidates(session.model, search.jury.evidence)
+
+    def asked_of(*joints):
+        return [[c for g in asked.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
+                for tier in range(asked.TIERS)]
+
+    of_all, at_joints, *others = asked_of("one", "two", "three")[1:]
+    assert {c.name for c in of_all} >= {"supply_voltage", "timing_drift"}
+    assert all(not c.where for c in of_all)
+    assert {c.joint for c in at_joints} == {"one", "two", "three"}
+    assert all(c.joint is None and c.where for tier in others for c in tier)
+    of_all, at_joints, *_ = asked_of("two", "three")[1:]
+    assert not of_all
+    assert {c.joint for c in at_joints} == {None, "two", "three"}
+
+
+@pytest.mark.parametrize("zeroed", [True, False])
+def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(worn, zeroed):
+    session, search, nominal = worn
+    e = search.jury.evidence[0]
+    seen = replace(e, take=replace(e.take, recorded=replace(e.take.recorded, zeroed=zeroed)))
+    search = Search(search.jury.on([seen]), session.model)
+    pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
+    groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
+    assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])

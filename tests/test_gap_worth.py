@@ -1,0 +1,148 @@
+"""Whether enough is left for another effect, and whether an effect brings enough."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from workbench.effects.registry import known_effects
+from workbench.gap import worth
+from workbench.gap.candidate import Candidate
+from workbench.gap.candidates import candidates
+from workbench.gap.race import Trial
+from workbench.gap.rounds import Round, before_rough, taken
+from workbench.gap.search import Search
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing_elsewhere(worn, monkeypatch, walks):
+    session, whole, nominal = worn
+    monkeypatch.setattr(whole.jury, "walks", lambda takes: walks)
+    search = Search(whole.jury, session.model)
+    taken = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
+    names = whole.jury.evidence[0].channels
+    n = names.index("three")
+    residual = nominal.residuals[0].copy()
+    residual[:, n] *= 30
+    before = replace(nominal, residuals={0: residual})
+    search.settled = replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals)
+    first = Round(before, (), (Trial(taken, np.array([2.6]), {"fit": 1e6, "choose": 1e6}, "three"),))
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+
+    def trial(channel):
+        gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
+        return Trial(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
+
+    assert worth.worthwhile(search, trial("two"), (0,), [first], search.settled)
+    assert not worth.worthwhile(search, trial("three"), (0,), [first], search.settled)
+
+
+def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+
+    def fit(**sizes):
+        left = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            left[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: left})
+
+    first = Round(fit(three=100.0), (), (Trial(taken, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
+    assert worth.too_little_left(search, fit(three=10.0), (0,), [first])
+    assert not worth.too_little_left(search, fit(three=40.0), (0,), [first])
+    assert not worth.too_little_left(search, fit(two=10.0), (0,), [first])
+
+
+def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+
+    def fit(**sizes):
+        left = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            left[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: left})
+
+    first = Round(fit(three=100.0, two=15.0), (), (Trial(taken, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
+    search.settled = replace(search.evaluated([(taken, np.ones(1))]), residuals=nominal.residuals)
+    monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
+    assert not worth.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert worth.too_little_left(search, fit(three=13.0), (0,), [first])
+    search.settled = None
+    assert worth.too_little_left(search, fit(two=13.0), (0,), [first])
+
+
+@pytest.mark.parametrize(("name", "left", "share"), [
+    ("backlash", {}, worth.LEAST_CLOSED), ("backlash", {"three": 2.0}, worth.LEAST_CLOSED),
+    ("backlash", {"three": 30.0}, worth.LAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
+    ("dead_band", {"three": 30.0}, worth.LAST_CLOSED)])
+def test_beside_a_joint_that_no_name_fits_an_effect_on_the_ground_has_to_be_half(worn, name, left, share):
+    session, whole, nominal = worn
+    search = Search(whole.jury, session.model)
+    names = whole.jury.evidence[0].channels
+
+    def fit(effects, **sizes):
+        there = 0.5 * np.ones_like(nominal.residuals[0])
+        for joint, size in sizes.items():
+            there[:, names.index(joint)] = size
+        return replace(nominal, residuals={0: there}, effects=effects)
+
+    given = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == (name, ("three",)))
+    assert worth.least_closed(search, fit((), three=40.0), fit((given,), **left)) == share
+
+
+def test_what_is_well_hides_no_gap_and_closes_none(worn):
+    jury = worn[1].jury
+    e = jury.evidence[0]
+    quiet = 0.5 * np.ones_like(worn[2].residuals[0])
+    ill, better = quiet.copy(), quiet.copy()
+    ill[:, e.channels.index("two")] = 3.0
+    better[:, e.channels.index("two")] = 2.0
+    assert jury.beyond({0: quiet}, "choose") == 0
+    assert jury.closed({0: ill}, {0: quiet}, "choose") == 1
+    assert 0.4 < jury.closed({0: ill}, {0: better}, "choose") < 0.8
+    assert jury.closed({0: ill}, {0: better}, "choose", "one") == 0
+    assert jury.closed({0: quiet}, {0: ill}, "choose") == 0
+
+
+def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
+    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
+    c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
+    fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
+    for settled, looked_at in ((True, [0]), (False, [0, 1])):
+        search = SimpleNamespace(held=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, jury=SimpleNamespace(
+            closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
+        r = Round(fit, (), ())
+        assert worth.completed(search, r, Trial(c, np.ones(1), {}, None), fit) == 1.0
+
+
+def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_not_others(monkeypatch):
+    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
+
+    def of(name, joint):
+        return Candidate.of(known_effects()[name], (joint,), (0.0,) * len(known_effects()[name].parameters))
+
+    own_effect, other = of("coulomb_friction", "two"), of("backlash", "three")
+    fit = SimpleNamespace(residuals={0: np.ones(1)}, effects=(own_effect, other))
+    trial = Trial(own_effect, np.ones(1), {}, None)
+    for own, elsewhere, share in ((1.0, 0.6, 0.8), (0.0, 0.6, 0.6), (0.2, 0.6, 0.6)):  # a zero shows in other joints alone
+        shares = {("two", ()): own, (None, ()): 0.2, (None, ("three",)): elsewhere}
+        jury = SimpleNamespace(closed=lambda before, after, use, joint=None, without=(), of=shares: of[joint, tuple(without)])
+        search = SimpleNamespace(held=(), fitted=(0,), is_settled=lambda _: False, jury=jury)
+        assert worth.completed(search, Round(fit, (), ()), trial, fit) == pytest.approx(share)
+
+
+def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
+    def accepted(name, *where):
+        return (Trial(Candidate.of(known_effects()[name], where, (0.0,)), np.ones(1), {}, None),)
+
+    clock, frame, sag, now = accepted("clock_rate"), accepted("marker_frame", "A"), accepted("supply_sag"), SimpleNamespace()
+    rounds = [Round("nominal", (), clock), Round("nominal", (), frame)]
+    assert before_rough(rounds, now) is now
+    assert before_rough([*rounds, Round("seen rightly", (), sag)], now) == "seen rightly"
+    assert taken([*rounds, Round("seen rightly", (), sag)]) == [*sag]
