@@ -110,7 +110,7 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
     session, evidence = quiet
     jury = Jury(evidence, CONFIG, n_jobs=1)
     whole, brief = (r[0] for r in jury.residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)]))
-    assert jury.work == pytest.approx(evidence[0].take.recorded.time[-1] + 1.5)
+    assert jury.work == pytest.approx((evidence[0].take.recorded.time[-1] + 1.5) * jury.seconds / evidence[0].take.recorded.time[-1])
     since = evidence[0].since
     known = np.isfinite(brief).any(axis=1)
     assert since[known].max() == pytest.approx(1.5, abs=0.02)

@@ -66,6 +66,18 @@ def test_a_stop_is_read_off_where_the_joint_stands_while_the_model_goes_on(quiet
     assert found.values(np.ones(1))[1] == pytest.approx(18.0, abs=0.7)
 
 
+@pytest.mark.parametrize("upper", [18.0, 1.0])
+def test_a_stop_stays_where_the_joint_was_seen_to_end(quiet, upper):
+    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": upper}),))
+    jury = recorded_with(quiet, stopped)
+    (found,) = special(quiet[0], jury.evidence, nominal_residuals(quiet, jury))
+    least, most = sorted(found.values(x)[1] for x in found.bounds())
+    lowest = min(np.rad2deg(np.nanmin(e.recorded[:, e.joints.index("two")] + e.zero("two"))) for e in jury.evidence)
+    assert lowest < least < upper < most
+    for x in found.bounds():  # each can be built
+        jury.residuals([Question(with_effects(quiet[0], [(found, x)]), (0,))])
+
+
 def test_a_loose_mount_is_read_off_with_its_axis(quiet):
     loose = replace(quiet[0], effects=(EffectSpec("loose_mount", ("two",), {"play": 6.0, "axis": (1.0, 0.0, 0.0)}),))
     jury = recorded_with(quiet, loose)

@@ -43,6 +43,13 @@ def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
     assert not selection.select(search, pool, lambda what, share: None, thorough=True).stopped
 
 
+def test_work_is_counted_in_seconds_of_a_puppys_rollout(worn):
+    jury = worn[1].jury
+    (e,) = jury.evidence
+    assert len(e.joints) == 3
+    assert jury.seconds == pytest.approx(float(e.take.recorded.time[-1]) * 20 / 32)
+
+
 def test_only_walks_tell_what_held_takes_were_asked_before(worn):
     _, search, _ = worn
     effects = known_effects()

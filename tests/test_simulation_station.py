@@ -201,3 +201,10 @@ def test_refuses_what_it_cannot_do(puppy):
 def test_configuration_goes_through_yaml():
     config = SimulationConfig(time_step=5e-4, contact="hydroelastic")
     assert yaml_load_typed(schema=SimulationConfig, data=yaml_dump_typed(config)) == config
+
+
+def test_a_robot_that_cannot_be_built_is_named_from_another_process():
+    bad = replace(puppy_model(), effects=(EffectSpec("joint_stop", ("flm",), {"lower": 20.0, "upper": 10.0}),))
+    walk = load_motion(data_file("robotis_walk.csv"), bad).commands(1)
+    with pytest.raises(InputError, match="stop of 'flm': expected lower below upper"):
+        simulate_batch([Job(bad, SimulationConfig(base="fixed"), walk, 0.05, name=name) for name in "ab"], n_jobs=2)

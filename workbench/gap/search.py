@@ -270,8 +270,8 @@ class Search:
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
 
     def _finer(self, fit: Fit) -> Fit:
-        """The fit with what walks tell fitted once more in finer steps, where that is an effect of several numbers."""
-        if not any(c.size > 1 and not self.is_settled(c) for c in fit.effects) or not self.grounded(self.fitted):
+        """The fit with what walks tell fitted once more in finer steps, where that is more than one number."""
+        if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.grounded(self.fitted):
             return fit
         return self.side_by_side([self.refitting(fit, self.fitted, FINER_STEPS, step=FINER)])[0]
 

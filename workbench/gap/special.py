@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,8 @@ LEAST_CUT = np.deg2rad(1.5)
 """A stop is asked about where the model goes this much further than the recording ever does [rad]."""
 AT_STOP = np.deg2rad(0.6)
 """And where the recording stands this close to its end whenever the model is beyond it [rad]."""
+FURTHEST = 2.0
+"""Times what was cut off, that a stop may have cut off: it was read off."""
 LEAST_TURN = np.deg2rad(0.3)
 """A marker frame is asked about that is turned by more than this at rest [rad]."""
 
@@ -40,6 +43,7 @@ def special(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapp
 def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """A stop at either side where the recording stands at its end while the model goes on."""
     ends: dict[int, list[tuple[float, float]]] = {1: [], -1: []}
+    went: dict[int, float] = {1: -np.inf, -1: -np.inf}
     for i, e in enumerate(evidence):
         if joint not in e.joints:
             continue
@@ -53,6 +57,7 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
             if good.sum() < 20:
                 continue
             end = float(np.quantile(mean[good], 0.995))
+            went[side] = max(went[side], end + rest * side)
             beyond = good & (said * side > end + LEAST_CUT / 3)
             if float(np.max(said[good] * side)) - end > LEAST_CUT and beyond.sum() > 5 \
                     and float(np.median(end - mean[beyond])) < AT_STOP:
@@ -66,7 +71,10 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     for side, (end, reach) in found.items():
         k = 1 if side > 0 else 0
         neutral[k], typical[k], held[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
-    return [Candidate.of(stop, (joint,), neutral, typical, held)]
+    # what a joint passed is no stop, and its ends do not change sides
+    apart = sum(found[side][1] if side in found else went[side] for side in ends) / len(found)
+    furthest = min(apart - LEAST_CUT, FURTHEST * max(reach - end for end, reach in found.values()))
+    return [replace(Candidate.of(stop, (joint,), neutral, typical, held), reach=float(np.rad2deg(furthest)))]
 
 
 def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],

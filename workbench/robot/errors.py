@@ -13,3 +13,6 @@ class InputError(ValueError):
         self.source = None if source is None else str(source)
         self.problem = " ".join(str(problem).split())
         super().__init__(f"{self.source}: {self.problem}" if self.source else self.problem)
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str | None, str]]:
+        return type(self), (self.source, self.problem)  # so that it comes back whole from another process
