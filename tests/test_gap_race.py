@@ -12,7 +12,7 @@ from workbench.gap.asked import _when_held
 from workbench.gap.candidate import Candidate
 from workbench.gap.covariance import _scattered
 from workbench.gap.fitting import WALKING, Solved, fit_blocks, lowest, together
-from workbench.gap.guess import guess, scan
+from workbench.gap.guess import SCANNED, guess, scan
 from workbench.gap.jury import STRETCHES, Jury, Question
 from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
 from workbench.gap.search import Search
@@ -110,7 +110,8 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
     session, evidence = quiet
     jury = Jury(evidence, CONFIG, n_jobs=1)
     whole, brief = (r[0] for r in jury.residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)]))
-    assert jury.work == pytest.approx((evidence[0].take.recorded.time[-1] + 1.5) * jury.seconds / evidence[0].take.recorded.time[-1])
+    length = evidence[0].take.recorded.time[-1]
+    assert jury.work == pytest.approx((length + 1.5) / length * jury.seconds)
     since = evidence[0].since
     known = np.isfinite(brief).any(axis=1)
     assert since[known].max() == pytest.approx(1.5, abs=0.02)
@@ -341,3 +342,11 @@ def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
 
     assert ends(np.array([9.0, 9.0])) == pytest.approx([10.0, 6.0], abs=1.5)
     assert abs(ends(None)[1] - 6.0) > 1.5
+
+
+@pytest.mark.parametrize(("name", "walking", "sizes"), [
+    ("torque_ceiling", False, [1.0, 2.0, 4.0]), ("viscous_friction", False, [1.0, 4.0]), ("torque_ceiling", True, [1.0])])
+def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
+    effect = known_effects()[name]
+    c = Candidate.of(effect, ("two",), (np.inf if name == "torque_ceiling" else 0.0,))
+    assert [float(x[0]) for x in scan(c, SCANNED[:1] if walking else SCANNED, walking)] == sizes

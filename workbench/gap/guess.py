@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -12,9 +13,10 @@ from scipy.optimize import Bounds, minimize
 from workbench.gap.candidate import Candidate
 
 Array = NDArray[np.float64]
-SCANNED, SCANNED_GROUND, AROUND = (1.0, 4.0), (0.7, 2.0), 2.0
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted; of a walk, the floor's alone at two sizes,
-and those of several numbers at the last, beyond what a walk makes of anything small."""
+SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
+at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, and those of several numbers at the last,
+beyond what a walk makes of anything small."""
 SHAPED = (0.0, 2.0, -2.0)
 """Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 
@@ -31,6 +33,8 @@ def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
     ways = (1.0, -1.0) if lifts else (1.0,)
     shapes = SHAPED if c.shapes.any() and not walking else (0.0,)
+    if not walking and math.isinf(c.neutral[0]):
+        sizes = sorted({*sizes, BETWEEN})
     points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
