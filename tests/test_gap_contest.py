@@ -6,27 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.gap_worn import CONFIG, HIDDEN, NOMINAL, gathered
+from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
 from workbench.gap.contest import TEMPER, WALKS_SAY, Rival, Standing, _better_held, _misfit, _temper, _told, _twin, contest
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.doubts import doubted
-from workbench.gap.jury import Jury
 from workbench.gap.point_mass import PointMass
 from workbench.gap.rounds import Chosen, Round
-from workbench.gap.search import Search
-
-
-@pytest.fixture(scope="module")
-def worn(tmp_path_factory):
-    session, evidence = gathered(tmp_path_factory.mktemp("worn"), HIDDEN)
-    return session, Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
-    session, search = worn
+    session, search, _ = worn
     nominal = search.evaluated([])
     pool = [c for c in candidates(session.model, search.jury.evidence)
             if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
@@ -45,7 +37,7 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
 
 
 def test_what_leaves_much_at_its_place_is_less_sure(worn):
-    session, search = worn
+    session, search, _ = worn
     friction = next(c for c in candidates(session.model, search.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
     right = search.refitted(search.evaluated([(friction, np.array([1.0]))]), (0,), 3)
     far = search.evaluated([(friction, 3.0 * right.x)])
@@ -60,7 +52,7 @@ def test_what_leaves_much_at_its_place_is_less_sure(worn):
 
 @pytest.mark.parametrize(("ill", "sure"), [(("one",), 0.9), (("one", "three"), 0.36)])
 def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill, sure):
-    _, search = worn
+    _, search, _ = worn
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = replace(search.evaluated([(fade, np.array([1.0]))]), covariance=np.full((1, 1), np.inf))
     e = search.jury.evidence[0]
@@ -72,7 +64,7 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
 
 @pytest.mark.parametrize(("friction", "sure"), [(1.12, 0.45), (0.88, 0.45), (0.7, 0.9), (1.3, 0.9)])
 def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(worn, friction, sure):
-    _, search = worn
+    _, search, _ = worn
     floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
     x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
     fit = replace(search.evaluated([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
@@ -82,7 +74,7 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
 
 
 def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
-    _, search = worn
+    _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
         fit = replace(search.evaluated([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
@@ -90,7 +82,7 @@ def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
 
 
 def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_together(worn):
-    _, search = worn
+    _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
 
@@ -127,7 +119,7 @@ def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
 
 
 def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
-    _, search = worn
+    _, search, _ = worn
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(mass,), x=np.ones(4), covariance=np.full((4, 4), np.inf))
     assert _told(fit, 0) == 4
@@ -135,7 +127,7 @@ def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):
-    _, search = worn
+    _, search, _ = worn
     nominal = search.evaluated([])
     fit, standings = contest(search, Chosen(nominal, ()), lambda what, share: None)
     assert fit is nominal

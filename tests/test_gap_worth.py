@@ -1,6 +1,7 @@
 """Whether enough is left for another effect, and whether an effect brings enough."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,15 @@ from workbench.gap.candidates import candidates
 from workbench.gap.race import Trial
 from workbench.gap.rounds import Round, before_rough, taken
 from workbench.gap.search import Search
+
+
+def leaving(worn, **sizes):
+    """A fit that leaves these joints of the arm so far off, in sigma, and all others at half."""
+    _, search, nominal = worn
+    left = 0.5 * np.ones_like(nominal.residuals[0])
+    for joint, size in sizes.items():
+        left[:, search.jury.evidence[0].channels.index(joint)] = size
+    return replace(nominal, residuals={0: left})
 
 
 @pytest.mark.parametrize("walks", [False, True])
@@ -39,18 +49,11 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
 
 
 def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
-    session, whole, nominal = worn
+    session, whole, _ = worn
     search = Search(whole.jury, session.model)
-    names = whole.jury.evidence[0].channels
-    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
-
-    def fit(**sizes):
-        left = 0.5 * np.ones_like(nominal.residuals[0])
-        for joint, size in sizes.items():
-            left[:, names.index(joint)] = size
-        return replace(nominal, residuals={0: left})
-
-    first = Round(fit(three=100.0), (), (Trial(taken, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
+    fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+    fit = partial(leaving, worn)
+    first = Round(fit(three=100.0), (), (Trial(fade, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
     assert worth.too_little_left(search, fit(three=10.0), (0,), [first])
     assert not worth.too_little_left(search, fit(three=40.0), (0,), [first])
     assert not worth.too_little_left(search, fit(two=10.0), (0,), [first])
@@ -59,17 +62,10 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
 def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
     session, whole, nominal = worn
     search = Search(whole.jury, session.model)
-    names = whole.jury.evidence[0].channels
-    taken = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
-
-    def fit(**sizes):
-        left = 0.5 * np.ones_like(nominal.residuals[0])
-        for joint, size in sizes.items():
-            left[:, names.index(joint)] = size
-        return replace(nominal, residuals={0: left})
-
-    first = Round(fit(three=100.0, two=15.0), (), (Trial(taken, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
-    search.settled = replace(search.evaluated([(taken, np.ones(1))]), residuals=nominal.residuals)
+    fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
+    fit = partial(leaving, worn)
+    first = Round(fit(three=100.0, two=15.0), (), (Trial(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
+    search.settled = replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals)
     monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
     assert not worth.too_little_left(search, fit(two=13.0), (0,), [first])
     assert worth.too_little_left(search, fit(three=13.0), (0,), [first])
@@ -82,18 +78,10 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_
     ("backlash", {"three": 30.0}, worth.LAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
     ("dead_band", {"three": 30.0}, worth.LAST_CLOSED)])
 def test_beside_a_joint_that_no_name_fits_an_effect_on_the_ground_has_to_be_half(worn, name, left, share):
-    session, whole, nominal = worn
+    session, whole, _ = worn
     search = Search(whole.jury, session.model)
-    names = whole.jury.evidence[0].channels
-
-    def fit(effects, **sizes):
-        there = 0.5 * np.ones_like(nominal.residuals[0])
-        for joint, size in sizes.items():
-            there[:, names.index(joint)] = size
-        return replace(nominal, residuals={0: there}, effects=effects)
-
     given = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == (name, ("three",)))
-    assert worth.least_closed(search, fit((), three=40.0), fit((given,), **left)) == share
+    assert worth.least_closed(search, leaving(worn, three=40.0), replace(leaving(worn, **left), effects=(given,))) == share
 
 
 def test_what_is_well_hides_no_gap_and_closes_none(worn):

@@ -44,7 +44,7 @@ class Question:
 
 class Jury:
     """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
-    answers are the same with and without. work: seconds of rollouts that were asked so far, at the search's step."""
+    answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | None = None) -> None:
