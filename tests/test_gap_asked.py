@@ -33,7 +33,7 @@ def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatc
     assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
 
 
-@pytest.mark.parametrize(("base", "tier", "said"), [("fixed", 2, False), ("free", 2, False), ("free", 5, True)])
+@pytest.mark.parametrize(("base", "tier", "said"), [("fixed", 2, False), ("free", 2, False), ("free", asked.TIERS_OF_ALL, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
     """What a hand carries looks like a weak shoulder."""
     search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"), grounded=lambda takes: ())
@@ -106,3 +106,22 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
     groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
+
+
+def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_carried_it_well(worn, monkeypatch):
+    """A load on a rear body's axis moves nothing that its joint would feel, and all feet."""
+    session, search, nominal = worn
+    well = next(iter(asked._when_held(search, nominal)[0]))
+    link = next(f.child for f in session.model.kinematics.frames.values() if f.name == well)
+    shift = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
+    trunk = Candidate.of(known_effects()["com_shift"], (session.model.base,), (0.0, 0.0, 0.0))
+    monkeypatch.setattr(search, "grounded", lambda takes: takes)
+
+    def tiers(heavy):
+        monkeypatch.setattr(asked, "heavy_links", lambda model: heavy)
+        return [tier for tier in range(asked.TIERS)
+                for g in asked.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.held, tier)[0]
+                for c in g if c is shift]
+
+    assert tiers([link]) == [asked.TIERS_OF_ALL - 1]
+    assert tiers([]) == []

@@ -63,3 +63,12 @@ def test_a_walk_and_what_one_explains_are_left_to_single_effects():
     held = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: False))
     assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
     assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
+
+
+def test_pairs_that_lines_foretell_about_as_well_are_all_fitted():
+    """A slow clock and waits that grow with each pose look alike from afar."""
+    rng = np.random.default_rng(6)
+    sag, late, noise = rng.normal(size=(3, 400))
+    pool = [seen("supply_sag", sag), seen("clock_rate", late), seen("timing_drift", late + 0.1 * noise)]
+    sets = names(_best_sets(pool, -(2.0 * sag + late) + 0.2 * rng.normal(size=400)))
+    assert sets == [{"supply_sag", "clock_rate"}, {"supply_sag", "timing_drift"}]

@@ -155,3 +155,11 @@ def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
 def test_twins_name_each_other():
     known = known_effects()
     assert all(known[e.twin].twin == e.name for e in known.values() if e.twin)
+
+
+def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):
+    _, search, _ = worn
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+    fit = replace(search.evaluated([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
+    assert doubted(search, fit, [Standing(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
+    assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(0.9)

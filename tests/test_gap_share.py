@@ -7,11 +7,11 @@ from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.gap import share
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.diagnosis import diagnose_session
-from workbench.gap.evidence import gather
+from workbench.gap.evidence import JUDGES, PART, PARTS, gather
 from workbench.gap.jury import Jury, Question
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
-from workbench.gap.share import floors_everywhere, searched, share_of
+from workbench.gap.share import floors_everywhere, judged_fairly, searched, share_of
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -105,3 +105,26 @@ def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter
     for story in told.stories:  # of both takes, all is judged
         assert np.isfinite(story.after[story.time > 2.0]).any()
         assert max(story.ratios(story.after).values()) < 1.6
+
+
+def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two):
+    """A joint met its stop but twice, while the frames that judge looked away."""
+    _, jury, residuals = two
+    e = jury.evidence[0]
+    k = e.channels.index("three")
+    part = np.mod(np.floor(e.since / PART).astype(int), PARTS)
+
+    def judging(third):
+        met = residuals[0].copy()
+        met[:, k] = np.where(e.moving & (third == part), 40.0, 0.1)
+        (seen, _) = judged_fairly(jury.evidence, {0: met, 1: residuals[1]})
+        assert (seen.uses["validate"] == e.uses["validate"]).all()
+        assert not (seen.uses["fit"] & seen.uses["choose"]).any()
+        assert ((seen.uses["fit"] | seen.uses["choose"]) == (e.uses["fit"] | e.uses["choose"])).all()
+        return set(part[seen.uses["choose"]].tolist())
+
+    assert judging(0) == {0}
+    assert judging(2) == {2}
+    assert judging(JUDGES) == {JUDGES}
+    assert judged_fairly(jury.evidence, residuals) == list(jury.evidence)
+    assert judged_fairly(jury.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(jury.evidence)

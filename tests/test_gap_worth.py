@@ -134,3 +134,23 @@ def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
     assert before_rough(rounds, now) is now
     assert before_rough([*rounds, Round("seen rightly", (), sag)], now) == "seen rightly"
     assert taken([*rounds, Round("seen rightly", (), sag)]) == [*sag]
+
+
+@pytest.mark.parametrize(("walks", "brings", "told"), [(True, 100.0, True), (True, 900.0, False), (False, 100.0, False)])
+def test_what_fine_steps_do_not_miss_is_idle_where_walks_told_it(worn, monkeypatch, walks, brings, told):
+    session, whole, _ = worn
+    search = Search(whole.jury, session.model)
+    load = next(c for c in candidates(session.model, whole.jury.evidence) if c.name == "payload")
+    friction = Candidate.of(known_effects()["coulomb_friction"], ("three",), (0.06,))
+    fit = search.evaluated([(load, np.ones(load.size)), (friction, np.ones(1))])
+    asked_without = []
+
+    def finely(fit, takes, *points):
+        asked_without.extend(fit.sizes(x) for x in points[1:])
+        return [replace(fit, cost={"choose": 1e4 + brings * (k > 0)}) for k in range(len(points))]
+
+    monkeypatch.setattr(search, "grounded", lambda takes: takes if walks else ())
+    monkeypatch.setattr(search, "is_settled", lambda c: c is friction)
+    monkeypatch.setattr(search, "finely", finely)
+    assert worth.idle(search, fit) == ([load] if told else [])
+    assert [[x.any() for _, x in sizes] for sizes in asked_without] == ([[False, True]] if walks else [])

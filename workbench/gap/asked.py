@@ -12,7 +12,7 @@ from workbench.gap.channels import BODY, joint_of
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.search import SEEN_ELSEWHERE, Fit, Search
 
-TIERS, TIERS_OF_ALL = 7, 5
+TIERS, TIERS_OF_ALL = 8, 6
 """On the ground the first are what moves the robot as a whole, and joints that stand out."""
 LONE = 2
 """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
@@ -44,16 +44,20 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
 
     def settled(c: Candidate) -> bool:
         """What servos lack at any load, and what hangs on their links, would show with the base held, too; not a stop that is not
-        reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings."""
+        reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings; nor what a heavy
+        link carries on its axis."""
         if c.read_off:
             return False
         if c.effect.layer == "inertia":
-            return search.nominal.kinematics.joint_of(c.where[0]) in well
+            return c.where[0] not in heavy and carried(c) in well
         if c.effect.under_load or c.name in SEEN_ELSEWHERE or c.effect.layer == "ground":
             return False
         if not c.where:
             return bool(well) and not ill
         return c.joint in well
+
+    def carried(c: Candidate) -> str | None:
+        return search.nominal.kinematics.joint_of(c.where[0]) if c.effect.layer == "inertia" else None
 
     zeroed = all(search.jury.evidence[i].take.recorded.zeroed for i in takes)
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
@@ -64,7 +68,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             continue  # a point mass has that freedom
         if c.name in ONE_PULL and used & {(name, ()) for name in ONE_PULL}:
             continue
-        likely = _tier(c, bool(grounded), many, heavy, outstanding)
+        likely = _tier(c, bool(grounded), many, heavy, outstanding, carried(c) in well)
         if c.key in used or (min(likely, LONE) if lone else likely) != tier:
             continue
         if c.effect.layer == "measurement":
@@ -103,10 +107,11 @@ def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     return moved - ill, ill
 
 
-def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str]) -> int:
+def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str], well: bool) -> int:
     """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
-    number, by where feet stand, by several (for which a walk has to be looked at all around), then joints, what links carry."""
+    number, by where feet stand, by several (for which a walk has to be looked at all around), of links that their joint carried
+    well in all axes but its own last, then joints, what links carry."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not grounded:
@@ -116,12 +121,14 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
     if c.name in SEEN_ELSEWHERE or c.name == "link_length":
         return 3  # feet stand elsewhere: much like a centre of mass that does
     if c.name == "payload" and c.where[0] not in heavy:
-        return 6
+        return 7
     if c.where and c.where[0] in outstanding:
         return 1
     if c.joint is not None:
-        return 5
-    return 4 if c.size > 1 else 2
+        return 6
+    if c.size > 1:
+        return 5 if well else 4
+    return 2
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:

@@ -24,9 +24,9 @@ NEARLY_ALL = 0.9
 shoulder, nor sets of them."""
 HALF = 0.5
 """Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
-FITTED, AS_GOOD = {2: 1, 3: 6}, 2.0
-"""Effects in a set, and how many such sets are fitted: of those that leave less than AS_GOOD times what the best does, as lines
-foretell roughly."""
+SIZES, FITTED, AS_GOOD = (2, 3), 6, 2.0
+"""Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does, as
+lines foretell roughly."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
     lines = _Lines(seen, r0)
     best = lines.whole
     out: list[list[Trial]] = []
-    for size in (1, *FITTED):
+    for size in (1, *SIZES):
         sets: dict[frozenset[object], tuple[float, list[Trial]]] = {}
         for which in combinations(range(len(seen)), size):
             name = frozenset(seen[k].trial.candidate.key for k in which)
@@ -112,7 +112,7 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
             break
         if size > 1 and ranked[0][0] < HALF * best:
-            out += [trials for left, trials in ranked[:FITTED[size]] if left < AS_GOOD * ranked[0][0]]
+            out += [trials for left, trials in ranked[:FITTED] if left < AS_GOOD * ranked[0][0]]
         best = min(best, ranked[0][0])
     return out
 

@@ -28,11 +28,11 @@ from workbench.gap.registered import LeftOut, Progress, ReadTake, no_progress, r
 from workbench.gap.search import Fit, Search
 from workbench.gap.selection import select
 from workbench.gap.session import Base, Session
-from workbench.gap.share import floors_everywhere, searched, share_of
+from workbench.gap.share import floors_everywhere, judged_fairly, searched, share_of
 from workbench.gap.special import special
 from workbench.gap.steadied import base_states
 from workbench.gap.story import TakeStory
-from workbench.gap.worth import too_little_left
+from workbench.gap.worth import idle, too_little_left
 from workbench.motion.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
@@ -79,7 +79,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         begun = Search(jury, known.model).evaluated([])
     sent = jury
     jury, missed = with_missed(sent, known.model, begun.residuals)
-    looked_at = searched(jury.evidence, begun.residuals)
+    looked_at = searched(judged_fairly(jury.evidence, begun.residuals), begun.residuals)
     search = Search(begun_with := jury.on(looked_at), known.model)
     pool = build.asked(candidates(known.model, evidence)) + special(known.model, evidence, begun.residuals)
     chosen = select(search, pool, progress, thorough, Played(sent, missed))
@@ -91,7 +91,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     fit = search.refined(fit) if fit.effects else fit
     floors = search.floors(fit) if fit.effects else {}
     changing = drifts(search, fit)
-    standings = doubted(search, fit, standings, floors, [d.effect for d in changing])
+    standings = doubted(search, fit, standings, floors, [d.effect for d in changing], idle(search, fit))
     fitted = fit.model(known.model)
     model = replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed)))
     after, rough = fit.residuals, floors

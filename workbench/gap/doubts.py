@@ -32,10 +32,10 @@ same for a number that would go further if it might, or may be nothing: it makes
 
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
-            changing: Collection[Candidate] = ()) -> list[Standing]:
+            changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
     whole robot at joints that no other effect is to answer for; where a floor is nearly the model's, a number as far as it may
-    go, or nothing within its interval. floors: of the fit, by take."""
+    go, or nothing within its interval; where in fine steps it is `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], {c.joint for c in fit.effects}
@@ -47,7 +47,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
             factor = max(factor, RATTLES)
         factor *= CHANGING if c in changing else 1.0
         slight = _hardly_another_floor(c, x) or _at_its_limit(c, x) or _may_be_nothing(c, x, fit.covariance[own_x, own_x])
-        factor *= HARDLY if slight else 1.0
+        factor *= LEAST if c in idle else HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
 

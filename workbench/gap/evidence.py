@@ -26,9 +26,9 @@ Mask = NDArray[np.bool_]
 BLOCK = 0.4
 """Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
 USES = ("fit", "choose", "fit", "validate")
-PART = 0.1
-"""With the base held, what is neither fitted nor validated is every third part [s] of what does not validate: a joint forgets
-within one, and may meet its stop but once."""
+PART, PARTS, JUDGES = 0.1, 3, 1
+"""With the base held, what is neither fitted nor validated is every third part [s] of what does not validate, the second of
+three: a joint forgets within one, and may meet its stop but once."""
 LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 """Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
 LATE, SHIFTS = 0.1, 4
@@ -219,8 +219,8 @@ def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
     since = t.recorded.since_start
     role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
     if t.spec.base == "fixed":
-        part = np.mod(np.floor(since / PART).astype(int), 3)
-        role = np.where(role == "validate", role, np.where(part == 1, "choose", "fit"))
+        part = np.mod(np.floor(since / PART).astype(int), PARTS)
+        role = np.where(role == "validate", role, np.where(part == JUDGES, "choose", "fit"))
     if t.spec.use == "validate":
         role[:] = "validate"
     elif not alone:

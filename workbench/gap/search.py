@@ -249,24 +249,24 @@ class Search:
         cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
         tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
         if not fit.slopes or not np.isfinite(fit.covariance).any():
-            return self._finely(fit, self.takes, fit.x)[0]
+            return self.finely(fit, self.takes, fit.x)[0]
         before, fit = fit, self._finer(fit)
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
         told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
         takes = self.held if told_held and self.held else self.takes
         points = [fit.x] if alone is None else _around(fit, alone)
-        seen = self._finely(fit, takes, *points, *([] if before is fit else [before.x]))
+        seen = self.finely(fit, takes, *points, *([] if before is fit else [before.x]))
         move, start = self._newton(seen[0]), fit.x.copy()
         low, high = fit.bounds()
         if alone is not None:
             move[alone] = 0.0
             start[alone] = _bottom(seen, alone, (low[alone], high[alone]))
         for share in (1.0, 0.4) if alone is None else (1.0,):
-            seen += self._finely(fit, takes, np.clip(start + share * move, low, high))
+            seen += self.finely(fit, takes, np.clip(start + share * move, low, high))
             if seen[-1].cost["fit"] < seen[0].cost["fit"]:
                 break
-        (best,) = self._finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
+        (best,) = self.finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
 
     def _finer(self, fit: Fit) -> Fit:
@@ -290,7 +290,7 @@ class Search:
         longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
 
-    def _finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
+    def finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
         asked = [Question(with_effects(self.nominal, fit.sizes(x)), takes, FINE) for x in points]
         return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.jury.residuals(asked))]

@@ -1,4 +1,4 @@
-"""The share of recordings that a search looks at: it asks for hundreds of rollouts."""
+"""What of the recordings a search looks at, as it asks for hundreds of rollouts, and which of it judges."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.evidence import BLOCK, USES, TakeEvidence
+from workbench.gap.evidence import BLOCK, JUDGES, PART, PARTS, USES, TakeEvidence
+from workbench.gap.ledger import channel_gaps
 
 Array = NDArray[np.float64]
 LONG, SEARCHED = 60.0, 40.0
@@ -16,6 +17,32 @@ LONG, SEARCHED = 60.0, 40.0
 measured by recordings of this length, too."""
 PIECE = 3 * len(USES) * BLOCK
 """What a share grows by [s]."""
+
+STARVED = 0.1
+"""Share of what a channel lacks with the base held below which the frames that judge show too little of it."""
+
+
+def judged_fairly(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+    """Takes of which, with the base held, another third of the frames judges where that which does shows next to nothing of what
+    a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
+    return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e
+            for i, e in enumerate(evidence)]
+
+
+def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
+    ill = [e.channels.index(c) for c in channel_gaps(e, residual)]
+    seen = e.uses["fit"] | e.uses["choose"]
+    beyond = np.maximum(np.nan_to_num(np.square(residual[:, ill]) - 1.0), 0.0)[seen]
+    beyond = beyond[:, beyond.any(axis=0)]
+    if not beyond.size:
+        return e
+    part = np.mod(np.floor(e.since / PART).astype(int), PARTS)
+    least = [float(np.min(beyond[part[seen] == k].sum(axis=0) / beyond.sum(axis=0))) for k in range(PARTS)]
+    judges = int(np.argmax(least))
+    if judges == JUDGES or least[JUDGES] >= STARVED:
+        return e
+    uses = {"fit": seen & (part != judges), "choose": seen & (part == judges)}
+    return replace(e, uses={**e.uses, **uses})
 
 
 def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from workbench.gap.asked import standing_out
+from workbench.gap.candidate import Candidate
 from workbench.gap.channels import joint_of
 from workbench.gap.company import NEARLY_ALL
 from workbench.gap.ledger import channel_gaps
@@ -116,3 +117,13 @@ def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     others = {c.joint for c in now.effects if c.joint is not None} - {joint}
     everywhere = search.jury.closed(before, after, "choose", without=others)
     return max(everywhere, (everywhere + search.jury.closed(before, after, "choose", joint)) / 2)
+
+
+def idle(search: Search, fit: Fit) -> list[Candidate]:
+    """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for."""
+    walked = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
+    if not walked or not search.grounded(search.fitted):
+        return []
+    points = [np.where(np.isin(np.arange(len(fit.x)), np.arange(own.start, own.stop)), 0.0, fit.x) for _, own in walked]
+    there, *without = search.finely(fit, search.takes, fit.x, *points)
+    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - there.cost["choose"] < LEAST_WALKING]
