@@ -12,7 +12,7 @@ from workbench.gap.asked import _when_held
 from workbench.gap.candidate import Candidate
 from workbench.gap.covariance import _scattered
 from workbench.gap.fitting import WALKING, Solved, fit_blocks, lowest, together
-from workbench.gap.guess import SCANNED, guess, scan
+from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan, sizes_of
 from workbench.gap.jury import STRETCHES, Jury, Question
 from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
 from workbench.gap.search import Search
@@ -350,3 +350,13 @@ def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
     effect = known_effects()[name]
     c = Candidate.of(effect, ("two",), (np.inf if name == "torque_ceiling" else 0.0,))
     assert [float(x[0]) for x in scan(c, SCANNED[:1] if walking else SCANNED, walking)] == sizes
+
+
+@pytest.mark.parametrize(("name", "walking", "unheld", "sizes"), [
+    ("coulomb_friction", False, False, SCANNED), ("coulomb_friction", True, False, SCANNED[:1]),
+    ("coulomb_friction", True, True, SCANNED), ("ground_friction", True, True, SCANNED_GROUND)])
+def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, unheld, sizes):
+    """Of a hip's friction six times the typical one nothing was foretold at once its size, and more of a wrong name."""
+    effect = known_effects()[name]
+    where = ("one",) if effect.places == ("joint",) else ()
+    assert sizes_of(Candidate.of(effect, where, (0.6,)), walking, unheld) == sizes

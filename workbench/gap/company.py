@@ -143,13 +143,18 @@ def _possible(s: _Seen, x: Array) -> bool:
     return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
 
 
+def worst_joint(beyond: dict[str, float]) -> str | None:
+    """The joint that errs most; None where none does."""
+    worst = max((c for c in beyond if c not in BODY), key=lambda c: beyond[c], default=None)
+    return None if worst is None else joint_of(worst)
+
+
 def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
             ) -> list[list[Trial]]:
     """Sets of effects for the joint that errs most, where the base is held and no single one is most of it."""
-    worst = max((c for c in beyond if c not in BODY), key=lambda c: beyond[c], default=None)
-    if worst is None or search.jury.walks(takes):
+    joint = worst_joint(beyond)
+    if joint is None or search.jury.walks(takes):
         return []
-    joint = joint_of(worst)
     if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
         return []
     return companies(search, current, trials, takes, joint)

@@ -15,10 +15,17 @@ from workbench.gap.candidate import Candidate
 Array = NDArray[np.float64]
 SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
 """Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
-at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, and those of several numbers at the last,
-beyond what a walk makes of anything small."""
+at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, unless walks are all there is, and those of
+several numbers at the last, beyond what a walk makes of anything small."""
 SHAPED = (0.0, 2.0, -2.0)
 """Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+
+
+def sizes_of(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
+    """Of the above, for an effect. unheld: whether no take had the base held, where joints show what they lack, however much."""
+    if walking and c.effect.layer == "ground":
+        return SCANNED_GROUND
+    return SCANNED[:1] if walking and not unheld else SCANNED
 
 
 def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.gap.candidate import Candidate, with_effects
 from workbench.gap.fitting import HELD, WALKING, Asks, Solved, fit_blocks, through
-from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan
+from workbench.gap.guess import guess, scan, sizes_of
 from workbench.gap.jury import COARSE, Jury, Question, take_of
 from workbench.robot import RobotModel
 
@@ -69,14 +69,16 @@ Signatures = dict[tuple[object, ...], Seen]
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
     those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
-    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; early: what there is
-    without them leaves, by takes and how long these are looked at."""
+    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
+    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
+    and how long these are looked at."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     foretold: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0
+    unheld: bool = False
     early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
 
@@ -135,8 +137,7 @@ class Trying:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
-        sizes = SCANNED if not self.walking else SCANNED_GROUND if c.effect.layer == "ground" else SCANNED[:1]
-        probes = scan(c, sizes, self.walking)
+        probes = scan(c, sizes_of(c, self.walking, self.race.unheld), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
         before = self._left(plain)

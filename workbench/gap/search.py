@@ -164,7 +164,7 @@ class Search:
         at several joints, each judged by its own joint's channels. takes: on which, by group.
         ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
         signatures must foretell of one that is fitted."""
-        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least), []
+        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not self.held), []
         for n, group in enumerate(groups):
             base = {i: current.residuals[i] for i in takes[n]}
             asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, self.apart(group[0], takes[n]),

@@ -15,7 +15,8 @@ from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
-from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several
+from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several, worst_joint
+from workbench.gap.exchange import exchanges
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
@@ -34,9 +35,9 @@ from workbench.gap.worth import (
 
 MOST_ROUNDS = 6
 """With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
-MOST_WORK, MOST_ROLLOUTS = 3200.0, 60.0
-"""Seconds of rollouts, and rollouts of all takes if that is more, after which nothing more is tried: minutes, of half a minute of
-recording."""
+MOST_WORK, MOST_WORK_LONE, MOST_ROLLOUTS = 3200.0, 6400.0, 60.0
+"""Seconds of rollouts, of a lone joint, of which sets are fitted, and rollouts of all takes if that is more, after which nothing
+more is tried: minutes, of half a minute of recording."""
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH = 0.6
@@ -50,8 +51,9 @@ back, which closes up to 0.93; true effects close more."""
 MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
 """Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
 it ends where little changes."""
-AHEAD = 2
-"""Sets of effects that are fitted to the end."""
+AHEAD, EXCHANGES, RIGHT = 2, 4, 1.2
+"""Sets of effects that are fitted to the end; how often sets are asked for, first and with one effect replaced; and what a set
+may leave, in shares of what a right model does, for which none is replaced."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
@@ -65,7 +67,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     left out of what is played; read anew by what held takes told, which may change the search's jury."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
-    most = np.inf if thorough else max(MOST_WORK, MOST_ROLLOUTS * search.jury.seconds)
+    work = MOST_WORK_LONE if search.lone else MOST_WORK
+    most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
         current = _phase(search, pool, current, search.held, rounds, report, most)
     if current.effects and played is not None:
@@ -127,7 +130,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
-        together = [] if stopped or read_off else _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+        together = [] if stopped or read_off else _together(search, current, trials, takes, beyond)
         if together and priced(together[0][0]) < HALF * priced(after):
             after = together[0][0]
             seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
@@ -148,7 +151,7 @@ def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond:
         on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
         groups += more
     looked = search.tried(current, groups, on, say, least=np.inf)
-    together = _fitted(search, current, several(search, current, looked, takes, beyond), takes)
+    together = _together(search, current, looked, takes, beyond)
     if not together:
         return current, []
     best = together[0][0]
@@ -156,6 +159,30 @@ def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond:
     if search.jury.closed(before, after, "choose") <= NEARLY_ALL:
         return current, []
     return best, seated(search, current, together)
+
+
+def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
+              ) -> list[tuple[Fit, list[Trial]]]:
+    """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
+    replaced, until none of these is better."""
+    joint = worst_joint(beyond)
+    new = several(search, current, trials, takes, beyond)
+    sets: list[tuple[Fit, list[Trial]]] = []
+    for _ in range(EXCHANGES):
+        if not new or joint is None:
+            break
+        best = sets[:1]
+        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: priced(f[0]))
+        if best and sets[0][0] is best[0][0]:
+            break
+        fit, chosen = sets[0]
+        left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
+        if left.sum() < RIGHT * expected.sum():
+            break
+        known = {frozenset(t.candidate.key for t in others) for _, others in sets}
+        new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
+               if frozenset(t.candidate.key for t in s) not in known]
+    return sets
 
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
