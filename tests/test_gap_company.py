@@ -7,7 +7,7 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
-from workbench.gap.company import _best_sets, _Seen, _variants, several
+from workbench.gap.company import Seen, _best_sets, several, variants
 from workbench.gap.race import Trial
 
 
@@ -18,7 +18,7 @@ def trial(name, closed=0.5, joint="knee"):
 
 
 def seen(name, signature, size=1.0):
-    return _Seen(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
+    return Seen(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
 
 
 def names(sets):
@@ -51,7 +51,7 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
     points = [np.array([1.0, 0.0]), np.array([1.0, 2.0])]
     rng = np.random.default_rng(5)
     slow, fast, play = rng.normal(size=(3, 300))
-    pool = [*_variants(sticking, points, [slow, fast]), seen("backlash", play)]
+    pool = [*variants(sticking, points, [slow, fast]), seen("backlash", play)]
     assert len(pool) == 3
     (both,) = _best_sets(pool, -(1.5 * fast + play))
     assert next(t.x for t in both if t.candidate.name == "stribeck_friction") == pytest.approx([1.5, 2.0])

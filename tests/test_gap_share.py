@@ -7,7 +7,7 @@ from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.gap import share
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.diagnosis import diagnose_session
-from workbench.gap.evidence import JUDGES, PART, PARTS, gather
+from workbench.gap.evidence import JUDGES, gather, part_of
 from workbench.gap.jury import Jury, Question
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.session import load_session
@@ -112,7 +112,7 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
     _, jury, residuals = two
     e = jury.evidence[0]
     k = e.channels.index("three")
-    part = np.mod(np.floor(e.since / PART).astype(int), PARTS)
+    part = part_of(e.since)
 
     def judging(third):
         met = residuals[0].copy()

@@ -142,12 +142,12 @@ def test_what_fine_steps_do_not_miss_is_idle_where_walks_told_it(worn, monkeypat
     search = Search(whole.jury, session.model)
     load = next(c for c in candidates(session.model, whole.jury.evidence) if c.name == "payload")
     friction = Candidate.of(known_effects()["coulomb_friction"], ("three",), (0.06,))
-    fit = search.evaluated([(load, np.ones(load.size)), (friction, np.ones(1))])
+    fit = replace(search.evaluated([(load, np.ones(load.size)), (friction, np.ones(1))]), cost={"choose": 1e4})
     asked_without = []
 
     def finely(fit, takes, *points):
-        asked_without.extend(fit.sizes(x) for x in points[1:])
-        return [replace(fit, cost={"choose": 1e4 + brings * (k > 0)}) for k in range(len(points))]
+        asked_without.extend(fit.sizes(x) for x in points)
+        return [replace(fit, cost={"choose": 1e4 + brings}) for _ in points]
 
     monkeypatch.setattr(search, "grounded", lambda takes: takes if walks else ())
     monkeypatch.setattr(search, "is_settled", lambda c: c is friction)

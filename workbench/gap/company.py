@@ -30,7 +30,7 @@ lines foretell roughly."""
 
 
 @dataclass(frozen=True)
-class _Seen:
+class Seen:
     """What an effect does to what is fitted in a joint: signatures (m, k), each at the sizes in a row of points (k, n)."""
 
     trial: Trial
@@ -59,7 +59,7 @@ def companies(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
     base = search.jury.early({i: current.residuals[i] for i in takes}, until)
     rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
     r0 = search.jury.vector(base, "fit", joint)[rows[joint]]
-    seen = [s for t, (points, did, _) in known for s in _variants(t, points, [v[rows[t.joint]] for v in did])]
+    seen = [s for t, (points, did, _) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
     return _best_sets(seen, r0) if seen else []
 
 
@@ -83,19 +83,19 @@ def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, ju
     return search.jury.vector(inside, "fit", judged) != 0
 
 
-def _variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[_Seen]:
+def variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[Seen]:
     """An effect of several numbers, each seen alone; of one, as it was seen at each size."""
     c = t.candidate
     if not c.size or not len(points):
         return
     if np.count_nonzero(~c.shapes) > 1:
-        yield _Seen(t, np.stack(signatures, axis=1), np.array(points))
+        yield Seen(t, np.stack(signatures, axis=1), np.array(points))
         return
     for p, v in zip(points, signatures):
-        yield _Seen(t, v[:, None], p[None])
+        yield Seen(t, v[:, None], p[None])
 
 
-def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
+def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[Trial]]:
     lines = _Lines(seen, r0)
     best = lines.whole
     out: list[list[Trial]] = []
@@ -106,7 +106,7 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
             if len(name) < size:
                 continue
             left, x = lines.lowest(which)
-            if (name not in sets or left < sets[name][0]) and all(_possible(seen[k], there) for k, there in zip(which, x)):
+            if (name not in sets or left < sets[name][0]) and all(possible(seen[k], there) for k, there in zip(which, x)):
                 sets[name] = left, [replace(seen[k].trial, x=there, foretold=False) for k, there in zip(which, x)]
         ranked = sorted(sets.values(), key=lambda s: s[0])
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
@@ -120,7 +120,7 @@ def _best_sets(seen: Sequence[_Seen], r0: Array) -> list[list[Trial]]:
 class _Lines:
     """Signatures added up: what is missing, r0, less what they do in shares of what was seen."""
 
-    def __init__(self, seen: Sequence[_Seen], r0: Array) -> None:
+    def __init__(self, seen: Sequence[Seen], r0: Array) -> None:
         A = np.concatenate([s.signatures for s in seen], axis=1)
         self.seen, self.whole = seen, float(r0 @ r0)
         self.ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
@@ -138,7 +138,7 @@ class _Lines:
         return self.whole + float(2 * g @ share + share @ H @ share), x
 
 
-def _possible(s: _Seen, x: Array) -> bool:
+def possible(s: Seen, x: Array) -> bool:
     """Whether an effect is there at all, at these sizes."""
     return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
 
@@ -173,7 +173,7 @@ def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]
     sizes = best.sizes_by_key()
     out = []
     for t in chosen:
-        rest = search.evaluated([s for s in best.sizes() if s[0].key != t.candidate.key])
+        rest = search.evaluated(best.sizes_without(t.candidate.key))
         gain = {use: rest.cost[use] - best.cost[use] for use in ("fit", "choose")}
         trials = [replace(t, x=sizes[t.candidate.key], gain=gain)]
         for fit, others in sets[1:]:

@@ -215,12 +215,16 @@ def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake
     return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
 
 
+def part_of(since: Array) -> NDArray[np.int_]:
+    """Which of PARTS a frame of a held take is in, by its time after the first command [s]."""
+    return np.mod(np.floor(since / PART).astype(int), PARTS)
+
+
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
     since = t.recorded.since_start
     role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
     if t.spec.base == "fixed":
-        part = np.mod(np.floor(since / PART).astype(int), PARTS)
-        role = np.where(role == "validate", role, np.where(part == JUDGES, "choose", "fit"))
+        role = np.where(role == "validate", role, np.where(part_of(since) == JUDGES, "choose", "fit"))
     if t.spec.use == "validate":
         role[:] = "validate"
     elif not alone:

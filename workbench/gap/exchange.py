@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from workbench.gap.candidate import LEAST_SIZE, Candidate, with_effects
-from workbench.gap.company import AS_GOOD
-from workbench.gap.fitting import HELD
+from workbench.gap.candidate import Candidate, with_effects
+from workbench.gap.company import AS_GOOD, Seen, possible, variants
+from workbench.gap.fitting import HELD, steps_of
 from workbench.gap.guess import SCANNED, scan
 from workbench.gap.jury import Question
 from workbench.gap.race import Trial
@@ -40,7 +40,7 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
     moves = [_moved(c, there[c.key]) for c in mine]
     probes = [scan(t.candidate, SCANNED, walking=False) for t in others]
     asked: list[Sizes] = [_with(fit, c, x) for c, points in zip(mine, moves) for x in points]
-    asked += [_without(fit, c) for c in mine]
+    asked += [fit.sizes_without(c.key) for c in mine]
     asked += [[*fit.sizes(), (t.candidate, p)] for t, points in zip(others, probes) for p in points]
     answers = search.jury.residuals([Question(with_effects(search.nominal, sizes), takes) for sizes in asked])
     seen = iter([search.jury.vector(a, "fit", joint) for a in answers])
@@ -61,55 +61,37 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
 
 
 def _moved(c: Candidate, x: Array) -> list[Array]:
-    """Sizes with one number moved at a time, as far as it may go."""
-    _, high = c.bounds()
-    out = []
-    for n in range(len(x)):
-        step = HELD * max(abs(float(x[n])), LEAST_SIZE)
-        moved = x.copy()
-        moved[n] += step if x[n] + step <= high[n] else -step
-        out.append(moved)
-    return out
+    """Sizes with one number moved at a time."""
+    return list(x + np.diag(steps_of(x, *c.bounds(), HELD)))
 
 
 def _with(fit: Fit, c: Candidate, x: Array) -> Sizes:
     return [(e, x if e.key == c.key else size) for e, size in fit.sizes()]
 
 
-def _without(fit: Fit, c: Candidate) -> Sizes:
-    return [s for s in fit.sizes() if s[0].key != c.key]
-
-
 def _in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
               x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
     """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
     was seen; of several, all at once. rest: what is left without the other."""
-    c = t.candidate
-    several = np.count_nonzero(~c.shapes) > 1
-    ways = [list(range(len(points)))] if several else [[k] for k in range(len(points))]
-    best: tuple[float, list[Trial]] | None = None
-    for way in ways:
-        P = np.array([points[k] for k in way])
-        A = np.column_stack([*slopes, *(did[k] for k in way)])
-        solved = lsq_linear(A, -rest, _bounds(c, P, staying, x))
-        cost, moves = 2.0 * float(solved.cost), solved.x
-        ends = np.cumsum([0, *(len(size) for size in x)])
-        size = np.clip(np.where(c.shapes, P[0], moves[ends[-1]:] @ P), *c.bounds())
-        if not np.abs(size[~c.shapes]).max() > 0 or (best is not None and cost >= best[0]):
-            continue
-        gain = {"fit": 0.0, "choose": 0.0}
-        beside = [Trial(e, start + moves[a:b], gain, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
-        best = cost, [*beside, replace(t, x=size, foretold=False)]
-    return [] if best is None else [best]
+    ends = np.cumsum([0, *(len(size) for size in x)])
+    gain = {"fit": 0.0, "choose": 0.0}
+    ways: list[tuple[float, list[Trial]]] = []
+    for seen in variants(t, points, did):
+        solved = lsq_linear(np.column_stack([*slopes, seen.signatures]), -rest, _bounds(seen, staying, x))
+        size = seen.sizes(solved.x[ends[-1]:])
+        if possible(seen, size):
+            beside = [Trial(e, start + solved.x[a:b], gain, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
+            ways.append((2.0 * float(solved.cost), [*beside, replace(t, x=size, foretold=False)]))
+    return sorted(ways, key=lambda way: way[0])[:1]
 
 
-def _bounds(c: Candidate, P: Array, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
-    """Of moves of those that stay, and of shares of the points (k, n) at which c was seen."""
+def _bounds(seen: Seen, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
+    """Of moves of those that stay, and of shares of the points at which the other was seen."""
     low = [e.bounds()[0] - size for e, size in zip(staying, x)]
     high = [e.bounds()[1] - size for e, size in zip(staying, x)]
-    if len(P) == 1:
-        own = ~c.shapes
-        ends = np.sort(np.array(c.bounds())[:, own][:, 0] / P[0][own][0])
+    if len(seen.points) == 1:
+        own = ~seen.trial.candidate.shapes
+        ends = np.sort(np.array(seen.trial.candidate.bounds())[:, own][:, 0] / seen.points[0][own][0])
         return np.concatenate([*low, ends[:1]]), np.concatenate([*high, ends[1:]])
-    free = np.full(len(P), np.inf)
+    free = np.full(len(seen.points), np.inf)
     return np.concatenate([*low, -free]), np.concatenate([*high, free])

@@ -64,7 +64,7 @@ def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], 
         stale = [b for b in blocks if b.open and not b.updated]
         if stale:
             for b in stale:
-                b.steps = _steps(b.x, b.low, b.high, stride, magnitudes)
+                b.steps = steps_of(b.x, b.low, b.high, stride, magnitudes)
             points = [[b.moved(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
             for i, answer in enumerate((yield points)):
                 for b, r in zip(blocks, answer):
@@ -157,7 +157,8 @@ class _Block:
         self.x, self.r = there, left_there
 
 
-def _steps(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None) -> Array:
+def steps_of(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None = None) -> Array:
+    """By how much each number is moved for a difference: a share `stride` of it, or of `magnitudes`, as far as it may go."""
     step = stride * np.maximum(np.abs(x), LEAST_SIZE if magnitudes is None else magnitudes)
     return np.asarray(np.where(x + step <= high, step, -step))
 

@@ -71,6 +71,10 @@ class Fit:
         x = self.x if x is None else x
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
+    def sizes_without(self, key: Key) -> list[tuple[Candidate, Array]]:
+        """Those of all effects but one."""
+        return [s for s in self.sizes() if s[0].key != key]
+
     def sizes_by_key(self) -> dict[Key, Array]:
         """Of each effect, by what it is and where."""
         return {c.key: x for c, x in self.sizes()}

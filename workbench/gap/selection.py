@@ -51,9 +51,9 @@ back, which closes up to 0.93; true effects close more."""
 MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
 """Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
 it ends where little changes."""
-AHEAD, EXCHANGES, RIGHT = 2, 4, 1.2
-"""Sets of effects that are fitted to the end; how often sets are asked for, first and with one effect replaced; and what a set
-may leave, in shares of what a right model does, for which none is replaced."""
+AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
+"""Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
+shares of what a right model does, for which none is replaced."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
@@ -166,15 +166,10 @@ def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
     """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
     replaced, until none of these is better."""
     joint = worst_joint(beyond)
-    new = several(search, current, trials, takes, beyond)
-    sets: list[tuple[Fit, list[Trial]]] = []
+    sets = _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+    if joint is None or not sets:
+        return []
     for _ in range(EXCHANGES):
-        if not new or joint is None:
-            break
-        best = sets[:1]
-        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: priced(f[0]))
-        if best and sets[0][0] is best[0][0]:
-            break
         fit, chosen = sets[0]
         left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
         if left.sum() < RIGHT * expected.sum():
@@ -182,6 +177,9 @@ def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
         new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
                if frozenset(t.candidate.key for t in s) not in known]
+        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: priced(f[0]))
+        if sets[0][0] is fit:
+            break
     return sets
 
 
@@ -246,7 +244,7 @@ def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round])
     for r in reversed(rounds):
         for t in r.accepted:
             if completed(search, r, t, current) < LAST_CLOSED:
-                current = search.evaluated([s for s in current.sizes() if s[0].key != t.candidate.key])
+                current = search.evaluated(current.sizes_without(t.candidate.key))
     return current
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.evidence import BLOCK, JUDGES, PART, PARTS, USES, TakeEvidence
+from workbench.gap.evidence import BLOCK, JUDGES, PARTS, USES, TakeEvidence, part_of
 from workbench.gap.ledger import channel_gaps
 
 Array = NDArray[np.float64]
@@ -36,7 +36,7 @@ def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
     beyond = beyond[:, beyond.any(axis=0)]
     if not beyond.size:
         return e
-    part = np.mod(np.floor(e.since / PART).astype(int), PARTS)
+    part = part_of(e.since)
     least = [float(np.min(beyond[part[seen] == k].sum(axis=0) / beyond.sum(axis=0))) for k in range(PARTS)]
     judges = int(np.argmax(least))
     if judges == JUDGES or least[JUDGES] >= STARVED:

@@ -120,10 +120,13 @@ def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
 
 
 def idle(search: Search, fit: Fit) -> list[Candidate]:
-    """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for."""
+    """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for.
+    fit: as fine steps judge it."""
     walked = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
     if not walked or not search.grounded(search.fitted):
         return []
-    points = [np.where(np.isin(np.arange(len(fit.x)), np.arange(own.start, own.stop)), 0.0, fit.x) for _, own in walked]
-    there, *without = search.finely(fit, search.takes, fit.x, *points)
-    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - there.cost["choose"] < LEAST_WALKING]
+    points = np.tile(fit.x, (len(walked), 1))
+    for x, (_, own) in zip(points, walked):
+        x[own] = 0.0
+    without = search.finely(fit, search.takes, *points)
+    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - fit.cost["choose"] < LEAST_WALKING]
