@@ -253,6 +253,14 @@ def test_a_payload_adds_its_mass_at_its_point(arm):
     np.testing.assert_allclose(k.centers["hand"], (0.2 * np.array([0.01, 0, -0.03]) + mass * at) / 0.5)
 
 
+def test_a_payload_is_to_the_links_centre_what_a_shift_of_it_is(arm):
+    spec = EffectSpec("payload", ("hand",), {"mass": 0.1, "position": (0.03, -0.02, 0.05)})
+    offset = known_effects()["payload"].as_limit(spec, arm)
+    loaded, shifted = (changed(with_effects(arm, e)).centers["hand"] for e in (
+        ("payload", "hand", dict(spec.parameters)), ("com_shift", "hand", {"offset": offset})))
+    np.testing.assert_allclose(loaded, shifted, atol=1e-12)
+
+
 def test_a_payload_pulls_its_servo_down(rig):
     bare, loaded = (at_rest(tilted(m, forward=30.0)) for m in (rig, with_effects(rig, ("payload", "arm", {
         "mass": 0.2, "position": (0.0, 0.0, -0.05)}))))

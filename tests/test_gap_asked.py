@@ -9,10 +9,11 @@ import pytest
 from workbench.effects.registry import known_effects
 from workbench.gap import asked, selection
 from workbench.gap.candidate import Candidate
-from workbench.gap.candidates import candidates
+from workbench.gap.candidates import candidates, heavy_links
 from workbench.gap.channels import ACROSS
 from workbench.gap.race import Trial
 from workbench.gap.search import Search
+from workbench.robot import puppy_model
 
 
 @pytest.mark.parametrize(("gaps", "expected"), [
@@ -125,3 +126,12 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
 
     assert tiers([link]) == [asked.TIERS_OF_ALL - 1]
     assert tiers([]) == []
+
+
+def test_a_rear_body_is_heavy_at_a_tenth_a_thigh_is_not(monkeypatch):
+    """What a trunk's link carries tips the robot; a leg's own joints feel what it carries."""
+    model = puppy_model()
+    masses = {"body_link": 0.4, "tail_link": 0.1, "flm_link": 0.1, "frm_link": 0.2, "head_link": 0.08, "neck_link": 0.12}
+    kinematics = replace(model.kinematics, masses=dict.fromkeys(model.kinematics.links, 0.0) | masses)
+    monkeypatch.setitem(vars(model), "kinematics", kinematics)
+    assert set(heavy_links(model)) == {"body_link", "tail_link", "frm_link", "neck_link"}

@@ -10,10 +10,24 @@ from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
-from workbench.gap.contest import TEMPER, WALKS_SAY, Rival, Standing, _better_held, _misfit, _temper, _told, _twin, contest
+from workbench.gap.contest import (
+    TEMPER,
+    WALKS_SAY,
+    Rival,
+    Standing,
+    _better_by_both,
+    _better_held,
+    _misfit,
+    _put,
+    _temper,
+    _told,
+    _twin,
+    contest,
+)
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.doubts import doubted
 from workbench.gap.point_mass import PointMass
+from workbench.gap.race import Trial
 from workbench.gap.rounds import Chosen, Round
 
 
@@ -95,6 +109,51 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.45)
     assert told(mass, [1.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.9)
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [np.inf, 0.1, 0.1, 0.1]) == pytest.approx(0.9)  # nothing is known of it
+
+
+def test_a_load_that_may_weigh_nothing_is_another_centre_of_mass_where_that_stands_beside_it(worn):
+    _, search, _ = worn
+    mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
+    other = Candidate.of(known_effects()["com_shift"], ("two_link",), (0.0, 0.0, 0.0))
+    beside = Standing(0.6, (Rival(other, np.ones(3), 10.0, 0.3),))
+
+    def told(deviations):
+        fit = replace(search.evaluated([]), effects=(mass,), x=np.array([0.4, 3.0, 0.0, 1.0]),
+                      covariance=np.diag(np.square(deviations)))
+        return doubted(search, fit, [beside], {})[0].probability
+
+    assert told([0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.6)
+    assert told([0.5, 4.0, 1.0, 2.0]) == pytest.approx(0.3)
+
+
+def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
+    """A load that hardly weighs but moves the centre of mass: the centre alone, begun elsewhere, is put where the load has it."""
+    session, search, _ = worn
+    k = session.model.kinematics
+    link = k.frames["two"].child
+    mass = PointMass.of(known_effects()["payload"], (link,), (0.0, *k.centers[link]))
+    other = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
+    fit = search.evaluated([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
+    astray = Trial(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
+    seen = []
+    part = _put(search, fit, 0, astray)
+    questions = next(part)
+    try:
+        while True:
+            seen += [q.model.effects[0].parameters["offset"] for q in questions]
+            questions = part.send(search.jury.residuals(questions))
+    except StopIteration:
+        pass
+    m, at = mass.values(fit.x)[0], np.array(mass.values(fit.x)[1:])
+    expected = m / (m + k.masses[link]) * (at - k.centers[link])
+    assert seen[0] == pytest.approx((0.045, 0.045, 0.045))
+    assert seen[1] == pytest.approx(expected)
+
+
+def test_what_walks_told_is_weighed_on_all_that_was_fitted_too():
+    """Twice as many stretches are fitted: where these say the opposite, they count as much as those that choose."""
+    fit, rival = SimpleNamespace(cost={"choose": 1000.0, "fit": 2000.0}), SimpleNamespace(cost={"choose": 1100.0, "fit": 1600.0})
+    assert _better_by_both(fit, rival) == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),

@@ -48,6 +48,26 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
     assert not worth.worthwhile(search, trial("three"), (0,), [first], search.settled)
 
 
+def test_on_the_ground_a_strong_effect_hides_nothing_in_channels_that_it_did_not_change(worn, monkeypatch):
+    """A stop that walks told brought a million in its own joint: another effect is asked for hundredths of that there alone."""
+    session, whole, nominal = worn
+    monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
+    search = Search(whole.jury, session.model)
+    stop = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
+    names = whole.jury.evidence[0].channels
+    residual = nominal.residuals[0].copy()
+    residual[:, names.index("three")] *= 30
+    first = Round(replace(nominal, residuals={0: residual}), (), (Trial(stop, np.ones(1), {"fit": 2e6, "choose": 1e6}, None),))
+    tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
+
+    def trial(channel):
+        gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
+        return Trial(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
+
+    assert worth.worthwhile(search, trial("two"), (0,), [first], nominal)
+    assert not worth.worthwhile(search, trial("three"), (0,), [first], nominal)
+
+
 def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
     session, whole, _ = worn
     search = Search(whole.jury, session.model)

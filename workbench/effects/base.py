@@ -83,6 +83,10 @@ class Effect:
         typical value for a number that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
+    def as_limit(self, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        """The values at which the effect `limit` does nearly the same, in the contract's units; empty where that is not known."""
+        return ()
+
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         """Changes the robot's SDF."""
 

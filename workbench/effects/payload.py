@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from workbench.effects.base import Effect, Parameter, scalar, si_values, vector
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
@@ -23,6 +25,12 @@ class Payload(Effect):
         x, y, z = spec.parameters["position"]  # type: ignore[misc]
         return (f"{', '.join(spec.where)} carries {1000 * scalar(spec, 'mass'):.0f} g more, at ({1000 * x:.0f}, {1000 * y:.0f}, "
                 f"{1000 * z:.0f}) mm in its frame.")
+
+    def as_limit(self, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        (link,), mass = spec.where, scalar(spec, "mass")
+        k = model.kinematics
+        share = mass / (k.masses[link] + mass)
+        return tuple(share * (np.array(spec.parameters["position"]) - k.centers.get(link, 0.0)))
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         values = si_values(self, spec)

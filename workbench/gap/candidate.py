@@ -107,6 +107,11 @@ class Candidate:
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 
+    def sizes(self, values: Sequence[float]) -> Array:
+        """The sizes of finite neutral values at these numbers, in the contract's units, as far as they may go."""
+        x = [(v - n) / (t - n) for v, n, t, held in zip(values, self.neutral, self.typical, self.held) if not held]
+        return np.asarray(np.clip(x, *self.bounds()))
+
     def bounds(self) -> tuple[Array, Array]:
         """Of the sizes x."""
         low, high = [], []

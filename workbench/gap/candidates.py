@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
@@ -16,8 +17,9 @@ from workbench.gap.footfalls import foot_points
 from workbench.gap.point_mass import point_mass
 from workbench.robot import RobotModel
 
-HEAVY = 0.15
-"""Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows."""
+HEAVY, HEAVY_APART = 0.15, 0.09
+"""Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows. The latter of
+links that are no part of one leg, as a trunk's: what they carry tips the robot, while their own joint hardly feels it."""
 LENGTH = 0.5
 """Share of a link's length by which the search changes it at most."""
 
@@ -62,9 +64,12 @@ def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
 
 
 def heavy_links(model: RobotModel) -> list[str]:
-    """Links with at least the share HEAVY of the robot's mass."""
-    masses = model.kinematics.masses
-    return [link for link in model.kinematics.links if masses[link] >= HEAVY * sum(masses.values())]
+    """Links with at least the share HEAVY of the robot's mass, HEAVY_APART where they are no part of one leg."""
+    k = model.kinematics
+    feet = [k.frames[f].child for f in foot_points(model.path) if f in k.frames]
+    carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
+    whole = sum(k.masses.values())
+    return [link for link in k.links if k.masses[link] >= whole * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:

@@ -147,10 +147,15 @@ def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
     price = max(NUMBER, NUMBER_SHARE * taken.gain["choose"])
     own = [c.key for c in rival.effects]
     (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
-    better = fit.cost["choose"] - rival.cost["choose"]
-    if search.is_settled(fit.effects[replaced]):
-        better = _better_held(search, fit, rival)
+    better = _better_held(search, fit, rival) if search.is_settled(fit.effects[replaced]) else _better_by_both(fit, rival)
     return better + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
+
+
+def _better_by_both(fit: Fit, rival: Fit) -> float:
+    """By how much a rival is better of an effect that walks told, of chi squared on the choosing stretches: twice as many are
+    fitted, and say as much of each; what more numbers make of these is in their price."""
+    choose, fitted = (fit.cost[use] - rival.cost[use] for use in ("choose", "fit"))
+    return (choose + fitted / 2) / 2
 
 
 def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
@@ -191,11 +196,13 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     """The fit with a rival in effect i's place and its numbers fitted there; the same effect elsewhere begins at the size that
-    the other has, if that is better."""
+    the other has, and what the other becomes where that does the same, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)
     starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if alike else [rival.x]
+    if rival.candidate.name == own.effect.limit and (values := own.effect.as_limit(own.spec(size), search.nominal)):
+        starts.append(rival.candidate.sizes(values))
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there

@@ -46,7 +46,9 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         if c.read_off and c.effect.free_play:
             factor = max(factor, RATTLES)
         factor *= CHANGING if c in changing else 1.0
-        slight = _hardly_another_floor(c, x) or _at_its_limit(c, x) or _may_be_nothing(c, x, fit.covariance[own_x, own_x])
+        makes = ~c.shapes if _becomes(c, s) else c.makes
+        slight = (_hardly_another_floor(c, x) or _at_its_limit(c, x)
+                  or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes))
         factor *= LEAST if c in idle else HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
@@ -71,11 +73,16 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
     return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
 
 
-def _may_be_nothing(c: Candidate, x: Array, covariance: Array) -> bool:
+def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np.bool_]) -> bool:
     """Whether the 90 % intervals of all numbers that make an effect hold what it vanishes at."""
     half = Z90 * WIDER * np.sqrt(np.diag(covariance))
-    makes = c.makes & np.isfinite(half)
+    makes = makes & np.isfinite(half)
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
+
+
+def _becomes(c: Candidate, s: Standing) -> bool:
+    """Whether what an effect is at its end stands beside it: of a load that weighs nothing, a centre of mass elsewhere."""
+    return any(r.candidate.key == (c.effect.limit, c.where) for r in s.rivals)
 
 
 def _at_its_limit(c: Candidate, x: Array) -> bool:

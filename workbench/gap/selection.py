@@ -121,7 +121,8 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
-            if trials and _says_it(search, current, trials[0], takes, tier):
+            said = bool(trials) and _says_it(search, current, trials[0], takes, tier)
+            if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 break
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)

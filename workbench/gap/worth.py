@@ -87,12 +87,17 @@ def worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     if not walks:
         return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
-    brought = sum(a.gain["choose"] for a in taken(rounds)
-                  if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate))
+    walked = [(r, a) for r in rounds for a in taken([r])
+              if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate)]
+    brought = sum(a.gain["choose"] for _, a in walked)
     settled = _settling(search, rounds)
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    return gain > max(least, WALKING_SHARE * brought)
+    if gain > max(least, WALKING_SHARE * brought) or not walked:
+        return gain > least
+    # what they brought may have been in other channels
+    elsewhere = _beyond_error(search, t, takes, walked[0][0].before, current, WALKING_SHARE)
+    return min(gain, elsewhere) > least
 
 
 def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
