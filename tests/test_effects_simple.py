@@ -218,6 +218,22 @@ def test_gravity_leans_in_the_floors_frame():
                                9.81 * np.array([np.sin(10 * DEG), 0, -np.cos(10 * DEG)]), atol=1e-9)
 
 
+def test_a_tilt_and_a_pull_push_the_robot_alike():
+    """Along the floor, by the robot's weight; a pull upwards has no tilt."""
+    model = puppy_model()
+    tilt, pull = known_effects()["ground_tilt"], known_effects()["tether_force"]
+    weight = 9.81 * sum(model.kinematics.masses.values())
+    spec = EffectSpec("ground_tilt", (), {"forward": 3.0, "left": -2.0})
+    force = pull_x, pull_y, pull_z = tilt.as_other("tether_force", spec, model)
+    lean = tilt.gravity(np.array([0.0, 0.0, -9.81]), si_values(tilt, spec))
+    assert pull_x / weight == pytest.approx(lean[0] / -lean[2])
+    assert pull_y / weight == pytest.approx(lean[1] / -lean[2])
+    assert pull_z == 0.0
+    assert pull.as_other("ground_tilt", EffectSpec("tether_force", (), {"force": force}), model) == pytest.approx((3.0, -2.0))
+    assert tilt.as_other("soft_ground", spec, model) == ()
+    assert pull.as_other("soft_ground", EffectSpec("tether_force", (), {"force": force}), model) == ()
+
+
 def test_a_tether_is_held_by_the_feet():
     force = np.array([0.5, -0.3, 1.0])
     model = with_effect("tether_force", force=tuple(force))

@@ -255,7 +255,7 @@ def test_a_payload_adds_its_mass_at_its_point(arm):
 
 def test_a_payload_is_to_the_links_centre_what_a_shift_of_it_is(arm):
     spec = EffectSpec("payload", ("hand",), {"mass": 0.1, "position": (0.03, -0.02, 0.05)})
-    offset = known_effects()["payload"].as_limit(spec, arm)
+    offset = known_effects()["payload"].as_other("com_shift", spec, arm)
     loaded, shifted = (changed(with_effects(arm, e)).centers["hand"] for e in (
         ("payload", "hand", dict(spec.parameters)), ("com_shift", "hand", {"offset": offset})))
     np.testing.assert_allclose(loaded, shifted, atol=1e-12)

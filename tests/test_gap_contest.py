@@ -18,6 +18,7 @@ from workbench.gap.contest import (
     _better_by_both,
     _better_held,
     _misfit,
+    _outbid,
     _put,
     _temper,
     _told,
@@ -154,6 +155,21 @@ def test_what_walks_told_is_weighed_on_all_that_was_fitted_too():
     """Twice as many stretches are fitted: where these say the opposite, they count as much as those that choose."""
     fit, rival = SimpleNamespace(cost={"choose": 1000.0, "fit": 2000.0}), SimpleNamespace(cost={"choose": 1100.0, "fit": 1600.0})
     assert _better_by_both(fit, rival) == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(("name", "choose", "told"), [("payload", 900.0, True), ("payload", 1300.0, False),
+                                                      ("stribeck_friction", 900.0, False), ("viscous_friction", 900.0, False)])
+def test_a_name_that_only_the_price_of_its_numbers_keeps_out_stands_beside(name, choose, told):
+    """A load that swings little is nearly a spring; Stribeck friction is dry friction with something added."""
+    numbers = {"payload": 3, "stribeck_friction": 2, "viscous_friction": 1}[name]
+    search = SimpleNamespace(is_settled=lambda c: False)
+
+    def fit(name, count, cost):
+        effect = SimpleNamespace(effect=known_effects()[name], name=name, size=count)
+        return SimpleNamespace(effects=(effect,), covariance=np.eye(count), slices=lambda: [slice(0, count)],
+                               cost={"choose": cost, "fit": 2 * cost})
+
+    assert _outbid(search, fit("coulomb_friction", 1, 1000.0), 0, fit(name, numbers, choose)) is told
 
 
 @pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),

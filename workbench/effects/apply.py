@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, check_places, si_values
+from workbench.effects.base import GRAVITY, Effect, check_places, si_values
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
@@ -17,7 +17,6 @@ from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
 
 Array = NDArray[np.float64]
-GRAVITY = (0.0, 0.0, -9.81)
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, 
 def physics_of(model: RobotModel) -> Physics:
     """The model's physics, effects applied in their order."""
     law = ServoLaw.of([model.servo(j) for j in model.joints])
-    ground, gravity, tether = model.ground, np.array(GRAVITY), np.zeros(3)
+    ground, gravity, tether = model.ground, np.array([0.0, 0.0, -GRAVITY]), np.zeros(3)
     zero = np.zeros(len(model.joints))
     friction: dict[str, float] = {}
     stiffness: float | None = None

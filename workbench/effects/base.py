@@ -30,6 +30,8 @@ Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measure
 Value = float | tuple[float, float, float]
 
 DEGREE = math.pi / 180
+GRAVITY = 9.81
+"""[m/s^2]"""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value within which the typical one is too near to it, and the one taken instead."""
 
@@ -83,8 +85,9 @@ class Effect:
         typical value for a number that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
-    def as_limit(self, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        """The values at which the effect `limit` does nearly the same, in the contract's units; empty where that is not known."""
+    def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        """The values at which the effect `name` (`limit` or `twin`) does nearly the same at the same place, in the contract's
+        units; empty where that is not known."""
         return ()
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.effects.base import DEGREE, Array, Effect, Parameter
-from workbench.robot import EffectSpec
+from workbench.effects.base import DEGREE, GRAVITY, Array, Effect, Parameter, si_values
+from workbench.robot import EffectSpec, RobotModel
 
 
 class GroundTilt(Effect):
@@ -24,6 +25,12 @@ class GroundTilt(Effect):
     def sentence(self, spec: EffectSpec) -> str:
         forward, left = spec.parameters["forward"], spec.parameters["left"]
         return f"Gravity leans {forward:.1f} deg forward and {left:.1f} deg to the left of the floor's normal."
+
+    def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        if name != self.twin:
+            return ()
+        values, weight = si_values(self, spec), GRAVITY * sum(model.kinematics.masses.values())
+        return weight * math.tan(values["forward"]), weight * math.tan(values["left"]), 0.0
 
     def gravity(self, gravity: Array, values: Mapping[str, float]) -> Array:
         size = np.linalg.norm(gravity)

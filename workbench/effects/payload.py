@@ -26,7 +26,9 @@ class Payload(Effect):
         return (f"{', '.join(spec.where)} carries {1000 * scalar(spec, 'mass'):.0f} g more, at ({1000 * x:.0f}, {1000 * y:.0f}, "
                 f"{1000 * z:.0f}) mm in its frame.")
 
-    def as_limit(self, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+    def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        if name != self.limit:
+            return ()
         (link,), mass = spec.where, scalar(spec, "mass")
         k = model.kinematics
         share = mass / (k.masses[link] + mass)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
-from workbench.effects.base import Array, Effect, Parameter, vector
-from workbench.robot import EffectSpec
+from workbench.effects.base import GRAVITY, Array, Effect, Parameter, si_values, vector
+from workbench.robot import EffectSpec, RobotModel
 
 
 class TetherForce(Effect):
@@ -19,6 +20,13 @@ class TetherForce(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return "Something pulls at the base with ({:.2f}, {:.2f}, {:.2f}) N.".format(*spec.parameters["force"])  # type: ignore[misc]
+
+    def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
+        if name != self.twin:
+            return ()
+        x, y, _ = vector(si_values(self, spec), "force")
+        weight = GRAVITY * sum(model.kinematics.masses.values())
+        return math.degrees(math.atan(x / weight)), math.degrees(math.atan(y / weight))
 
     def tether(self, values: Mapping[str, float]) -> Array:
         return vector(values, "force")

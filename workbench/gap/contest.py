@@ -44,7 +44,8 @@ elsewhere, and a wrong name may happen to go that way.
 STEPS = 4
 """Of a fit: names that differ by little are told apart at their best alone."""
 TWIN = 1.0 / 3.0
-"""The least odds of a finding's twin that walks tell, where it came near enough to be put in its place."""
+"""The least odds of a finding's twin that walks tell, where it came near enough to be put in its place, and of a name that held
+takes find better but for the price of its numbers."""
 SUREST = 0.98
 """What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
@@ -103,7 +104,7 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     walked = _walked(search, fit.effects[i], taken)
     temper = _temper(search, fit, fit.effects[i], taken)
     leads = np.array([0.0, *(_lead(search, fit, r, taken) for r in rivals)])
-    twins = np.array([False, *(walked and _twin(search, fit, i, r) for r in rivals)])
+    twins = np.array([False, *(_twin(search, fit, i, r) if walked else _outbid(search, fit, i, r) for r in rivals)])
     weight = np.maximum(np.exp(0.5 * (leads - leads.max()) / temper), np.where(twins, TWIN, 0.0))
     p = weight / weight.sum()
     closed = completed(search, *seats[fit.effects[i].key], fit)
@@ -147,8 +148,19 @@ def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
     price = max(NUMBER, NUMBER_SHARE * taken.gain["choose"])
     own = [c.key for c in rival.effects]
     (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
-    better = _better_held(search, fit, rival) if search.is_settled(fit.effects[replaced]) else _better_by_both(fit, rival)
-    return better + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
+    return _ahead(search, fit, rival, replaced) + price * (_told(fit, replaced) - _told(rival, len(own) - 1))
+
+
+def _ahead(search: Search, fit: Fit, rival: Fit, replaced: int) -> float:
+    """The same, whatever numbers cost."""
+    return _better_held(search, fit, rival) if search.is_settled(fit.effects[replaced]) else _better_by_both(fit, rival)
+
+
+def _outbid(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
+    """Whether only the price of more numbers keeps a rival from effect i's place: a load that swings little is nearly a spring.
+    Not one that is effect i with something added."""
+    more = _told(rival, len(rival.effects) - 1) > _told(fit, i)
+    return more and rival.effects[-1].effect.limit != fit.effects[i].name and _ahead(search, fit, rival, i) > 0
 
 
 def _better_by_both(fit: Fit, rival: Fit) -> float:
@@ -178,14 +190,17 @@ def _told(fit: Fit, i: int) -> int:
 
 
 def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
-    """Who came near an effect when it was taken, and is not among those that stay; and what it is at the end of its shape."""
+    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end."""
     r, trial = seats[c.key]
     taken = {e.key for e in effects}
     reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
     there = [t for t in r.rivals(trial) if t.candidate.key not in taken]
-    plain = [t for t in there if t.candidate.key == (c.effect.limit, c.where) and _at_its_end(c, x)]
-    return plain + [t for t in there if not t.foretold and t not in plain
-                    and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
+    alike = {(c.effect.twin, c.where)} if trial.joint is None else set()
+    if _at_its_end(c, x):
+        alike.add((c.effect.limit, c.where))
+    always = [t for t in there if t.candidate.key in alike]
+    return always + [t for t in there if not t.foretold and t not in always
+                     and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
 
 
 def _at_its_end(c: Candidate, x: Array) -> bool:
@@ -195,16 +210,20 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
 
 
 def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
-    """The fit with a rival in effect i's place and its numbers fitted there; the same effect elsewhere begins at the size that
-    the other has, and what the other becomes where that does the same, if that is better."""
+    """The fit with a rival in effect i's place and its numbers fitted there, with those of others in its joint where held takes
+    tell them; the same effect elsewhere begins at the size that the other has, and what the other becomes where that does the
+    same, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)
     starts = [rival.x, np.clip(size, *rival.candidate.bounds())] if alike else [rival.x]
-    if rival.candidate.name == own.effect.limit and (values := own.effect.as_limit(own.spec(size), search.nominal)):
+    values = own.effect.as_other(rival.candidate.name, own.spec(size), search.nominal)
+    if values and rival.candidate.where == own.where:
         starts.append(rival.candidate.sizes(values))
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
-    takes = search.held if search.is_settled(fit.effects[i]) else search.fitted
-    return (yield from search.refitting(there, takes, STEPS, free=[len(others)]))
+    takes = search.held if search.is_settled(own) else search.fitted
+    held = search.is_settled(own) or search.held == search.fitted
+    beside = [j for j, (c, _) in enumerate(others) if held and (search.lone or c.joint == own.joint)]
+    return (yield from search.refitting(there, takes, STEPS, free=[*beside, len(others)]))

@@ -20,10 +20,9 @@ from workbench.gap.fitting import HELD, steps_of
 from workbench.gap.guess import SCANNED, scan
 from workbench.gap.jury import Question
 from workbench.gap.race import Trial
-from workbench.gap.search import Fit, Search
+from workbench.gap.search import Fit, Search, Sizes
 
 Array = NDArray[np.float64]
-Sizes = list[tuple[Candidate, Array]]
 FITTED = 2
 """Others that are fitted in each one's place."""
 
@@ -54,7 +53,7 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
         staying = [n for n in range(len(mine)) if n != k]
         x = [there[mine[n].key] for n in staying]
         sets = [s for t, points, did in zip(others, probes, signatures)
-                for s in _in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
+                for s in in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
         sets.sort(key=lambda s: s[0])
         out += [chosen for cost, chosen in sets[:FITTED] if cost < AS_GOOD * sets[0][0]]
     return out
@@ -69,7 +68,7 @@ def _with(fit: Fit, c: Candidate, x: Array) -> Sizes:
     return [(e, x if e.key == c.key else size) for e, size in fit.sizes()]
 
 
-def _in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
+def in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
               x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
     """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
     was seen; of several, all at once. rest: what is left without the other."""

@@ -20,6 +20,8 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+Sizes = list[tuple[Candidate, Array]]
+"""Effects, each with its sizes."""
 Report = Callable[[str, float | None], None]
 SEEN_ELSEWHERE = ("zero_offset",)
 """What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
@@ -66,12 +68,12 @@ class Fit:
         slices = self.slices()
         return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
 
-    def sizes(self, x: Array | None = None) -> list[tuple[Candidate, Array]]:
+    def sizes(self, x: Array | None = None) -> Sizes:
         """Each effect with its own sizes; with those of another x."""
         x = self.x if x is None else x
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
-    def sizes_without(self, key: Key) -> list[tuple[Candidate, Array]]:
+    def sizes_without(self, key: Key) -> Sizes:
         """Those of all effects but one."""
         return [s for s in self.sizes() if s[0].key != key]
 

@@ -18,6 +18,7 @@ from workbench.gap.channels import BODY, joint_of
 from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several, worst_joint
 from workbench.gap.exchange import exchanges
 from workbench.gap.ledger import channel_gaps
+from workbench.gap.pulls import in_two
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
 from workbench.gap.search import Fit, Report, Search
@@ -79,6 +80,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         search.settled = current = search.retimed(current)
         closed = least_closed(search, nominal, current)
         current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
+        current, rounds = in_two(search, pool, current, rounds)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)

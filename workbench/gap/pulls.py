@@ -1,0 +1,131 @@
+"""Two causes that look like one: a pull that lifts the robot explains much of what a slope and a slippery floor do together.
+
+What explains most by itself is found first, and then nothing completes it. So what came near it is given company, too, foretold
+by lines around each one's own fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gap.asked import ONE_PULL
+from workbench.gap.candidate import Candidate, Key, with_effects
+from workbench.gap.company import priced, seated
+from workbench.gap.exchange import in_place
+from workbench.gap.fitting import WALKING, steps_of
+from workbench.gap.guess import AROUND, SCANNED_GROUND
+from workbench.gap.jury import COARSE, Question
+from workbench.gap.race import Part, Trial
+from workbench.gap.rounds import Round
+from workbench.gap.search import Fit, Search, Sizes
+from workbench.gap.worth import worthwhile
+
+Array = NDArray[np.float64]
+COMPLETE = 0.97
+"""Share of a gap that one effect closes, from which on none is looked for in two: true effects close more."""
+NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
+"""Share of the best one's gain from which on another is given company; how many are, how many pairs are fitted, and steps of
+that."""
+NOTHING = {"fit": 0.0, "choose": 0.0}
+
+
+def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round]) -> tuple[Fit, list[Round]]:
+    """The fit, with two effects in the place of the last of the ground or of masses that walks told, where that left much and
+    these bring enough more, and the rounds with them."""
+    there = current.sizes_by_key()
+    told = [(r, t) for r in rounds for t in r.accepted if _of_the_ground(search, t) and t.candidate.key in there]
+    if not told or told[-1][1].closed > COMPLETE:
+        return current, list(rounds)
+    seat, found = told[-1]
+    rest = search.evaluated(current.sizes_without(found.candidate.key))
+    free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
+    known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
+    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _of_the_ground(search, t)
+              and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
+    pairs = _foretold(search, rest, list(known.values())[:ONES], free)
+    fits = search.side_by_side([_fitted(search, rest, pair) for pair in pairs])
+    ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
+    if not ranked or not _enough(search, *ranked[0], current, rounds):
+        return current, list(rounds)
+    first, second = seated(search, rest, ranked)
+    fitted = {t.candidate.key for r in (first, second) for t in r.trials}
+    first = replace(first, trials=(*first.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
+    return ranked[0][0], [*(r for r in rounds if r is not seat), first, second]
+
+
+def _of_the_ground(search: Search, t: Trial) -> bool:
+    """Whether it is of the ground or of masses, and was fitted to walks."""
+    return not t.foretold and t.joint is None and _keeps_company(t.candidate) and not search.is_settled(t.candidate)
+
+
+def _keeps_company(c: Candidate) -> bool:
+    """What the ground does, and where masses are; not how heavy what is carried is, which walks tell last."""
+    return c.size > 0 and c.effect.layer in ("ground", "inertia") and c.name != "payload"
+
+
+@dataclass(frozen=True)
+class _Around:
+    """What is asked around a fit with one effect: with its numbers moved one at a time, and with each other effect beside it."""
+
+    one: Trial
+    fit: Fit
+    moves: Array
+    probes: list[tuple[Candidate, list[Array]]]
+
+    @classmethod
+    def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate]) -> _Around:
+        c = one.candidate
+        company = [o for o in others if o.key != c.key and not (o.name in ONE_PULL and c.name in ONE_PULL)]
+        return cls(one, fit, steps_of(one.x, *c.bounds(), WALKING, c.magnitudes(one.x)), [(o, _probes(o)) for o in company])
+
+    def asked(self) -> Iterator[Sizes]:
+        yield self.fit.sizes()
+        for x in self.one.x + np.diag(self.moves):
+            yield [(c, x if c.key == self.one.candidate.key else size) for c, size in self.fit.sizes()]
+        for c, points in self.probes:
+            yield from ([*self.fit.sizes(), (c, p)] for p in points)
+
+    def foretold(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[Trial]]]:
+        """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
+        plain, own = next(answers), self.one
+        slopes = np.column_stack([(next(answers) - plain) / move for move in self.moves])
+        for c, points in self.probes:
+            did = [next(answers) - plain for _ in points]
+            yield from in_place(Trial(c, points[0], NOTHING, None), points, did, left, [own.candidate], [own.x], [slopes])
+
+
+def _probes(c: Candidate) -> list[Array]:
+    """Sizes at which an effect is looked at: the floor's alone at two."""
+    sizes = (AROUND,) if c.size > 1 else SCANNED_GROUND[:1] if c.where else SCANNED_GROUND
+    return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
+
+
+def _foretold(search: Search, rest: Fit, ones: Sequence[Trial], others: Sequence[Candidate]) -> list[list[Trial]]:
+    """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
+    takes = search.telling([t.candidate for t in ones], search.fitted)
+    around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others) for t in ones]
+    questions = [Question(with_effects(search.nominal, sizes), takes, COARSE) for a in around for sizes in a.asked()]
+    answers = iter([search.jury.vector(answer, "fit") for answer in search.jury.residuals(questions)])
+    best: dict[frozenset[Key], tuple[float, list[Trial]]] = {}
+    for a in around:
+        for cost, pair in a.foretold(search.jury.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
+            name = frozenset(t.candidate.key for t in pair)
+            best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
+    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIRS]]
+
+
+def _fitted(search: Search, rest: Fit, pair: Sequence[Trial]) -> Part[Fit]:
+    (start,) = yield from search.evaluating([*rest.sizes(), *((t.candidate, t.x) for t in pair)])
+    return (yield from search.refitting(start, search.fitted, STEPS))
+
+
+def _enough(search: Search, fit: Fit, pair: Sequence[Trial], current: Fit, rounds: Sequence[Round]) -> bool:
+    """Whether a pair brings as much more than the one as any effect has to."""
+    takes = search.telling([t.candidate for t in pair], search.fitted)
+    was, now = (search.jury.by_channel({i: f.residuals[i] for i in takes}, "choose")[0] for f in (current, fit))
+    more = replace(pair[-1], gain={use: current.cost[use] - fit.cost[use] for use in NOTHING}, by_channel=was - now)
+    return worthwhile(search, more, search.fitted, rounds, current)
