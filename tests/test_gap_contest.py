@@ -8,6 +8,7 @@ import pytest
 
 from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
+from workbench.gap import doubts
 from workbench.gap.candidate import Candidate
 from workbench.gap.candidates import candidates
 from workbench.gap.contest import (
@@ -75,6 +76,21 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
     residual[:, [e.channels.index(j) for j in ill]] = 4.0
     standing = doubted(search, replace(fit, residuals={0: residual}), [Standing(0.9, ())], {0: np.zeros(len(e.channels))})[0]
     assert standing.probability == pytest.approx(sure)
+
+
+@pytest.mark.parametrize(("lone", "sure"), [(False, 0.9), (True, 0.18)])
+def test_all_that_a_lone_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, lone, sure):
+    _, search, _ = worn
+    monkeypatch.setattr(type(search), "lone", lone)
+    monkeypatch.setattr(doubts, "FEW", 3)  # none of three may err for itself
+    sag = Candidate.of(known_effects()["supply_sag"], (), (0.0,))
+    stiff = Candidate.of(known_effects()["coulomb_friction"], ("one",), (NOMINAL,))
+    fit = replace(search.evaluated([(sag, np.ones(1)), (stiff, np.ones(1))]), covariance=np.full((2, 2), np.inf))
+    e = search.jury.evidence[0]
+    residual = np.zeros_like(fit.residuals[0])
+    residual[:, e.channels.index("one")] = 7.0
+    told = doubted(search, replace(fit, residuals={0: residual}), [Standing(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
+    assert [t.probability for t in told] == pytest.approx([sure, 0.18])
 
 
 @pytest.mark.parametrize(("friction", "sure"), [(1.12, 0.45), (0.88, 0.45), (0.7, 0.9), (1.3, 0.9)])

@@ -128,6 +128,14 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
         assert held.values(np.empty(0)) == pytest.approx(c.typical)
 
 
+@pytest.mark.parametrize(("name", "own", "asked"), [("supply_voltage", 5.0, 4.0), ("supply_voltage", 7.4, 5.92),
+                                                    ("supply_voltage", 12.0, 10.0), ("ground_friction", 0.3, 0.24)])
+def test_a_robot_with_little_of_its_own_is_asked_about_less(name, own, asked):
+    """A small servo's supply of 5 V fails at 4 V; at the 10 V that a larger one feels first it would only be stronger."""
+    effect = known_effects()[name]
+    assert effect.parameters[0].typical_beside(own) == pytest.approx(asked)
+
+
 @pytest.mark.parametrize(("name", "own"), [("ground_friction", 0.4), ("foot_friction", 0.31), ("supply_voltage", 10.0)])
 def test_a_robot_whose_own_value_is_the_typical_one_is_asked_about_another(name, own):
     c = Candidate.of(known_effects()[name], (), (own,))

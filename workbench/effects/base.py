@@ -33,7 +33,7 @@ DEGREE = math.pi / 180
 GRAVITY = 9.81
 """[m/s^2]"""
 NEAR, BEYOND = 0.08, 0.8
-"""Shares of the robot's own value within which the typical one is too near to it, and the one taken instead."""
+"""Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,9 @@ class Parameter:
     replaces: bool = False
 
     def typical_beside(self, neutral: float) -> float:
-        """The typical value, or where the robot's own lies so near that the step between them would show nothing, one beyond."""
-        near = self.replaces and abs(self.typical - neutral) < NEAR * abs(neutral)
+        """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
+        that is so near, or less, that the step between them would show nothing of this, one beyond."""
+        near = self.replaces and self.typical > (1 - NEAR) * neutral
         return BEYOND * neutral if near else self.typical
 
 

@@ -34,11 +34,11 @@ same for a number that would go further if it might, or may be nothing: it makes
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
-    whole robot at joints that no other effect is to answer for; where a floor is nearly the model's, a number as far as it may
-    go, or nothing within its interval; where in fine steps it is `idle`. floors: of the fit, by take."""
+    whole robot at joints that no other effect is to answer for, or at its only one; where a floor is nearly the model's, a number
+    as far as it may go, or nothing within its interval; where in fine steps it is `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
-    out, theirs = [], {c.joint for c in fit.effects}
+    out, theirs = [], set() if search.lone else {c.joint for c in fit.effects}
     for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
         told_held = search.is_settled(c) or search.held == search.fitted
         worst = _left_at(c, left, theirs) if told_held else 0.0
