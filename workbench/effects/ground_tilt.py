@@ -29,7 +29,7 @@ class GroundTilt(Effect):
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         if name != self.twin:
             return ()
-        values, weight = si_values(self, spec), GRAVITY * sum(model.kinematics.masses.values())
+        values, weight = si_values(self, spec), GRAVITY * model.kinematics.mass
         return weight * math.tan(values["forward"]), weight * math.tan(values["left"]), 0.0
 
     def gravity(self, gravity: Array, values: Mapping[str, float]) -> Array:

@@ -25,7 +25,7 @@ class TetherForce(Effect):
         if name != self.twin:
             return ()
         x, y, _ = vector(si_values(self, spec), "force")
-        weight = GRAVITY * sum(model.kinematics.masses.values())
+        weight = GRAVITY * model.kinematics.mass
         return math.degrees(math.atan(x / weight)), math.degrees(math.atan(y / weight))
 
     def tether(self, values: Mapping[str, float]) -> Array:

@@ -68,14 +68,12 @@ def heavy_links(model: RobotModel) -> list[str]:
     k = model.kinematics
     feet = [k.frames[f].child for f in foot_points(model.path) if f in k.frames]
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
-    whole = sum(k.masses.values())
-    return [link for link in k.links if k.masses[link] >= whole * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
+    return [link for link in k.links if k.masses[link] >= k.mass * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    heavy = heavy_links(model)
     if effect.layer == "inertia" and all(p.vector for p in effect.parameters):
-        yield from ((link,) for link in heavy)
+        yield from ((link,) for link in heavy_links(model))
         return
     frames, feet = model.kinematics.frames, [f for f in foot_points(model.path) if f in seen]
     links: Sequence[str] = model.kinematics.links

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.channels import BODY, joint_of
-from workbench.gap.race import Trial
+from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import LEAST_GAIN, Round
 from workbench.gap.search import Fit, Search
 
@@ -158,6 +158,12 @@ def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[
     if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
         return []
     return companies(search, current, trials, takes, joint)
+
+
+def fitted_beside(search: Search, current: Fit, added: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
+    """All effects fitted together, when some were added."""
+    (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in added)])
+    return (yield from search.refitting(start, takes, steps))
 
 
 def priced(fit: Fit) -> float:

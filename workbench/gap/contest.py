@@ -164,7 +164,7 @@ def _outbid(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
 
 
 def _better_by_both(fit: Fit, rival: Fit) -> float:
-    """By how much a rival is better of an effect that walks told, of chi squared on the choosing stretches: twice as many are
+    """By how much a rival is better of an effect that all takes tell, of chi squared on the choosing stretches: twice as many are
     fitted, and say as much of each; what more numbers make of these is in their price."""
     choose, fitted = (fit.cost[use] - rival.cost[use] for use in ("choose", "fit"))
     return (choose + fitted / 2) / 2
@@ -223,7 +223,7 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
-    takes = search.held if search.is_settled(own) else search.fitted
-    held = search.is_settled(own) or search.held == search.fitted
+    held = search.told_held(own)
+    takes = search.held if held else search.fitted
     beside = [j for j, (c, _) in enumerate(others) if held and (search.lone or c.joint == own.joint)]
     return (yield from search.refitting(there, takes, STEPS, free=[*beside, len(others)]))

@@ -40,8 +40,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], set() if search.lone else {c.joint for c in fit.effects}
     for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
-        told_held = search.is_settled(c) or search.held == search.fitted
-        worst = _left_at(c, left, theirs) if told_held else 0.0
+        worst = _left_at(c, left, theirs) if search.told_held(c) else 0.0
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
         if c.read_off and c.effect.free_play:
             factor = max(factor, RATTLES)

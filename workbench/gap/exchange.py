@@ -25,6 +25,8 @@ from workbench.gap.search import Fit, Search, Sizes
 Array = NDArray[np.float64]
 FITTED = 2
 """Others that are fitted in each one's place."""
+NOTHING = {"fit": 0.0, "choose": 0.0}
+"""The gain of what lines only foretell."""
 
 
 def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str, alone: Sequence[Candidate]
@@ -38,7 +40,7 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
         return []
     moves = [_moved(c, there[c.key]) for c in mine]
     probes = [scan(t.candidate, SCANNED, walking=False) for t in others]
-    asked: list[Sizes] = [_with(fit, c, x) for c, points in zip(mine, moves) for x in points]
+    asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
     asked += [fit.sizes_without(c.key) for c in mine]
     asked += [[*fit.sizes(), (t.candidate, p)] for t, points in zip(others, probes) for p in points]
     answers = search.jury.residuals([Question(with_effects(search.nominal, sizes), takes) for sizes in asked])
@@ -64,22 +66,17 @@ def _moved(c: Candidate, x: Array) -> list[Array]:
     return list(x + np.diag(steps_of(x, *c.bounds(), HELD)))
 
 
-def _with(fit: Fit, c: Candidate, x: Array) -> Sizes:
-    return [(e, x if e.key == c.key else size) for e, size in fit.sizes()]
-
-
 def in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
-              x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
+             x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
     """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
     was seen; of several, all at once. rest: what is left without the other."""
     ends = np.cumsum([0, *(len(size) for size in x)])
-    gain = {"fit": 0.0, "choose": 0.0}
     ways: list[tuple[float, list[Trial]]] = []
     for seen in variants(t, points, did):
         solved = lsq_linear(np.column_stack([*slopes, seen.signatures]), -rest, _bounds(seen, staying, x))
         size = seen.sizes(solved.x[ends[-1]:])
         if possible(seen, size):
-            beside = [Trial(e, start + solved.x[a:b], gain, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
+            beside = [Trial(e, start + solved.x[a:b], NOTHING, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
             ways.append((2.0 * float(solved.cost), [*beside, replace(t, x=size, foretold=False)]))
     return sorted(ways, key=lambda way: way[0])[:1]
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from workbench.gap.asked import ONE_PULL
 from workbench.gap.candidate import Candidate, Key, with_effects
-from workbench.gap.company import priced, seated
-from workbench.gap.exchange import in_place
+from workbench.gap.company import fitted_beside, priced, seated
+from workbench.gap.exchange import NOTHING, in_place
 from workbench.gap.fitting import WALKING, steps_of
 from workbench.gap.guess import AROUND, SCANNED_GROUND
 from workbench.gap.jury import COARSE, Question
-from workbench.gap.race import Part, Trial
+from workbench.gap.race import Trial
 from workbench.gap.rounds import Round
 from workbench.gap.search import Fit, Search, Sizes
 from workbench.gap.worth import worthwhile
@@ -30,7 +30,6 @@ COMPLETE = 0.97
 NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
 """Share of the best one's gain from which on another is given company; how many are, how many pairs are fitted, and steps of
 that."""
-NOTHING = {"fit": 0.0, "choose": 0.0}
 
 
 def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round]) -> tuple[Fit, list[Round]]:
@@ -47,7 +46,7 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _of_the_ground(search, t)
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
     pairs = _foretold(search, rest, list(known.values())[:ONES], free)
-    fits = search.side_by_side([_fitted(search, rest, pair) for pair in pairs])
+    fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
     ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
@@ -85,7 +84,7 @@ class _Around:
     def asked(self) -> Iterator[Sizes]:
         yield self.fit.sizes()
         for x in self.one.x + np.diag(self.moves):
-            yield [(c, x if c.key == self.one.candidate.key else size) for c, size in self.fit.sizes()]
+            yield self.fit.sizes_with(self.one.candidate.key, x)
         for c, points in self.probes:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
@@ -116,11 +115,6 @@ def _foretold(search: Search, rest: Fit, ones: Sequence[Trial], others: Sequence
             name = frozenset(t.candidate.key for t in pair)
             best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
     return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIRS]]
-
-
-def _fitted(search: Search, rest: Fit, pair: Sequence[Trial]) -> Part[Fit]:
-    (start,) = yield from search.evaluating([*rest.sizes(), *((t.candidate, t.x) for t in pair)])
-    return (yield from search.refitting(start, search.fitted, STEPS))
 
 
 def _enough(search: Search, fit: Fit, pair: Sequence[Trial], current: Fit, rounds: Sequence[Round]) -> bool:

@@ -77,6 +77,10 @@ class Fit:
         """Those of all effects but one."""
         return [s for s in self.sizes() if s[0].key != key]
 
+    def sizes_with(self, key: Key, x: Array) -> Sizes:
+        """Those of all effects, one at other sizes."""
+        return [(c, x if c.key == key else own) for c, own in self.sizes()]
+
     def sizes_by_key(self) -> dict[Key, Array]:
         """Of each effect, by what it is and where."""
         return {c.key: x for c, x in self.sizes()}
@@ -114,6 +118,10 @@ class Search:
     def is_settled(self, c: Candidate) -> bool:
         """Whether held takes told its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
+
+    def told_held(self, c: Candidate) -> bool:
+        """The same, or there are no others."""
+        return self.is_settled(c) or self.held == self.fitted
 
     def grounded(self, takes: tuple[int, ...]) -> tuple[int, ...]:
         """Of these takes, those whose base is not held."""

@@ -15,11 +15,11 @@ from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
-from workbench.gap.company import HALF, NEARLY_ALL, priced, seated, several, worst_joint
+from workbench.gap.company import HALF, NEARLY_ALL, fitted_beside, priced, seated, several, worst_joint
 from workbench.gap.exchange import exchanges
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.pulls import in_two
-from workbench.gap.race import Part, Trial
+from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
 from workbench.gap.search import Fit, Report, Search
 from workbench.gap.worth import (
@@ -123,12 +123,13 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
+            # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
             said = bool(trials) and _says_it(search, current, trials[0], takes, tier)
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 break
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
-        fits = search.side_by_side([_with(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
+        fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
@@ -188,7 +189,7 @@ def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
     """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
-    begun = search.side_by_side([_with(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
+    begun = search.side_by_side([fitted_beside(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
     ranked = sorted(zip(begun, sets), key=lambda f: priced(f[0]))
     ended = search.side_by_side([search.refitting(fit, takes, TOGETHER_STEPS) for fit, _ in ranked[:AHEAD]])
     return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[AHEAD:]], key=lambda f: priced(f[0]))
@@ -212,12 +213,6 @@ def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]
     cost, expected = search.jury.by_channel({i: current.residuals[i] for i in here}, "choose")
     own = np.concatenate([np.isin(e.columns(), e.columns(t.candidate.joint)) for e in (search.jury.evidence[i] for i in here)])
     return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
-
-
-def _with(search: Search, current: Fit, accepted: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
-    """All effects fitted together, when some were added."""
-    (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in accepted)])
-    return (yield from search.refitting(start, takes, steps))
 
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:

@@ -93,11 +93,9 @@ def worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[
     settled = _settling(search, rounds)
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    if gain > max(least, WALKING_SHARE * brought) or not walked:
-        return gain > least
-    # what they brought may have been in other channels
-    elsewhere = _beyond_error(search, t, takes, walked[0][0].before, current, WALKING_SHARE)
-    return min(gain, elsewhere) > least
+    if walked and gain <= WALKING_SHARE * brought:  # which may have been in other channels
+        gain = min(gain, _beyond_error(search, t, takes, walked[0][0].before, current, WALKING_SHARE))
+    return gain > least
 
 
 def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:

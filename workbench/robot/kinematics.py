@@ -73,6 +73,11 @@ class Kinematics:
         """Parses an SDF held in memory; `path` is the file it came from, which errors name."""
         return _parse(Path(path), text)
 
+    @property
+    def mass(self) -> float:
+        """Of the whole robot [kg]."""
+        return sum(self.masses.values())
+
     def joint_of(self, link: str) -> str | None:
         """Name of the joint that carries `link`; None for the root."""
         return self.parent_joint[link]

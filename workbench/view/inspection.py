@@ -181,7 +181,7 @@ def _model(name: str) -> Inspection:
         name, "model", f"SDF {version[1]}" if version else path.suffix.lstrip(".").upper(), "m, kg, rad",
         joints=kinematics.joints,
         details={"links": list(kinematics.links), "root": kinematics.root,
-                 "mass": f"{sum(kinematics.masses.values()):.4f} kg",
+                 "mass": f"{kinematics.mass:.4f} kg",
                  "base": "fixed to the world" if kinematics.fixed_to_world else "free"})
 
 

@@ -73,7 +73,7 @@ def robot_shapes(model: RobotModel) -> RobotShapes:
         frame = plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link).index())
         seen = inspector.GetGeometries(frame, Role.kIllustration) or inspector.GetGeometries(frame, Role.kProximity)
         visuals[link] = [_visual(inspector, g, meshes) for g in seen if not isinstance(inspector.GetShape(g), HalfSpace)]
-    return RobotShapes(visuals, meshes, feet, sum(kinematics.masses.values()), _height(model, visuals, feet))
+    return RobotShapes(visuals, meshes, feet, kinematics.mass, _height(model, visuals, feet))
 
 
 def _visual(inspector: Any, geometry: Any, meshes: dict[str, list[MeshPart]]) -> VisualShape:
