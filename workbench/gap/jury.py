@@ -130,8 +130,8 @@ class Jury:
         left = self.vector(residuals, use, joint)
         return float(left @ left)
 
-    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None, share: float = 0.0,
-               everywhere: bool = False) -> float:
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
+               share: float | Array = 0.0, everywhere: bool = False) -> float:
         """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
         has gone of it since `before`. everywhere: of walks beyond noise, as steps and contact models rarely make them as wrong as
         they may, and of all channels, as what moves the robot shows a little in each."""

@@ -217,12 +217,15 @@ def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]
 
 def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
-    robot's the best. Where a race does not tell who is ahead, each of them to be fitted."""
+    robot's the best, but not what leaves half where another closes nearly all. Where a race does not tell who is ahead, each of
+    them to be fitted."""
     if not worth:
         return []
     best = worth[0]
     if best.joint is None:
-        return [[t] for t in worth[:MOST_RIVALS + 1] if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
+        close = [t for t in worth if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
+        whole = [t for t in close if t.closed > NEARLY_ALL] if best.closed < LAST_CLOSED else []
+        return [[t] for t in (whole or close)[:MOST_RIVALS + 1]]
     # recordings that end at a stop show it, whatever else keeps a stiff spring ahead of it for now
     shown = next((t for t in worth if t.candidate.read_off and t.joint == best.joint
                   and t.gain["choose"] > HALFWAY * best.gain["choose"]), None)

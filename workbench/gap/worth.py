@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from workbench.gap.asked import standing_out
+from workbench.gap.asked import STANDS_OUT, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import joint_of
 from workbench.gap.company import NEARLY_ALL
-from workbench.gap.ledger import channel_gaps
+from workbench.gap.evidence import TakeEvidence
+from workbench.gap.ledger import GAP_RATIO, channel_gaps
 from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Round, before_rough, taken
 from workbench.gap.search import Fit, Search
 
+Array = NDArray[np.float64]
 LEAST_WALKING = 300.0
 """LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
 ALL_CLOSED = 0.5
@@ -23,6 +26,9 @@ LEAST_SHARE, WALKING_SHARE = 0.01, 0.02
 """Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
 held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
 a second effect must not live on that."""
+ALONE = 0.25
+"""Of LEAST_SHARE, for a held joint that nothing was given to and of which much more than of any other is left: what engines
+play differently of an effect that all joints show, they do in all."""
 ROUGH_SHARE, LEFT_SHARE = 0.04, 0.02
 """The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
 LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
@@ -37,9 +43,27 @@ def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...],
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = share if i in search.held else ROUGH_SHARE
-        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least * (was.get(c, 0.0)**2 - 1)}
+        least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, share if i in search.held else ROUGH_SHARE)))
+        out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least[c] * (was.get(c, 0.0)**2 - 1)}
     return out
+
+
+def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> Array:
+    """By channel of a take, the share that effects may err by, of what they brought from `before` to `now`."""
+    e = search.jury.evidence[take]
+    shares = np.full(len(e.channels), share)
+    if not search.jury.walks((take,)):
+        was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
+        parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > GAP_RATIO**2 - 1)
+        if len(parts) > 1 and parts[-1][0] > STANDS_OUT * parts[-2][0] and parts[-1][1] not in {c.joint for c in now.effects}:
+            shares[e.columns(parts[-1][1])] *= ALONE
+    return shares
+
+
+def _of_joints(e: TakeEvidence, residual: Array) -> dict[str, float]:
+    """What is beyond noise, of chi squared by frame, in each joint's channels."""
+    beyond = np.nan_to_num(np.maximum(np.nanmean(np.square(residual[e.moving]), axis=0) - 1.0, 0.0))
+    return {j: float(np.sum(beyond[e.columns(j)])) for j in e.joints}
 
 
 def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
@@ -64,7 +88,8 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
     for i in takes:
         if channel_gaps(jury.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
-            left += sum(jury.beyond(now, use, was, share, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
+            may_err = _may_err(search, before, current, i, share)
+            left += sum(jury.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
         return left < ALL_CLOSED * LEAST_GAIN
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
@@ -103,7 +128,9 @@ def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, n
     channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
     here = search.telling([t.candidate], tuple(takes))
     was, left = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
-    may_err = share * np.maximum(was - left, 0.0)
+    evidence = search.jury.evidence
+    shares = np.concatenate([_may_err(search, before, now, i, share)[evidence[i].columns(t.joint)] for i in sorted(here)])
+    may_err = shares * np.maximum(was - left, 0.0)
     return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
 
 
