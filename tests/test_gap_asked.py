@@ -56,6 +56,19 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     assert [[t.candidate.name for t in c] for c in choices] == [chosen]
 
 
+@pytest.mark.parametrize(("closed", "gain", "chosen"), [
+    ((0.16, 0.97), 514.0, ["com_shift"]), ((0.6, 0.97), 514.0, ["soft_ground", "com_shift"]),
+    ((0.16, 0.85), 514.0, ["soft_ground", "com_shift"]), ((0.16, 0.97), 300.0, ["soft_ground"])])
+def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_about_the_same(closed, gain, chosen):
+    """Beside a centre of mass elsewhere soft ground brought a tenth more, by one number for three, and closed a sixth."""
+    known = known_effects()
+    soft = Candidate.of(known["soft_ground"], (), (1e5,))
+    shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
+    trials = [Trial(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
+              for c, g, share in zip((soft, shifted), (565.0, gain), closed)]
+    assert [[t.candidate.name for t in c] for c in selection._accepted(trials)] == [[name] for name in chosen]
+
+
 def test_beside_a_pull_no_tilt_is_asked(worn):
     _, search, nominal = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))

@@ -79,6 +79,18 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
     assert not worth.too_little_left(search, fit(two=10.0), (0,), [first])
 
 
+@pytest.mark.parametrize(("left", "given", "asked"), [
+    ({"three": 8.0}, False, {"three"}), ({"three": 8.0}, True, set()), ({"three": 8.0, "two": 4.0}, False, set()),
+    ({"three": 4.0}, False, set())])
+def test_of_what_all_joints_show_hundredths_may_be_left_in_all_but_not_in_one_alone(worn, left, given, asked):
+    """As other speeds of all servos hide that a gear of one twists."""
+    session, whole, _ = worn
+    search = Search(whole.jury, session.model)
+    own = next(c for c in candidates(session.model, whole.jury.evidence) if c.key == ("backlash", ("three",)))
+    now = replace(leaving(worn, **left), effects=(own,) if given else ())
+    assert set(worth.remaining(search, now, leaving(worn, one=60.0, two=60.0, three=100.0), (0,))) == asked
+
+
 def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
     session, whole, nominal = worn
     search = Search(whole.jury, session.model)
