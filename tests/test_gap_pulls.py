@@ -26,6 +26,10 @@ def candidate(name):
     return Candidate.of(effect, where, effect.neutral(model))
 
 
+def silent(stage, share):
+    """Progress that nobody reads."""
+
+
 class LinearSearch:
     """A walk that answers in lines, fitted to its end at once."""
 
@@ -103,7 +107,7 @@ def test_a_slope_and_a_slippery_floor_are_found_where_a_pull_that_lifts_was():
     search = LinearSearch(ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     fit, seat = found(search, "tether_force", "ground_friction")
     assert fit.cost["choose"] > 500
-    now, rounds = pulls.in_two(search, POOL, fit, [seat])
+    now, rounds = pulls.in_two(search, POOL, fit, [seat], silent)
     names = {c.name for c in now.effects}
     assert "ground_friction" in names
     assert names - {"ground_friction"} <= {"ground_tilt", "tether_force"}
@@ -116,7 +120,7 @@ def test_a_slope_and_a_slippery_floor_are_found_where_a_pull_that_lifts_was():
 def test_one_that_explains_nearly_all_is_left_alone_and_nothing_is_asked():
     search = LinearSearch(ground_tilt=(2.0, 1.0))
     fit, seat = found(search, "ground_tilt", closed=0.99)
-    assert pulls.in_two(search, POOL, fit, [seat]) == (fit, [seat])
+    assert pulls.in_two(search, POOL, fit, [seat], silent) == (fit, [seat])
     assert search.asked == 0
 
 
@@ -124,7 +128,7 @@ def test_two_that_bring_little_more_than_one_do_not_take_its_place():
     search = LinearSearch(ground_tilt=(2.0, 1.0), soft_ground=(0.1,))
     fit, seat = found(search, "tether_force")
     assert 0 < fit.cost["choose"] < 300
-    assert pulls.in_two(search, POOL, fit, [seat])[0] is fit
+    assert pulls.in_two(search, POOL, fit, [seat], silent)[0] is fit
     assert search.asked > 0
 
 
@@ -132,10 +136,10 @@ def test_joints_loads_and_what_was_only_foretold_get_no_company():
     search = LinearSearch(ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     for name in ("backlash", "payload"):
         fit, seat = found(search, name)
-        assert pulls.in_two(search, POOL, fit, [seat]) == (fit, [seat])
+        assert pulls.in_two(search, POOL, fit, [seat], silent) == (fit, [seat])
     fit, seat = found(search, "tether_force", "ground_friction")
     told = replace(seat, trials=(seat.trials[0], replace(seat.trials[1], foretold=True)))
-    pulls.in_two(search, POOL, fit, [seat])
+    pulls.in_two(search, POOL, fit, [seat], silent)
     both, search.asked = search.asked, 0
-    pulls.in_two(search, POOL, fit, [told])
+    pulls.in_two(search, POOL, fit, [told], silent)
     assert 0 < search.asked < both

@@ -21,7 +21,7 @@ from workbench.gap.guess import AROUND, SCANNED_GROUND
 from workbench.gap.jury import COARSE, Question
 from workbench.gap.race import Trial
 from workbench.gap.rounds import Round
-from workbench.gap.search import Fit, Search, Sizes
+from workbench.gap.search import Fit, Report, Search, Sizes
 from workbench.gap.worth import worthwhile
 
 Array = NDArray[np.float64]
@@ -32,7 +32,8 @@ NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
 that."""
 
 
-def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round]) -> tuple[Fit, list[Round]]:
+def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], report: Report
+           ) -> tuple[Fit, list[Round]]:
     """The fit, with two effects in the place of the last of the ground or of masses that walks told, where that left much and
     these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
@@ -40,6 +41,7 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     if not told or told[-1][1].closed > COMPLETE:
         return current, list(rounds)
     seat, found = told[-1]
+    report(f"trying two causes for {found.candidate}", None)
     rest = search.evaluated(current.sizes_without(found.candidate.key))
     free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
     known = {found.candidate.key: replace(found, x=there[found.candidate.key])}

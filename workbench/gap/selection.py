@@ -80,7 +80,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         search.settled = current = search.retimed(current)
         closed = least_closed(search, nominal, current)
         current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
-        current, rounds = in_two(search, pool, current, rounds)
+        current, rounds = in_two(search, pool, current, rounds, report)
     kept = _without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
