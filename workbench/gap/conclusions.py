@@ -23,7 +23,7 @@ from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
-LEAST_RELATIVE = 0.004
+LEAST_RELATIVE = 0.005
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""

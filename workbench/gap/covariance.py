@@ -12,9 +12,9 @@ from workbench.gap.jury import Jury, take_of
 
 Array = NDArray[np.float64]
 Z90 = 1.645
-WIDER = 1.1
+WIDER = 1.3
 """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
-engine, or the world, is not ours."""
+engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials held the truth, with 1.3 it is 91 %."""
 TEMPER_WALKING = 60.0
 """What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of the
 same effect that begin elsewhere end some hundreds apart there."""

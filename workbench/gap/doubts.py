@@ -12,7 +12,6 @@ from workbench.gap.asked import FEW
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import joint_of
 from workbench.gap.contest import LEAST, Standing
-from workbench.gap.covariance import WIDER, Z90
 from workbench.gap.evidence import ratios
 from workbench.gap.search import Fit, Search
 
@@ -29,13 +28,15 @@ ALIKE_FLOOR, HARDLY = 0.15, 0.5
 """By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
 robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
 same for a number that would go further if it might, or may be nothing: it makes up for something else."""
+NOTHING = 1.81
+"""Standard deviations from neutral within which a number may be nothing."""
 
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
     whole robot at joints that no other effect is to answer for, or at its only one; where a floor is nearly the model's, a number
-    as far as it may go, or nothing within its interval; where in fine steps it is `idle`. floors: of the fit, by take."""
+    as far as it may go, or nearly nothing; where in fine steps it is `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], set() if search.lone else {c.joint for c in fit.effects}
@@ -73,8 +74,8 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
 
 
 def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np.bool_]) -> bool:
-    """Whether the 90 % intervals of all numbers that make an effect hold what it vanishes at."""
-    half = Z90 * WIDER * np.sqrt(np.diag(covariance))
+    """Whether all numbers that make an effect are within NOTHING of what it vanishes at."""
+    half = NOTHING * np.sqrt(np.diag(covariance))
     makes = makes & np.isfinite(half)
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
 
