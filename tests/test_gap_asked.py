@@ -69,6 +69,20 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     assert [[t.candidate.name for t in c] for c in selection._accepted(trials)] == [[name] for name in chosen]
 
 
+@pytest.mark.parametrize(("base", "shares", "of_all"), [
+    ("fixed", (0.1, 0.97, 0.99), True), ("fixed", (0.1, 0.5, 0.99), False), ("fixed", (0.97, 0.99), False),
+    ("free", (0.1, 0.97, 0.99), False)])
+def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_more_one_lacks(monkeypatch, base, shares, of_all):
+    """Beside another clock rate, play in one joint kept joints and sets of effects being asked until the limit of work."""
+    joints = [f"joint{n}" for n in range(len(shares))]
+    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"))
+    monkeypatch.setattr(selection, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
+    for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
+        trial = Trial(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
+        beyond = dict.fromkeys([*joints, "heading"], 9.0)
+        assert selection.is_of_all(search, None, trial, (0,), beyond) is expected
+
+
 def test_beside_a_pull_no_tilt_is_asked(worn):
     _, search, nominal = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))

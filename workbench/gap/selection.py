@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from workbench.gap.anew import Played, played_anew
-from workbench.gap.asked import LONE, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.asked import FEW, LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
 from workbench.gap.company import HALF, NEARLY_ALL, fitted_beside, priced, seated, several, worst_joint
@@ -124,7 +124,8 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
-            said = bool(trials) and _says_it(search, current, trials[0], takes, tier)
+            said = any(_says_it(search, current, t, takes, tier) or is_of_all(search, current, t, takes, beyond)
+                       for t in trials[:1])
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 break
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
@@ -134,7 +135,8 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
-        together = [] if stopped or read_off else _together(search, current, trials, takes, beyond)
+        of_all = bool(accepted) and is_of_all(search, current, accepted[0], takes, beyond)
+        together = [] if stopped or read_off or of_all else _together(search, current, trials, takes, beyond)
         if together and priced(together[0][0]) < HALF * priced(after):
             after = together[0][0]
             seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
@@ -199,19 +201,28 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
     surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
-        return t.gain["choose"] > LEAST_WALKING and _closed_there(search, current, t, takes) > OWN_GAP
+        return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
     if not surely:
         return t.closed > ENOUGH
     return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
 
 
-def _closed_there(search: Search, current: Fit, t: Trial, takes: tuple[int, ...]) -> float:
-    """Share of what is beyond noise in its own joint that an effect judged by all channels takes away."""
+def is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
+    """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
+    common, whatever more one of them lacks."""
+    joints = {joint_of(c) for c in beyond if c not in BODY}
+    if t.candidate.where or len(joints) <= FEW or search.jury.walks(takes):
+        return False
+    return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > NEARLY_ALL
+
+
+def _closed_at(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], joint: str | None) -> float:
+    """Share of what is beyond noise in a joint that an effect judged by all channels takes away."""
     if not len(t.by_channel):
         return 0.0
     here = search.telling([t.candidate], takes)
     cost, expected = search.jury.by_channel({i: current.residuals[i] for i in here}, "choose")
-    own = np.concatenate([np.isin(e.columns(), e.columns(t.candidate.joint)) for e in (search.jury.evidence[i] for i in here)])
+    own = np.concatenate([np.isin(e.columns(), e.columns(joint)) for e in (search.jury.evidence[i] for i in here)])
     return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
 
 
