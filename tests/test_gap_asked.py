@@ -80,7 +80,7 @@ def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_
     for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
         trial = Trial(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
         beyond = dict.fromkeys([*joints, "heading"], 9.0)
-        assert selection.is_of_all(search, None, trial, (0,), beyond) is expected
+        assert selection._is_of_all(search, None, trial, (0,), beyond) is expected
 
 
 def test_beside_a_pull_no_tilt_is_asked(worn):

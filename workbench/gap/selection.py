@@ -124,8 +124,8 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
-            said = any(_says_it(search, current, t, takes, tier) or is_of_all(search, current, t, takes, beyond)
-                       for t in trials[:1])
+            said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
+                                     or _is_of_all(search, current, trials[0], takes, beyond))
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 break
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
@@ -135,7 +135,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
-        of_all = bool(accepted) and is_of_all(search, current, accepted[0], takes, beyond)
+        of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
         together = [] if stopped or read_off or of_all else _together(search, current, trials, takes, beyond)
         if together and priced(together[0][0]) < HALF * priced(after):
             after = together[0][0]
@@ -207,7 +207,7 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
     return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
 
 
-def is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
+def _is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
     """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
     common, whatever more one of them lacks."""
     joints = {joint_of(c) for c in beyond if c not in BODY}
