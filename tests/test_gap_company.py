@@ -7,8 +7,10 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
-from workbench.gap.company import Seen, _best_sets, several, variants
+from workbench.gap.company import Seen, _best_sets, begun_again, several, variants
 from workbench.gap.race import Trial
+from workbench.gap.rounds import LEAST_GAIN
+from workbench.gap.search import Fit
 
 
 def trial(name, closed=0.5, joint="knee"):
@@ -72,3 +74,28 @@ def test_pairs_that_lines_foretell_about_as_well_are_all_fitted():
     pool = [seen("supply_sag", sag), seen("clock_rate", late), seen("timing_drift", late + 0.1 * noise)]
     sets = names(_best_sets(pool, -(2.0 * sag + late) + 0.2 * rng.normal(size=400)))
     assert sets == [{"supply_sag", "clock_rate"}, {"supply_sag", "timing_drift"}]
+
+
+@pytest.mark.parametrize(("elsewhere", "again"), [(40.0, True), (60.0, False)])
+def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_far_less(elsewhere, again):
+    """Stribeck friction's speed and torque leave a valley that bends: what a fit ends at is beside it."""
+    friction, play = (trial(n).candidate for n in ("stribeck_friction", "backlash"))
+    begun = []
+
+    def fit_at(sizes, cost):
+        x = np.concatenate([x for _, x in sizes])
+        return Fit(tuple(c for c, _ in sizes), x, np.eye(len(x)), {"choose": cost}, {})
+
+    def ended(start, takes, steps):
+        begun.append(start)
+        return fit_at(start.sizes(), elsewhere if start.x[0] > 1.0 and start.x[1] < 0.5 else 1000.0)
+
+    search = SimpleNamespace(side_by_side=list, evaluating=lambda *starts: [fit_at(s, 1e4) for s in starts], refitting=ended,
+                             refitted=ended)
+    here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + LEAST_GAIN * 3)
+    there = begun_again(search, here, (0,), 9)
+    assert (there is not here) is again
+    assert {tuple(np.sign(f.x[:2] - here.x[:2])) for f in begun} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}
+    assert all(f.x[2] == 2.0 for f in begun)
+    alone = fit_at([(play, np.array([2.0]))], 100.0)
+    assert begun_again(search, alone, (0,), 9) is alone

@@ -17,7 +17,7 @@ from workbench.gap.evidence import gather
 from workbench.gap.findings import Change
 from workbench.gap.jury import Jury, Question
 from workbench.gap.missed import LEAST_CLOSED, SURELY, Missed, _least_closed, _read, _stands_at_an_end, with_missed
-from workbench.gap.passed_over import passed_over, played_without
+from workbench.gap.passed_over import _suspects, passed_over, played_without
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Search
 from workbench.gap.session import load_session
@@ -113,8 +113,8 @@ def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet)
     assert search.jury.evidence[0].take.commands is jury.evidence[0].take.commands
 
 
-@pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])
-def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet, lost):
+def quick_session(quiet, lost):
+    """The jury of the arm moved on before it comes to rest, recorded without some poses of joint one."""
     e = quiet[1].evidence[0]
     times = np.arange(0.0, e.take.commands.end - 0.1, 0.15)
     swing = np.deg2rad(np.tile([18.0, 6.0, -9.0, -9.0, 15.0], 40)[:len(times)])
@@ -124,9 +124,25 @@ def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet
                     poses=e.take.commands.poses[first])
     played = without_poses(quick, quick.column("one"), lost)
     there = recorded_with(quiet, quiet[0], played)
-    jury = there.on([replace(there.evidence[0], take=replace(e.take, commands=quick))])
+    return there.on([replace(there.evidence[0], take=replace(e.take, commands=quick))])
+
+
+@pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])
+def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet, lost):
+    jury = quick_session(quiet, lost)
     found = passed_over(jury, quiet[0], nominal_residuals(quiet, jury))
     assert found == ({(0, "one"): lost} if lost else {})
+
+
+def test_of_poses_in_a_row_that_may_be_missed_the_first_is_asked_alone(quiet):
+    """The cameras saw nothing until the next pose came, as a joint stayed behind: together neither pose would be believed."""
+    e = quick_session(quiet, ()).evidence[0]
+    time, times = e.take.recorded.since_start, e.take.commands.times
+    residual = np.zeros_like(e.recorded)
+    residual[(time > times[6] - 0.05) & (time < times[7])] = np.nan
+    residual[time > times[7] + 0.03, e.joints.index("one")] = 20.0  # poses 6 and 7 go down
+    assert _suspects(quiet[1].on([e]), {0: residual}, {}, set()) == {(0, "one"): (6,)}
+    assert _suspects(quiet[1].on([e]), {0: residual}, {}, {(0, "one", 6)}) == {(0, "one"): (7,)}
 
 
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):

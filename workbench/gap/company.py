@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,10 @@ HALF = 0.5
 SIZES, FITTED, AS_GOOD = (2, 3), 6, 2.0
 """Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does, as
 lines foretell roughly."""
+AGAIN = tuple(product((0.75, 1.33), (-0.7, 0.7)))
+"""Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
+MOST_STEPS = 5
+"""Of a fit of all effects, when one was added, and where it is begun again."""
 
 
 @dataclass(frozen=True)
@@ -164,6 +168,19 @@ def fitted_beside(search: Search, current: Fit, added: Sequence[Trial], takes: t
     """All effects fitted together, when some were added."""
     (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in added)])
     return (yield from search.refitting(start, takes, steps))
+
+
+def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
+    """A fit, or a far better end that it comes to from elsewhere: numbers that shape an effect bend what it does, and a fit may
+    end beside the valley. steps: of the last fit."""
+    starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))
+              for c, x in fit.sizes() if c.shapes.any() for share, doublings in AGAIN]
+    if not starts:
+        return fit
+    begun = search.side_by_side([search.evaluating(*starts)])[0]
+    ends = search.side_by_side([search.refitting(start, takes, MOST_STEPS) for start in begun])
+    best = min(ends, key=priced)
+    return search.refitted(best, takes, steps) if priced(best) < HALF * priced(fit) else fit
 
 
 def priced(fit: Fit) -> float:

@@ -78,7 +78,8 @@ def _played(jury: Jury, nominal: RobotModel, lost: Lost, residuals: Mapping[int,
 
 
 def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tuple[int, str, int]]) -> Lost:
-    """Poses with which joints that were well begin to stay behind."""
+    """Poses with which joints that were well begin to stay behind; of several in a row the first, as what one does shows with the
+    next, and left out together neither would be believed."""
     out: Lost = {}
     for i, e in enumerate(jury.evidence):
         for joint in e.joints if e.take.commands is not None else ():
@@ -86,7 +87,7 @@ def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tup
             steps = _steps(e, joint, gone)
             behind = tuple(k for k, way in steps.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
             if behind and len(behind) + len(gone) <= MOST * (len(steps) + len(gone)):
-                out[i, joint] = behind
+                out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
     return out
 
 

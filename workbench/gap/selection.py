@@ -15,7 +15,17 @@ from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import FEW, LONE, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
-from workbench.gap.company import HALF, NEARLY_ALL, fitted_beside, priced, seated, several, worst_joint
+from workbench.gap.company import (
+    HALF,
+    MOST_STEPS,
+    NEARLY_ALL,
+    begun_again,
+    fitted_beside,
+    priced,
+    seated,
+    several,
+    worst_joint,
+)
 from workbench.gap.exchange import exchanges
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.pulls import in_two
@@ -49,9 +59,9 @@ OWN_GAP = 0.9
 NEARLY_ALL_WALKING = 0.97
 """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
 back, which closes up to 0.93; true effects close more."""
-MOST_STEPS, TOGETHER_STEPS, LAST_STEPS = 5, 12, 3
-"""Of a fit of all effects, when one was added, when several were, where lines foretell them, and when one was dropped at the end;
-it ends where little changes."""
+TOGETHER_STEPS, LAST_STEPS = 12, 3
+"""Of a fit of all effects, when several were added, where lines foretell them, and when one was dropped at the end; it ends where
+little changes."""
 AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
 """Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
 shares of what a right model does, for which none is replaced."""
@@ -177,9 +187,11 @@ def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
         return []
     for _ in range(EXCHANGES):
         fit, chosen = sets[0]
-        left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
-        if left.sum() < RIGHT * expected.sum():
+        if _is_right(search, fit, takes, joint):
             break
+        if (again := begun_again(search, fit, takes, TOGETHER_STEPS)) is not fit:
+            sets[0] = again, chosen
+            continue
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
         new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
                if frozenset(t.candidate.key for t in s) not in known]
@@ -187,6 +199,12 @@ def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tupl
         if sets[0][0] is fit:
             break
     return sets
+
+
+def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
+    """Whether a fit leaves in a joint about what a right model does."""
+    left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
+    return bool(left.sum() < RIGHT * expected.sum())
 
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:

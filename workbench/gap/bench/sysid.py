@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from workbench.gap.bench.arm import EXTRA, ODD, SERVO, TRUE_STEP, Log, arm, goals, measured, session
 from workbench.gap.candidates import candidates
+from workbench.gap.company import MOST_STEPS
 from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.diagnosis import STEP
 from workbench.gap.evidence import TakeEvidence, gather
 from workbench.gap.jury import FINE, Jury
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Fit, Search
-from workbench.gap.selection import MOST_STEPS
 from workbench.gap.session import Session
 from workbench.simulation import SimulationConfig
 from workbench.simulation.bench.figure import Figure, in_turns, median_and_quartiles
