@@ -28,6 +28,7 @@ from workbench.gap.contest import (
 )
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.doubts import doubted
+from workbench.gap.hanging import hanging
 from workbench.gap.point_mass import PointMass
 from workbench.gap.race import Trial
 from workbench.gap.rounds import Chosen, Round
@@ -124,7 +125,7 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
     assert told(tilt, [0.1, 2.0], [0.5, 0.5]) == pytest.approx(0.9)
     assert told(tilt, [0.1, 0.9], [0.5, 0.5]) == pytest.approx(0.45)
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.45)
-    assert told(mass, [1.4, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.9)
+    assert told(mass, [1.8, 3.0, 0.0, 1.0], [0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.9)
     assert told(mass, [0.4, 3.0, 0.0, 1.0], [np.inf, 0.1, 0.1, 0.1]) == pytest.approx(0.9)  # nothing is known of it
 
 
@@ -254,3 +255,27 @@ def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):
     fit = replace(search.evaluated([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
     assert doubted(search, fit, [Standing(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
     assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize(("force", "down"), [((0.05, -0.05, -0.7), True), ((0.05, -0.05, 0.7), False), ((0.3, 0.0, -0.7), False)])
+def test_a_pull_straight_down_is_no_cable(worn, force, down):
+    """A mass of 71 g that hangs below a body and swings was called a tether of (-0.02, 0.03, -0.75) N."""
+    _, search, _ = worn
+    tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
+    fit = replace(search.evaluated([]), effects=(tether,), x=tether.sizes(force), covariance=np.diag([1e-4] * 3))
+    assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
+    left = list(hanging(fit))
+    assert bool(left) is down
+    for u in left:
+        assert (u.error, u.floor) == pytest.approx((0.7, 0.01 * tether.typical[2]))
+        assert "71 g" in u.description
+
+
+@pytest.mark.parametrize(("likely", "sure"), [(0.4, 0.25), (0.2, 0.5)])
+def test_a_load_is_less_sure_where_a_pull_straight_down_is_about_as_likely(worn, likely, sure):
+    _, search, _ = worn
+    mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
+    tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
+    fit = replace(search.evaluated([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
+    beside = Standing(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
+    assert doubted(search, fit, [beside], {})[0].probability == pytest.approx(sure)

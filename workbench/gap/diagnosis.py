@@ -21,6 +21,7 @@ from workbench.gap.doubts import doubted
 from workbench.gap.evidence import BLOCK, USES, TakeEvidence, gather
 from workbench.gap.experiment import Experiment, Sight, design_experiment
 from workbench.gap.findings import Diagnosis
+from workbench.gap.hanging import hanging
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import channel_gaps, ledger
 from workbench.gap.missed import with_missed
@@ -103,7 +104,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
                      for m in build.measured)
     findings = measured + tuple(m.finding() for m in missed) + tuple(
         finding(evidence, fit, i, standings[i], nominal.residuals, after) for i in range(len(fit.effects)))
-    left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing)) if gap else ()
+    left = (*unexplained(evidence, after, rough), *(d.left(evidence) for d in changing), *hanging(fit)) if gap else ()
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
     slight = not findings and not left and too_little_left(search, fit, search.fitted, (), everywhere=False)
     verdict = verdict_of(bool(gap) and not slight, findings, left)

@@ -13,6 +13,7 @@ from workbench.gap.candidate import Candidate
 from workbench.gap.channels import joint_of
 from workbench.gap.contest import LEAST, Standing
 from workbench.gap.evidence import ratios
+from workbench.gap.hanging import hangs
 from workbench.gap.search import Fit, Search
 
 Array = NDArray[np.float64]
@@ -24,19 +25,25 @@ RATTLES = 0.7
 from a right model as it has play."""
 CHANGING = 0.5
 """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
+ABOUT_AS_LIKELY = 0.5
+"""Of a finding's probability, what a rival that pulls straight down has at least where a load is not told from what hangs: of
+true loads it is up to 0.4."""
 ALIKE_FLOOR, HARDLY = 0.15, 0.5
 """By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
 robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
-same for a number that would go further if it might, or may be nothing: it makes up for something else."""
-NOTHING = 1.81
-"""Standard deviations from neutral within which a number may be nothing."""
+same for a number that would go further if it might, or may be nothing, and for a pull straight down: it makes up for something
+else."""
+NOTHING = 3.0
+"""Standard deviations from neutral within which a number may be nothing: a mass that swings below a body looked like a load of
+2.7, true ones come to 3.3 and more."""
 
 
 def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[Standing]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
     whole robot at joints that no other effect is to answer for, or at its only one; where a floor is nearly the model's, a number
-    as far as it may go, or nearly nothing; where in fine steps it is `idle`. floors: of the fit, by take."""
+    as far as it may go, or nearly nothing; where it, or about as likely a rival, pulls straight down; where in fine steps it is
+    `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
             for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], set() if search.lone else {c.joint for c in fit.effects}
@@ -48,7 +55,8 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         factor *= CHANGING if c in changing else 1.0
         makes = ~c.shapes if _becomes(c, s) else c.makes
         slight = (_hardly_another_floor(c, x) or _at_its_limit(c, x)
-                  or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes))
+                  or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes) or hangs(c, x)
+                  or any(hangs(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability))
         factor *= LEAST if c in idle else HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
