@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -166,8 +166,12 @@ def _outbid(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
 def _better_by_both(fit: Fit, rival: Fit) -> float:
     """By how much a rival is better of an effect that all takes tell, of chi squared on the choosing stretches: twice as many are
     fitted, and say as much of each; what more numbers make of these is in their price."""
-    choose, fitted = (fit.cost[use] - rival.cost[use] for use in ("choose", "fit"))
-    return (choose + fitted / 2) / 2
+    return _by_both({use: fit.cost[use] - rival.cost[use] for use in ("choose", "fit")})
+
+
+def _by_both(of: Mapping[str, float]) -> float:
+    """Of chi squared, what both the fitted and the choosing stretches say, as much as the latter would."""
+    return (of["choose"] + of["fit"] / 2) / 2
 
 
 def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
@@ -199,8 +203,13 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) ->
     if _at_its_end(c, x):
         alike.add((c.effect.limit, c.where))
     always = [t for t in there if t.candidate.key in alike]
-    return always + [t for t in there if not t.foretold and t not in always
-                     and trial.gain["choose"] - t.gain["choose"] < reach][:MOST_RIVALS]
+    return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
+
+
+def _behind(trial: Trial, t: Trial) -> float:
+    """By how much a rival was behind; where all channels of a walk judge, what was fitted says as much as what was not."""
+    behind = {use: trial.gain[use] - t.gain[use] for use in trial.gain}
+    return min(behind["choose"], _by_both(behind)) if trial.joint is None else behind["choose"]
 
 
 def _at_its_end(c: Candidate, x: Array) -> bool:

@@ -115,7 +115,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
-        if not beyond or too_little_left(search, current, takes, rounds):
+        if stopped or not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
@@ -151,7 +151,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             after = together[0][0]
             seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
         rounds += seats
-        if stopped or after is current:
+        if after is current:
             break
         current = after
     return current
