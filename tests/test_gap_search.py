@@ -43,6 +43,17 @@ def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
     assert not selection.select(search, pool, lambda what, share: None, thorough=True).stopped
 
 
+def test_what_was_tried_when_the_limit_of_work_came_decides(worn, monkeypatch):
+    session, search, _ = worn
+    pool = [c for c in candidates(session.model, search.jury.evidence) if c.name == "coulomb_friction"]
+    monkeypatch.setattr(selection, "_says_it", lambda *a: False)  # it would ask for more
+    monkeypatch.setattr(selection, "MOST_WORK", search.jury.work + 2 * search.jury.seconds)
+    monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
+    chosen = selection.select(search, pool, lambda what, share: None)
+    assert chosen.stopped
+    assert [c.key for c in chosen.fit.effects] == [("coulomb_friction", ("three",))]
+
+
 def test_work_is_counted_in_seconds_of_a_puppys_rollout(worn):
     jury = worn[1].jury
     (e,) = jury.evidence
