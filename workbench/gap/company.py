@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from workbench.gap.channels import BODY, joint_of
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import LEAST_GAIN, Round
-from workbench.gap.search import Fit, Search
+from workbench.gap.search import Fit, Search, Sizes
 
 Array = NDArray[np.float64]
 NEARLY_ALL = 0.9
@@ -166,7 +166,11 @@ def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[
 
 def fitted_beside(search: Search, current: Fit, added: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
     """All effects fitted together, when some were added."""
-    (start,) = yield from search.evaluating([*current.sizes(), *((t.candidate, t.x) for t in added)])
+    return (yield from _fitted_from(search, [*current.sizes(), *((t.candidate, t.x) for t in added)], takes, steps))
+
+
+def _fitted_from(search: Search, sizes: Sizes, takes: tuple[int, ...], steps: int) -> Part[Fit]:
+    (start,) = yield from search.evaluating(sizes)
     return (yield from search.refitting(start, takes, steps))
 
 
@@ -177,9 +181,7 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
               for c, x in fit.sizes() if c.shapes.any() for share, doublings in AGAIN]
     if not starts:
         return fit
-    begun = search.side_by_side([search.evaluating(*starts)])[0]
-    ends = search.side_by_side([search.refitting(start, takes, MOST_STEPS) for start in begun])
-    best = min(ends, key=priced)
+    best = min(search.side_by_side([_fitted_from(search, sizes, takes, MOST_STEPS) for sizes in starts]), key=priced)
     return search.refitted(best, takes, steps) if priced(best) < HALF * priced(fit) else fit
 
 

@@ -55,8 +55,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         factor *= CHANGING if c in changing else 1.0
         makes = ~c.shapes if _becomes(c, s) else c.makes
         slight = (_hardly_another_floor(c, x) or _at_its_limit(c, x)
-                  or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes) or hangs(c, x)
-                  or any(hangs(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability))
+                  or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes) or _may_hang(c, x, s))
         factor *= LEAST if c in idle else HARDLY if slight else 1.0
         out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
@@ -86,6 +85,11 @@ def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np
     half = NOTHING * np.sqrt(np.diag(covariance))
     makes = makes & np.isfinite(half)
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
+
+
+def _may_hang(c: Candidate, x: Array, s: Standing) -> bool:
+    """Whether an effect, or a rival about as likely, pulls straight down."""
+    return hangs(c, x) or any(hangs(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability)
 
 
 def _becomes(c: Candidate, s: Standing) -> bool:
