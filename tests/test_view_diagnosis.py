@@ -191,6 +191,15 @@ def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str])
     assert left_row(entry) == row
 
 
+def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(model: RobotModel, story: TakeStory) -> None:
+    hangs = Unexplained((), 0.75, 0.12, "N", "the tether force is a pull straight down, with the weight of 76 g")
+    off = Unexplained(("brm",), 0.567, 0.206, "deg", "sway: goes with nothing tried")
+    told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [story], "Session small").html()
+            for n, left in enumerate([(hangs,), (hangs, off)])}
+    assert all("The tether force is a pull straight down, with the weight of 76 g." in page for page in told.values())
+    assert ["still off by more than noise" in page for page in told.values()] == [False, True]
+
+
 def test_reasons_name_effects_as_people_do() -> None:
     assert reason_of("in place of com_shift(body_link) it leaves 686 more") == (
         "in place of centre of mass shift at body_link it leaves 686 more")

@@ -33,8 +33,9 @@ def hanging(fit: Fit) -> Iterator[Unexplained]:
             slopes = np.array([-_pull(c, x + step)[2] - down for step in STEP * np.eye(len(x))]) / STEP
             deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
             yield Unexplained((), down, deviation, "N",
-                              f"{c} pulls straight down with the weight of {1e3 * down / GRAVITY:.0f} g that does not resist "
-                              "being moved as a load does: something that hangs and swings looks like it")
+                              f"the {c.name.replace('_', ' ')} is a pull straight down, with the weight of "
+                              f"{1e3 * down / GRAVITY:.0f} g that does not resist being moved as a load does: something that "
+                              "hangs and swings looks like it")
 
 
 def _pull(c: Candidate, x: Array) -> Array:

@@ -24,6 +24,7 @@ from workbench.view.words import (
     change,
     headline,
     intervals_of,
+    is_error,
     layers_of,
     left_row,
     listed,
@@ -261,10 +262,10 @@ def _left(diagnosis: Diagnosis) -> Section:
                                              "What is still beyond the green band above has no name yet.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
     header = ["what is still off", "take", "by", "over noise", "and it goes"]
-    return Section("What is left", [
-        Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No effect "
-             "that was tried explains it."),
-        *_folded(header, [left_row(u) for u in order], "more")])
+    off = [left_row(u) for u in order if is_error(u)]
+    still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
+                  "effect that was tried explains it."), *_folded(header, off, "more")] if off else []
+    return Section("What is left", [*still, *(Text(f"{capital(u.description)}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:

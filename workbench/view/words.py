@@ -154,6 +154,11 @@ def layers_of(diagnosis: Diagnosis) -> str:
     return said
 
 
+def is_error(u: Unexplained) -> bool:
+    """Whether it says how far the fitted model is off, in a recording's unit; else it doubts what was found."""
+    return u.unit in ("deg", "m")
+
+
 def left_row(u: Unexplained) -> list[str]:
     """What is off, in which take, by how much, over noise, and what it goes with."""
     found = _LEFT.fullmatch(u.description)
