@@ -132,6 +132,15 @@ def test_two_that_bring_little_more_than_one_do_not_take_its_place():
     assert search.asked > 0
 
 
+def test_two_of_the_ground_take_the_place_of_a_joint_that_was_found_for_them():
+    search = LinearSearch(ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
+    fit, seat = found(search, "backlash", "ground_friction", "tether_force")
+    now, rounds = pulls.in_two(search, POOL, fit, [seat], silent)
+    assert "backlash" not in {c.name for c in now.effects}
+    assert now.cost["choose"] == pytest.approx(0.0, abs=1e-9)
+    assert all("tether_force" in {t.candidate.name for t in r.trials} for r in rounds), "a pull's rivals stay, for its place"
+
+
 def test_joints_loads_and_what_was_only_foretold_get_no_company():
     search = LinearSearch(ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     for name in ("backlash", "payload"):

@@ -1,6 +1,7 @@
 """Evidence and fits on a small arm whose joint `three` is stiffer than its model says."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from workbench.gap.fitting import fit_blocks, together
 from workbench.gap.jury import Jury, Question
 from workbench.gap.ledger import layer_of, ledger
 from workbench.gap.point_mass import PointMass, SwungMass
-from workbench.gap.search import Search
+from workbench.gap.search import Fit, Search
 
 
 def test_residuals_are_as_large_as_noise_where_nothing_is_hidden(tmp_path):
@@ -209,6 +210,18 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
     alone = search.resettled(search.evaluated([(second, np.array([0.1]))]), second)
     assert [c.key for c in search.settled.effects] == [second.key]
     assert alone.x == pytest.approx(search.settled.x)
+
+
+@pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes do not mind", "they speak against it"])
+def test_walks_say_when_commands_come_unless_held_takes_speak_against_it(left, late):
+    delay = Candidate.of(known_effects()["command_delay"], ("three",), (0.0,))
+
+    def fit(x, held):
+        return Fit((delay,), np.array([x]), np.eye(1), {}, {0: np.array([[held]]), 1: np.zeros((1, 1))})
+
+    search = SimpleNamespace(held=(0,), fitted=(0, 1), grounded=lambda takes: (1,), refitted=lambda *_: fit(3.4, left),
+                             jury=SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values()))))
+    assert Search.retimed(search, fit(2.5, 10.0)).x.tolist() == [late]
 
 
 def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):

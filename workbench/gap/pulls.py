@@ -34,33 +34,39 @@ that."""
 
 def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], report: Report
            ) -> tuple[Fit, list[Round]]:
-    """The fit, with two effects in the place of the last of the ground or of masses that walks told, where that left much and
+    """The fit, with two effects of the ground or of masses in the place of the last that walks told, where that left much and
     these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
-    told = [(r, t) for r in rounds for t in r.accepted if _of_the_ground(search, t) and t.candidate.key in there]
+    told = [(r, t) for r in rounds for t in r.accepted if _walked(search, t) and t.candidate.key in there]
     if not told or told[-1][1].closed > COMPLETE:
         return current, list(rounds)
     seat, found = told[-1]
     report(f"trying two causes for {found.candidate}", None)
     rest = search.evaluated(current.sizes_without(found.candidate.key))
     free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
-    known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
-    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _of_the_ground(search, t)
+    known = {found.candidate.key: replace(found, x=there[found.candidate.key])} if _keeps_company(found.candidate) else {}
+    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _walked(search, t)
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
+    if not known:
+        return current, list(rounds)
     pairs = _foretold(search, rest, list(known.values())[:ONES], free)
     fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
     ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
-    first, second = seated(search, rest, ranked)
-    fitted = {t.candidate.key for r in (first, second) for t in r.trials}
-    first = replace(first, trials=(*first.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
-    return ranked[0][0], [*(r for r in rounds if r is not seat), first, second]
+    seats = [_beside_tried(r, seat) for r in seated(search, rest, ranked)]
+    return ranked[0][0], [*(r for r in rounds if r is not seat), *seats]
 
 
-def _of_the_ground(search: Search, t: Trial) -> bool:
-    """Whether it is of the ground or of masses, and was fitted to walks."""
-    return not t.foretold and t.joint is None and _keeps_company(t.candidate) and not search.is_settled(t.candidate)
+def _beside_tried(taken: Round, seat: Round) -> Round:
+    """A round with what else was tried at first: a pull's twin is to be put in its place."""
+    fitted = {t.candidate.key for t in taken.trials}
+    return replace(taken, trials=(*taken.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
+
+
+def _walked(search: Search, t: Trial) -> bool:
+    """Whether it was fitted to walks."""
+    return not t.foretold and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)
 
 
 def _keeps_company(c: Candidate) -> bool:

@@ -28,6 +28,8 @@ SEEN_ELSEWHERE = ("zero_offset",)
 
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
+AGAINST = 100.0
+"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number of timing."""
 FINER, FINER_STEPS = 0.5, 3
 """In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
 does is less than what a coarse step makes of it."""
@@ -143,11 +145,15 @@ class Search:
         return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
     def retimed(self, current: Fit) -> Fit:
-        """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come."""
+        """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come. As it
+        was where held takes speak against that: then walks lack something else."""
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
         if not timing or not self.grounded(self.fitted):
             return current
         fit = self.refitted(current, self.fitted, RESETTLING, timing)
+        was, now = (self.jury.cost({i: f.residuals[i] for i in self.held}, "fit") for f in (current, fit))
+        if now - was > AGAINST:
+            return current
         numbers = fit.numbers(timing)
         covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
         others = [(s, ~np.isin(s.numbers, numbers)) for s in current.slopes]
