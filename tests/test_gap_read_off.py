@@ -16,7 +16,7 @@ from workbench.gap.compare_session import roll_out, run_of
 from workbench.gap.evidence import gather
 from workbench.gap.findings import Change
 from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import LEAST_CLOSED, SURELY, Missed, _least_closed, _read, _stands_at_an_end, with_missed
+from workbench.gap.missed import LEAST_CLOSED, SURELY, Missed, _least_closed, _lost, _stands_at_an_end, with_missed
 from workbench.gap.passed_over import _suspects, passed_over, played_without
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Search
@@ -127,6 +127,21 @@ def quick_session(quiet, lost):
     return there.on([replace(there.evidence[0], take=replace(e.take, commands=quick))])
 
 
+def test_what_comes_after_a_missed_pose_is_judged_beside_a_robot_that_missed_it_too(quiet):
+    """On its way to the next, which comes soon after, the joint has gone as little as if it had missed that one, too."""
+    e = quick_session(quiet, ()).evidence[0]
+    commands = e.take.commands
+    times = np.array([0.0, 0.6, 0.95, 1.1, 1.7])
+    goals = np.outer(np.deg2rad([18.0, 5.0, -20.0, 18.0, 0.0]), np.ones(len(commands.joints)))
+    first = np.zeros(len(times), dtype=int)
+    slow = replace(commands, times=times, goals=goals, speeds=np.full(goals.shape, np.deg2rad(60.0)),
+                   enabled=commands.enabled[first], poses=commands.poses[first])
+    jury = recorded_with(quiet, quiet[0], without_poses(slow, slow.column("one"), (1, 4)))
+    jury = jury.on([replace(jury.evidence[0], take=replace(e.take, commands=slow))])
+    (missed,) = with_missed(jury, quiet[0], nominal_residuals(quiet, jury))[1]
+    assert (missed.poses, missed.of) == ({0: (1, 4)}, 5)
+
+
 @pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])
 def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet, lost):
     jury = quick_session(quiet, lost)
@@ -148,14 +163,14 @@ def test_of_poses_in_a_row_that_may_be_missed_the_first_is_asked_alone(quiet):
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 6.0}),))
     jury = recorded_with(quiet, stopped)
-    kept = _read(jury.evidence[0], "two", nominal_residuals(quiet, jury)[0])[0]
+    kept = _lost(jury, quiet[0], "two", {0: ()}, nominal_residuals(quiet, jury))[0][0]
     assert len(kept) == 2
     assert all(_stands_at_an_end(jury.evidence, 0, "two", k) for k in kept)
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     jury = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    (lost,) = _read(jury.evidence[0], "one", nominal_residuals(quiet, jury)[0])[0]
+    ((lost,),) = _lost(jury, quiet[0], "one", {0: ()}, nominal_residuals(quiet, jury))[0].values()
     assert not _stands_at_an_end(jury.evidence, 0, "one", lost)
 
 

@@ -13,11 +13,13 @@ from workbench.effects.registry import known_effects
 from workbench.gap.evidence import TakeEvidence, joint_error
 from workbench.gap.findings import Change, Estimate, Finding
 from workbench.gap.jury import Jury, Question
-from workbench.gap.passed_over import LEAST_STEP, end_of, passed_over, played_without
+from workbench.gap.passed_over import LEAST_STEP, TURNS, end_of, passed_over, played_without, steps
 from workbench.gap.special import AT_STOP
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
+MOST = 0.6
+"""Share of poses that may be missed: of more, something else is the matter."""
 STAYED, WENT = 0.3, 0.5
 """Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
 has gone at least the second."""
@@ -73,27 +75,41 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
     found: list[Missed] = []
     moving = passed_over(jury, nominal, residuals)
     for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
-        read = {i: _with(_read(e, joint, residuals[i]), moving.get((i, joint), ()))
-                for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands}
-        count, of = (sum(len(r[k]) for r in read.values()) for k in (0, 1))
-        least = _least_closed(jury, {i: len(r[0]) for i, r in read.items()})
-        if least is None or count > 0.6 * of:
+        here = [i for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands]
+        lost, after = _lost(jury, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
+        count, of = sum(map(len, lost.values())), sum(_telling(jury.evidence[i], joint, k) for i, k in lost.items())
+        least = _least_closed(jury, {i: len(k) for i, k in lost.items()})
+        if least is None or count > MOST * of:
             continue
-        if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, r in read.items() for k in r[0]):
+        if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
             continue
-        lost = {i: r[0] for i, r in read.items()}
-        tried = played_without(jury, {(i, joint): k for i, k in lost.items() if k})
-        after = tried.residuals([Question(nominal, tuple(range(len(jury.evidence))))])[0]
-        here = tuple(i for i, k in lost.items() if k)
+        here = [i for i, k in lost.items() if k]
         was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
                     for r in (residuals, after))
         frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
         if was - now > least * (was - frames) and was - now > 100:
             fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
                                   joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
-            found.append(Missed(joint, {i: tuple(k) for i, k in lost.items() if k}, of, fit, unseen))
-            jury, residuals = tried, after
+            found.append(Missed(joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
+            jury, residuals = played_without(jury, {(i, joint): k for i, k in lost.items() if k}), after
     return jury, tuple(found)
+
+
+def _lost(jury: Jury, nominal: RobotModel, joint: str, known: Mapping[int, tuple[int, ...]], residuals: Mapping[int, Array]
+          ) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
+    """Poses that a joint missed, by take, and what is left of all takes played without them. known: those missed in motion. What
+    comes after a missed pose is read anew, beside a robot that did not get it either."""
+    lost, now = dict(known), dict(residuals)
+    new = {i: k for i, k in lost.items() if k}
+    for _ in range(TURNS):
+        if new:
+            tried = played_without(jury, {(i, joint): lost[i] for i in new})
+            now |= tried.residuals([Question(nominal, tuple(new))])[0]
+        new = {i: more for i in lost if (more := _read(jury.evidence[i], joint, now[i], lost[i]))}
+        if not new:
+            break
+        lost |= {i: tuple(sorted((*lost[i], *more))) for i, more in new.items()}
+    return lost, now
 
 
 def _least_closed(jury: Jury, missed: Mapping[int, int]) -> float | None:
@@ -123,35 +139,40 @@ def _seen(e: TakeEvidence, joint: str) -> Array:
 
 
 def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
-    """The last frames before the next command comes."""
+    """The last frames before the next command comes; after the last, all from then on."""
+    assert e.take.commands is not None
     time, end = e.take.recorded.since_start, end_of(e, k)
-    return np.asarray((time > end - 0.06) & (time <= end))
+    return np.asarray((time > end - 0.06) & ((time <= end) | (k + 1 == len(e.take.commands.times))))
 
 
-def _read(e: TakeEvidence, joint: str, residual: Array) -> tuple[list[int], list[int]]:
-    """Commands that a joint missed, and all that would have moved it, by what it did until the next came."""
+def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> tuple[int, ...]:
+    """Commands that a joint missed beside those that are known (gone), by what it did until the next came. After one, none until
+    it stands where it was told to: the model got what it did not."""
     commands = e.take.commands
     assert commands is not None
     column, i = commands.column(joint), e.channels.index(joint)
     seen = _seen(e, joint)
     said = seen - residual[:, i] * e.sigma[i]
-    at, missed, telling = 0.0, list[int](), list[int]()
+    at, missed, alike = 0.0, list[int](), True
     for k, goal in enumerate(commands.goals[:, column]):
         way = float(goal - at)
         frames = _at_the_end_of(e, k) & np.isfinite(seen)
+        if k in gone:
+            continue
         if abs(way) < LEAST_STEP or not frames.any():
             at = float(goal)
             continue
         went, should = (float(np.median(q[frames]) - at) / way for q in (seen, said))
-        telling.append(k)
-        follows = bool(missed) and missed[-1] == k - 1  # the model, which got the pose before, says nothing about this one
-        if abs(went) < STAYED and (follows or should > WENT):
+        if alike and abs(went) < STAYED and should > WENT:
             missed.append(k)
+            alike = False
         else:
             at = float(goal)
-    return missed, telling
+            alike = alike or abs(went - 1) < STAYED
+    return tuple(missed)
 
 
-def _with(read: tuple[list[int], list[int]], more: Sequence[int]) -> tuple[list[int], list[int]]:
-    """What was read, with poses that were missed in motion."""
-    return sorted({*read[0], *more}), sorted({*read[1], *more})
+def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
+    """How many poses would have moved a joint, as it was seen to do or not."""
+    seen = np.isfinite(_seen(e, joint))
+    return sum(k in gone or bool((_at_the_end_of(e, k) & seen).any()) for k in {*steps(e, joint, gone), *gone})

@@ -84,14 +84,14 @@ def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tup
     for i, e in enumerate(jury.evidence):
         for joint in e.joints if e.take.commands is not None else ():
             gone = lost.get((i, joint), ())
-            steps = _steps(e, joint, gone)
-            behind = tuple(k for k, way in steps.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
-            if behind and len(behind) + len(gone) <= MOST * (len(steps) + len(gone)):
+            moves = steps(e, joint, gone)
+            behind = tuple(k for k, way in moves.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
+            if behind and len(behind) + len(gone) <= MOST * (len(moves) + len(gone)):
                 out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
     return out
 
 
-def _steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
+def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     """Poses that move a joint and that it got, and by how much [rad]."""
     commands = e.take.commands
     assert commands is not None

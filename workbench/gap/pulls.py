@@ -1,7 +1,8 @@
 """Two causes that look like one: a pull that lifts the robot explains much of what a slope and a slippery floor do together.
 
-What explains most by itself is found first, and then nothing completes it. So what came near it is given company, too, foretold
-by lines around each one's own fit.
+What explains most by itself is found first, and then nothing completes it. So it and what came near it are given company,
+foretold by lines around each one's own fit, in which all that walks told gives way: a motor that ends early makes up for much of
+a body that leans.
 """
 
 from __future__ import annotations
@@ -20,13 +21,11 @@ from workbench.gap.fitting import WALKING, steps_of
 from workbench.gap.guess import AROUND, SCANNED_GROUND
 from workbench.gap.jury import COARSE, Question
 from workbench.gap.race import Trial
-from workbench.gap.rounds import Round
+from workbench.gap.rounds import COMPLETE, Round
 from workbench.gap.search import Fit, Report, Search, Sizes
 from workbench.gap.worth import worthwhile
 
 Array = NDArray[np.float64]
-COMPLETE = 0.97
-"""Share of a gap that one effect closes, from which on none is looked for in two: true effects close more."""
 NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
 """Share of the best one's gain from which on another is given company; how many are, how many pairs are fitted, and steps of
 that."""
@@ -34,21 +33,19 @@ that."""
 
 def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], report: Report
            ) -> tuple[Fit, list[Round]]:
-    """The fit, with two effects of the ground or of masses in the place of the last that walks told, where that left much and
-    these bring enough more, and the rounds with them."""
+    """The fit, with two effects in the place of the last that walks told, one of them at least of the ground or of masses, where
+    that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
     told = [(r, t) for r in rounds for t in r.accepted if _walked(search, t) and t.candidate.key in there]
-    if not told or told[-1][1].closed > COMPLETE:
+    if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.name == "payload":
         return current, list(rounds)
     seat, found = told[-1]
     report(f"trying two causes for {found.candidate}", None)
     rest = search.evaluated(current.sizes_without(found.candidate.key))
     free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
-    known = {found.candidate.key: replace(found, x=there[found.candidate.key])} if _keeps_company(found.candidate) else {}
+    known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
     known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _walked(search, t)
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
-    if not known:
-        return current, list(rounds)
     pairs = _foretold(search, rest, list(known.values())[:ONES], free)
     fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
     ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
@@ -76,33 +73,37 @@ def _keeps_company(c: Candidate) -> bool:
 
 @dataclass(frozen=True)
 class _Around:
-    """What is asked around a fit with one effect: with its numbers moved one at a time, and with each other effect beside it."""
+    """What is asked around a fit with one effect: each number that walks tell moved, and each other effect beside it."""
 
     one: Trial
     fit: Fit
-    moves: Array
+    moves: list[tuple[Candidate, Array, Array]]
     probes: list[tuple[Candidate, list[Array]]]
 
     @classmethod
-    def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate]) -> _Around:
+    def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
         c = one.candidate
         company = [o for o in others if o.key != c.key and not (o.name in ONE_PULL and c.name in ONE_PULL)]
-        return cls(one, fit, steps_of(one.x, *c.bounds(), WALKING, c.magnitudes(one.x)), [(o, _probes(o)) for o in company])
+        moves = [(e, x, steps_of(x, *e.bounds(), WALKING, e.magnitudes(x))) for e, x in fit.sizes()
+                 if e.size and not search.is_settled(e)]
+        return cls(one, fit, moves, [(o, _probes(o)) for o in company])
 
     def asked(self) -> Iterator[Sizes]:
         yield self.fit.sizes()
-        for x in self.one.x + np.diag(self.moves):
-            yield self.fit.sizes_with(self.one.candidate.key, x)
+        for e, x, move in self.moves:
+            yield from (self.fit.sizes_with(e.key, moved) for moved in x + np.diag(move))
         for c, points in self.probes:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
     def foretold(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[Trial]]]:
         """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
-        plain, own = next(answers), self.one
-        slopes = np.column_stack([(next(answers) - plain) / move for move in self.moves])
+        plain = next(answers)
+        slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
+        moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]
         for c, points in self.probes:
             did = [next(answers) - plain for _ in points]
-            yield from in_place(Trial(c, points[0], NOTHING, None), points, did, left, [own.candidate], [own.x], [slopes])
+            for cost, chosen in in_place(Trial(c, points[0], NOTHING, None), points, did, left, moving, x, slopes):
+                yield cost, [t for t in chosen if t.candidate.key in (self.one.candidate.key, c.key)]
 
 
 def _probes(c: Candidate) -> list[Array]:
@@ -114,7 +115,7 @@ def _probes(c: Candidate) -> list[Array]:
 def _foretold(search: Search, rest: Fit, ones: Sequence[Trial], others: Sequence[Candidate]) -> list[list[Trial]]:
     """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
     takes = search.telling([t.candidate for t in ones], search.fitted)
-    around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others) for t in ones]
+    around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
     questions = [Question(with_effects(search.nominal, sizes), takes, COARSE) for a in around for sizes in a.asked()]
     answers = iter([search.jury.vector(answer, "fit") for answer in search.jury.residuals(questions)])
     best: dict[frozenset[Key], tuple[float, list[Trial]]] = {}

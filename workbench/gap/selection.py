@@ -32,6 +32,7 @@ from workbench.gap.pulls import in_two
 from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
 from workbench.gap.search import Fit, Report, Search
+from workbench.gap.weighed_anew import weighed_anew
 from workbench.gap.worth import (
     ALL_CLOSED,
     LAST_CLOSED,
@@ -154,6 +155,10 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         if after is current:
             break
         current = after
+        if not search.jury.walks(takes):
+            current, rounds[:] = weighed_anew(search, current, rounds, takes)
+    if search.jury.walks(takes):
+        current, rounds[:] = weighed_anew(search, current, rounds, takes)
     return current
 
 
