@@ -38,6 +38,7 @@ POOL = [candidate(n) for n in DOES]
 @pytest.fixture(autouse=True)
 def linear(monkeypatch):
     monkeypatch.setattr(pulls, "with_effects", lambda nominal, sizes: list(sizes))
+    monkeypatch.setattr(pulls, "too_little_left", lambda search, current, takes, rounds: current.cost["choose"] < 1)
     monkeypatch.setattr(pulls, "worthwhile", lambda search, t, takes, rounds, current: t.gain["choose"] > 300)
 
 
@@ -58,6 +59,13 @@ def test_a_slope_and_a_slippery_floor_are_found_where_a_pull_that_lifts_was():
 def test_one_that_explains_nearly_all_is_left_alone_and_nothing_is_asked():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0))
     fit, seat = found(search, "ground_tilt", closed=0.99)
+    assert pulls.in_two(search, POOL, fit, [seat], silent) == (fit, [seat])
+    assert search.asked == 0
+
+
+def test_where_nothing_is_left_nothing_is_asked():
+    search = LinearSearch(DOES, ground_tilt=(2.0, 1.0))
+    fit, seat = found(search, "ground_tilt")
     assert pulls.in_two(search, POOL, fit, [seat], silent) == (fit, [seat])
     assert search.asked == 0
 

@@ -23,7 +23,7 @@ from workbench.gap.jury import COARSE, Question
 from workbench.gap.race import Trial
 from workbench.gap.rounds import COMPLETE, Round
 from workbench.gap.search import Fit, Report, Search, Sizes
-from workbench.gap.worth import worthwhile
+from workbench.gap.worth import too_little_left, worthwhile
 
 Array = NDArray[np.float64]
 NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
@@ -38,6 +38,8 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     there = current.sizes_by_key()
     told = [(r, t) for r in rounds for t in r.accepted if _walked(search, t) and t.candidate.key in there]
     if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.name == "payload":
+        return current, list(rounds)
+    if too_little_left(search, current, search.fitted, rounds):
         return current, list(rounds)
     seat, found = told[-1]
     report(f"trying two causes for {found.candidate}", None)
