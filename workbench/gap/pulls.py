@@ -21,7 +21,7 @@ from workbench.gap.fitting import WALKING, steps_of
 from workbench.gap.guess import AROUND, SCANNED_GROUND
 from workbench.gap.jury import COARSE, Question
 from workbench.gap.race import Trial
-from workbench.gap.rounds import COMPLETE, Round
+from workbench.gap.rounds import COMPLETE, Round, judged_by_all
 from workbench.gap.search import Fit, Report, Search, Sizes
 from workbench.gap.worth import too_little_left, worthwhile
 
@@ -36,7 +36,7 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     """The fit, with two effects in the place of the last that walks told, one of them at least of the ground or of masses, where
     that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
-    told = [(r, t) for r in rounds for t in r.accepted if _walked(search, t) and t.candidate.key in there]
+    told = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
     if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.name == "payload":
         return current, list(rounds)
     if too_little_left(search, current, search.fitted, rounds):
@@ -46,7 +46,7 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     rest = search.evaluated(current.sizes_without(found.candidate.key))
     free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
     known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
-    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and _walked(search, t)
+    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and judged_by_all(search, t)
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
     pairs = _foretold(search, rest, list(known.values())[:ONES], free)
     fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
@@ -61,11 +61,6 @@ def _beside_tried(taken: Round, seat: Round) -> Round:
     """A round with what else was tried at first: a pull's twin is to be put in its place."""
     fitted = {t.candidate.key for t in taken.trials}
     return replace(taken, trials=(*taken.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
-
-
-def _walked(search: Search, t: Trial) -> bool:
-    """Whether it was fitted to walks."""
-    return not t.foretold and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)
 
 
 def _keeps_company(c: Candidate) -> bool:

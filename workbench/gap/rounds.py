@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from workbench.gap.missed import Missed
 from workbench.gap.race import Trial
-from workbench.gap.search import Fit
+from workbench.gap.search import Fit, Search
 
 LEAST_GAIN = 150.0
 """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
@@ -62,3 +62,8 @@ def _exact(t: Trial) -> bool:
     says, make another motion."""
     layer = t.candidate.effect.layer
     return layer == "measurement" or (layer == "timing" and t.candidate.size > 0)
+
+
+def judged_by_all(search: Search, t: Trial) -> bool:
+    """Whether it was fitted by some number, and all channels judged it; not what held takes told."""
+    return not t.foretold and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from workbench.gap.company import MOST_STEPS, fitted_beside
 from workbench.gap.race import Trial
-from workbench.gap.rounds import COMPLETE, LEAST_GAIN, Round
+from workbench.gap.rounds import COMPLETE, LEAST_GAIN, Round, judged_by_all
 from workbench.gap.search import Fit, Search
 
 NEAR, MOST = 0.5, 2
@@ -30,7 +30,7 @@ def weighed_anew(search: Search, current: Fit, rounds: Sequence[Round], takes: t
 
 
 def _weighed(search: Search, current: Fit, r: Round, t: Trial, takes: tuple[int, ...]) -> tuple[Fit, Round]:
-    rivals = [o for o in r.trials if _weighable(search, o) and not o.foretold and o.candidate.key not in current.sizes_by_key()
+    rivals = [o for o in r.trials if _weighable(search, o) and o.candidate.key not in current.sizes_by_key()
               and o.gain["choose"] > NEAR * t.gain["choose"]][:MOST]
     if not rivals:
         return current, r
@@ -53,6 +53,5 @@ def _weighed(search: Search, current: Fit, r: Round, t: Trial, takes: tuple[int,
 
 
 def _weighable(search: Search, t: Trial) -> bool:
-    """Whether all channels judge it, and some number says it; not what held takes told, nor how cameras saw the robot."""
-    c = t.candidate
-    return t.joint is None and c.size > 0 and c.effect.layer != "measurement" and not search.is_settled(c)
+    """Whether another may stand for it: not for how cameras saw the robot."""
+    return judged_by_all(search, t) and t.candidate.effect.layer != "measurement"
