@@ -6,6 +6,7 @@ import numpy as np
 
 from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
+from workbench.gap.race import Trial
 from workbench.gap.search import Fit
 from workbench.robot import puppy_model
 
@@ -17,6 +18,16 @@ def candidate(name):
     effect, model = known_effects()[name], puppy_model()
     where = {"joint": ("flm",), "link": (model.base,), "robot": ()}[effect.places[0]]
     return Candidate.of(effect, where, effect.neutral(model))
+
+
+def trial(name, closed=0.5, joint="knee"):
+    effect = known_effects()[name]
+    c = Candidate.of(effect, ("knee",), effect.neutral(SimpleNamespace()))
+    return Trial(c, np.ones(c.size), {"fit": 1.0, "choose": 1.0}, joint, foretold=True, closed=closed)
+
+
+def names(sets):
+    return [{t.candidate.name for t in chosen} for chosen in sets]
 
 
 class LinearSearch:

@@ -5,27 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from workbench.effects.registry import known_effects
-from workbench.gap.candidate import Candidate
+from tests.gap_linear import names, trial
 from workbench.gap.company import Seen, _best_sets, begun_again, several, variants
 from workbench.gap.fitting import together
-from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN
 from workbench.gap.search import Fit
 
 
-def trial(name, closed=0.5, joint="knee"):
-    effect = known_effects()[name]
-    c = Candidate.of(effect, ("knee",), effect.neutral(SimpleNamespace()))
-    return Trial(c, np.ones(c.size), {"fit": 1.0, "choose": 1.0}, joint, foretold=True, closed=closed)
-
-
 def seen(name, signature, size=1.0):
     return Seen(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
-
-
-def names(sets):
-    return [{t.candidate.name for t in chosen} for chosen in sets]
 
 
 def test_two_are_named_where_both_together_explain_what_neither_does_though_a_third_explains_most_alone():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.test_gap_company import names, trial
+from tests.gap_linear import names, trial
 from workbench.gap import exchange, selection
 from workbench.gap.company import worst_joint
 from workbench.gap.search import Fit

@@ -10,10 +10,9 @@ from scipy.signal import savgol_filter
 
 from studies.so101.programmes import Programme
 from workbench.recording.sage import JOINTS
-from workbench.robot import Kinematics
+from workbench.robot import GRAVITY, Kinematics
 
 Array = NDArray[np.float64]
-GRAVITY = 9.81
 LOADED = ("Pitch", "Elbow", "Wrist_Pitch")
 """Joints that gravity turns."""
 EVERY = 5

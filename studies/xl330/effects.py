@@ -19,11 +19,10 @@ from studies.xl330.bam import Logs
 from studies.xl330.rig import ARM, JOINT
 from workbench.effects.base import Parameter
 from workbench.effects.registry import effect_named
-from workbench.robot import EffectSpec
+from workbench.robot import GRAVITY, EffectSpec
 
 Array = NDArray[np.float64]
 STEP = 4e-3
-GRAVITY = 9.81
 LOAD_SMOOTHING = 2e-3
 """As in the servo bank (workbench/servo/term_bank.py) [s]."""
 EFFECTS: dict[str, tuple[tuple[str, ...], dict[str, float]]] = {

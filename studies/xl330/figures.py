@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from studies.xl330.bam import Logs
 from studies.xl330.rig import Log
+from workbench.robot import GRAVITY
 from workbench.view import style
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ def draw_balance(logs: Sequence[Log], stall_torque: float) -> Figure:
     for log in logs:
         c = {name.partition(".")[0]: values for name, values in log.read().channels.items()}
         smooth = np.convolve(c["velocity"], np.ones(9) / 9, mode="same")
-        weight = log.mass * 9.81 * log.length * np.sin(c["position"])
+        weight = log.mass * GRAVITY * log.length * np.sin(c["position"])
         slow = (c["enabled"] > 0.5) & (np.abs(smooth) < SLOW)
         up = smooth * np.sign(weight)
         for name, rows in (("lifting", up > 0.15), ("held", np.abs(up) < 0.02), ("lowering", up < -0.15)):

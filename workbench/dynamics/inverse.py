@@ -19,7 +19,7 @@ from workbench.dynamics.trajectory import RobotTrajectory, smoothed
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
-from workbench.robot import InputError, RobotModel
+from workbench.robot import GRAVITY, InputError, RobotModel
 
 Array = NDArray[np.float64]
 Stance = Mapping[str, NDArray[np.bool_]]
@@ -51,7 +51,7 @@ class InverseDynamics:
     """
 
     def __init__(self, model: RobotModel, base: Literal["free", "fixed"] = "free", friction: float | None = None,
-                 servo_friction: bool = True, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> None:
+                 servo_friction: bool = True, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:
         if base not in ("free", "fixed"):
             raise InputError(None, f"base: expected free or fixed, got '{base}'")
         model.check_base(floating=base == "free")

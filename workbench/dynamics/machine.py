@@ -17,7 +17,7 @@ from pydrake.multibody.tree import MultibodyForces
 from workbench.dynamics.trajectory import RobotTrajectory
 from workbench.effects.apply import physics_of, resolved
 from workbench.recording import quaternions
-from workbench.robot import FEET, ConfigureParser, InputError, RobotModel
+from workbench.robot import FEET, GRAVITY, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import rotation_about
 
 Array = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Machine:
     Of a model's effects those that change masses are in; left_out names the others.
     """
 
-    def __init__(self, model: RobotModel, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> None:
+    def __init__(self, model: RobotModel, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:
         self.model, self.joints = model, model.joints
         model.check_base(floating=False)
         kinematics = model.kinematics

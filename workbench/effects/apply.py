@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import GRAVITY, Effect, check_places, si_values
+from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
-from workbench.robot import EffectSpec, Ground, RobotModel
+from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
 
 Array = NDArray[np.float64]

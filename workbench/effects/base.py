@@ -30,8 +30,6 @@ Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measure
 Value = float | tuple[float, float, float]
 
 DEGREE = math.pi / 180
-GRAVITY = 9.81
-"""[m/s^2]"""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 

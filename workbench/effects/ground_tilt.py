@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.effects.base import DEGREE, GRAVITY, Array, Effect, Parameter, si_values
-from workbench.robot import EffectSpec, RobotModel
+from workbench.effects.base import DEGREE, Array, Effect, Parameter, si_values
+from workbench.robot import GRAVITY, EffectSpec, RobotModel
 
 
 class GroundTilt(Effect):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from workbench.effects.base import GRAVITY, Array, Effect, Parameter, si_values, vector
-from workbench.robot import EffectSpec, RobotModel
+from workbench.effects.base import Array, Effect, Parameter, si_values, vector
+from workbench.robot import GRAVITY, EffectSpec, RobotModel
 
 
 class TetherForce(Effect):

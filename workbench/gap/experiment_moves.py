@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gap.experiment_reach import Reach
-from workbench.robot import RobotModel
+from workbench.robot import GRAVITY, RobotModel
 
 Array = NDArray[np.float64]
 SLOW, QUICK = math.radians(50), math.radians(150)
@@ -20,7 +20,6 @@ SETTLED = 0.3
 """Rest at a segment's end, after which the next one finds the robot as if it had stood in neutral [s]."""
 GRID = (-60.0, -30.0, 0.0, 30.0, 60.0)
 """Angles [deg] from which postures are put together."""
-GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +218,7 @@ def gravity_torque(model: RobotModel, joint: str, q: Array) -> Array:
         if joint in k.chain(link):
             p, R = poses[link]
             arm = p + R @ k.centers[link] - origin
-            out += k.masses[link] * np.einsum("ni,ni->n", axis, np.cross(arm, GRAVITY))
+            out += k.masses[link] * np.einsum("ni,ni->n", axis, np.cross(arm, [0.0, 0.0, -GRAVITY]))
     return out
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import GRAVITY, si_values
+from workbench.effects.base import si_values
 from workbench.gap.candidate import Candidate
 from workbench.gap.findings import Unexplained
 from workbench.gap.search import Fit
+from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
 ASIDE = np.tan(np.deg2rad(15.0))

@@ -19,6 +19,8 @@ from workbench.robot.resources import resolve_model
 from workbench.robot.servo_constants import ServoConstants
 
 PUPPY = "package://puppy/puppy.sdf"
+GRAVITY = 9.81
+"""Of free fall [m/s^2], as Drake's plants have it."""
 FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """Writes the same text either way."""
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from workbench.dynamics import InverseDynamicsResult
-from workbench.robot import RobotModel
+from workbench.robot import GRAVITY, RobotModel
 from workbench.view.figures import base_wrench, joint_torques, servo_margins
 
 
@@ -19,7 +19,7 @@ def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[s
     figures = {"torques": joint_torques(result.time, result.joints, torques, limit=limit),
                "margins": servo_margins(model, result.joints, result.motor_torque, result.v)}
     if result.base != "fixed":
-        weight = 9.81 * model.kinematics.mass
+        weight = GRAVITY * model.kinematics.mass
         figures["base_wrench"] = base_wrench(result.time, result.base_wrench_residual, result.residual_sigma, weight=weight)
     return figures
 

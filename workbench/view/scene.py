@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from workbench.recording.take import Take
 from workbench.robot.files import write_whole
-from workbench.robot.model import RobotModel
+from workbench.robot.model import GRAVITY, RobotModel
 from workbench.view.floor import GRID, add_grid, ribbon
 from workbench.view.gap_marks import Errors, Marker
 from workbench.view.keys import kept_keys
@@ -144,7 +144,7 @@ class _Scene:
         forces = {foot: f for foot, f in take.contact.items() if foot in self.shapes.feet}
         if not forces:
             return None
-        per_metre = 9.81 * self.shapes.mass / self.shapes.height
+        per_metre = GRAVITY * self.shapes.mass / self.shapes.height
         for foot, force in forces.items():
             link, p_LF = self.shapes.feet[foot]
             p, R = played.in_world(link)
