@@ -27,6 +27,7 @@ from workbench.gap.company import (
     worst_joint,
 )
 from workbench.gap.exchange import exchanges
+from workbench.gap.gainsaid import heard
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.pulls import in_two
 from workbench.gap.race import Trial
@@ -155,7 +156,9 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         if after is current:
             break
         current = after
-        if not search.jury.walks(takes):
+        if search.jury.walks(takes):
+            current = heard(search, current, [t.candidate for t in accepted])
+        else:
             current, rounds[:] = weighed_anew(search, current, rounds, takes)
     if search.jury.walks(takes):
         current, rounds[:] = weighed_anew(search, current, rounds, takes)
