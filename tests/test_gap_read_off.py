@@ -21,7 +21,7 @@ from workbench.gap.passed_over import _suspects, passed_over, played_without
 from workbench.gap.registered import read_takes, register_takes
 from workbench.gap.search import Search
 from workbench.gap.session import load_session
-from workbench.gap.special import special
+from workbench.gap.special import _stop, special
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job
 
@@ -64,6 +64,23 @@ def test_a_stop_is_read_off_where_the_joint_stands_while_the_model_goes_on(quiet
     assert found.key == ("joint_stop", ("two",))
     assert found.size == 1
     assert found.values(np.ones(1))[1] == pytest.approx(18.0, abs=0.7)
+
+
+def test_what_a_joint_passed_elsewhere_is_no_stop(quiet):
+    stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 18.0}),))
+    evidence = [recorded_with(quiet, stopped).evidence[0], quiet[1].evidence[0]]
+    residuals = {i: nominal_residuals(quiet, quiet[1].on([e]))[0] for i, e in enumerate(evidence)}
+    assert [c.key for c in special(quiet[0], evidence[:1], {0: residuals[0]})] == [("joint_stop", ("two",))]
+    assert special(quiet[0], evidence, residuals) == []
+
+
+@pytest.mark.parametrize(("stop", "asked"), [(np.inf, 0), (34.0, 1)], ids=["it turns there", "it stands there"])
+def test_a_peak_of_few_frames_is_no_stop(stop, asked):
+    peak = np.concatenate([np.arange(30, 40, 2.0), np.arange(40, 28, -2.0)])
+    said = np.deg2rad(np.concatenate([np.zeros(2000), peak, np.zeros(2000)]))[:, None]
+    seen = np.minimum(said, np.deg2rad(stop)) + np.deg2rad(0.05)
+    e = SimpleNamespace(joints=("knee",), recorded=seen, sigma=np.array([1e-3]), zero=lambda joint: 0.0)
+    assert len(_stop("knee", [e], {0: (seen - said) / e.sigma})) == asked
 
 
 @pytest.mark.parametrize("upper", [18.0, 1.0])

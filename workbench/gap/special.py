@@ -18,7 +18,7 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 LEAST_CUT = np.deg2rad(1.5)
-"""A stop is asked about where the model goes this much further than the recording ever does [rad]."""
+"""A stop is asked about where the model goes this much further than the recording ever does, and does then [rad]."""
 AT_STOP = np.deg2rad(0.6)
 """And where the recording stands this close to its end whenever the model is beyond it [rad]."""
 FURTHEST = 2.0
@@ -60,9 +60,11 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
             went[side] = max(went[side], end + rest * side)
             beyond = good & (said * side > end + LEAST_CUT / 3)
             if float(np.max(said[good] * side)) - end > LEAST_CUT and beyond.sum() > 5 \
-                    and float(np.median(end - mean[beyond])) < AT_STOP:
+                    and float(np.median(end - mean[beyond])) < AT_STOP \
+                    and float(np.nanmax(((said - seen) * side)[beyond])) > LEAST_CUT:
                 ends[side].append((end + rest * side, float(np.max(said[good] * side)) + rest * side))
     found = {side: (min(e for e, _ in told), max(m for _, m in told)) for side, told in ends.items() if told}
+    found = {side: told for side, told in found.items() if went[side] - told[0] < LEAST_CUT}  # what it passed is no stop
     if not found:
         return []
     stop = known_effects()["joint_stop"]
@@ -71,7 +73,7 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     for side, (end, reach) in found.items():
         k = 1 if side > 0 else 0
         neutral[k], typical[k], held[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
-    # what a joint passed is no stop, and its ends do not change sides
+    # its ends do not change sides
     apart = sum(found[side][1] if side in found else went[side] for side in ends) / len(found)
     furthest = min(apart - LEAST_CUT, FURTHEST * max(reach - end for end, reach in found.values()))
     return [replace(Candidate.of(stop, (joint,), neutral, typical, held), reach=float(np.rad2deg(furthest)))]
