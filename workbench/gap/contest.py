@@ -13,7 +13,7 @@ from workbench.gap.candidate import Candidate, Key
 from workbench.gap.covariance import TEMPER_WALKING
 from workbench.gap.race import Part, Trial
 from workbench.gap.rounds import Chosen, Round
-from workbench.gap.search import Fit, Report, Search
+from workbench.gap.search import Fit, Report, Search, gained
 from workbench.gap.selection import CLOSE, MOST_RIVALS
 from workbench.gap.worth import completed
 
@@ -182,8 +182,7 @@ def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
 
 def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
     """How much less chi squared a rival leaves on these takes."""
-    was, now = (search.jury.cost({i: f.residuals[i] for i in takes}, "choose") for f in (fit, rival))
-    return was - now
+    return gained(search.jury, fit, rival, takes, "choose")
 
 
 def _told(fit: Fit, i: int) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import NEARLY_ALL
-from workbench.gap.search import AGAINST, Fit, Search
+from workbench.gap.search import AGAINST, Fit, Search, gained
 
 
 def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> Fit:
@@ -24,18 +24,12 @@ def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> Fit:
 def _heard(search: Search, current: Fit, c: Candidate) -> Fit:
     held, walks = search.held, search.grounded(search.fitted)
     without = search.evaluated(current.sizes_without(c.key))
-    if _gain(search, current, without, held) < AGAINST:
+    if gained(search.jury, current, without, held, "fit") < AGAINST:
         return current
     settled = search.settled
     fit = search.resettled(current, c)
-    if _gain(search, without, fit, held) > 0 and \
-            _gain(search, without, fit, walks) > NEARLY_ALL * _gain(search, without, current, walks):
+    walking = [gained(search.jury, without, there, walks, "fit") for there in (fit, current)]
+    if gained(search.jury, without, fit, held, "fit") > 0 and walking[0] > NEARLY_ALL * walking[1]:
         return fit
     search.settled = settled
     return current
-
-
-def _gain(search: Search, before: Fit, after: Fit, takes: tuple[int, ...]) -> float:
-    """Of chi squared on what is fitted of some takes."""
-    was, now = (search.jury.cost({i: fit.residuals[i] for i in takes}, "fit") for fit in (before, after))
-    return was - now

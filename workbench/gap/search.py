@@ -151,8 +151,7 @@ class Search:
         if not timing or not self.grounded(self.fitted):
             return current
         fit = self.refitted(current, self.fitted, RESETTLING, timing)
-        was, now = (self.jury.cost({i: f.residuals[i] for i in self.held}, "fit") for f in (current, fit))
-        if now - was > AGAINST:
+        if gained(self.jury, fit, current, self.held, "fit") > AGAINST:
             return current
         numbers = fit.numbers(timing)
         covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
@@ -317,6 +316,12 @@ class Search:
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
         return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
+
+
+def gained(jury: Jury, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
+    """By how much less chi squared one fit leaves than another, of one use of some takes."""
+    was, now = (jury.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
+    return was - now
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
