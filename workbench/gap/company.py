@@ -29,8 +29,9 @@ SIZES, FITTED, AS_GOOD = (2, 3), 6, 2.0
 lines foretell roughly."""
 AGAIN = tuple(product((0.75, 1.33), (-0.7, 0.7)))
 """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
-MOST_STEPS = 5
-"""Of a fit of all effects, when one was added, and where it is begun again."""
+MOST_STEPS, TOGETHER_STEPS = 5, 12
+"""Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines foretell them, and
+where others must take one's place. It ends where little changes."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Forward and backward: which effects stay, judged on stretches that no fit saw.
+"""Forward: which effects are taken, judged on stretches that no fit saw.
 
 First what held takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground adds.
 """
@@ -13,12 +13,14 @@ import numpy as np
 
 from workbench.gap.anew import Played, played_anew
 from workbench.gap.asked import FEW, LONE, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.backward import without_idle, without_part_answers
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
 from workbench.gap.company import (
     HALF,
     MOST_STEPS,
     NEARLY_ALL,
+    TOGETHER_STEPS,
     begun_again,
     fitted_beside,
     priced,
@@ -39,7 +41,6 @@ from workbench.gap.worth import (
     LAST_CLOSED,
     LEAST_CLOSED,
     LEAST_WALKING,
-    completed,
     least_closed,
     remaining,
     too_little_left,
@@ -51,8 +52,6 @@ MOST_ROUNDS = 6
 MOST_WORK, MOST_WORK_LONE, MOST_ROLLOUTS = 3200.0, 6400.0, 60.0
 """Seconds of rollouts, of a lone joint, of which sets are fitted, and rollouts of all takes if that is more, after which nothing
 more is tried: minutes, of half a minute of recording."""
-CLEARLY = 5.0
-"""Times that gain, from which on an effect is missed whatever the others do in its place."""
 ENOUGH = 0.6
 """Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
 before joints are asked, as a joint's effect can look like one of the whole robot's."""
@@ -61,9 +60,8 @@ OWN_GAP = 0.9
 NEARLY_ALL_WALKING = 0.97
 """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
 back, which closes up to 0.93; true effects close more."""
-TOGETHER_STEPS, LAST_STEPS = 12, 3
-"""Of a fit of all effects, when several were added, where lines foretell them, and when one was dropped at the end; it ends where
-little changes."""
+LAST_STEPS = 3
+"""Of a fit of all effects when one was dropped at the end; it ends where little changes."""
 AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
 """Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
 shares of what a right model does, for which none is replaced."""
@@ -93,7 +91,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         closed = least_closed(search, nominal, current)
         current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
         current, rounds = in_two(search, pool, current, rounds, report)
-    kept = _without_part_answers(search, current, rounds)
+    kept = without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
         kept = without_idle(search, kept)
@@ -275,27 +273,3 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     rivals = [] if shown else [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
                                and t.gain["choose"] > HALFWAY * best.gain["choose"]]
     return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
-
-
-def _without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
-    """Without effects, from the last one back, that left half of what was there and that no other completed."""
-    for r in reversed(rounds):
-        for t in r.accepted:
-            if completed(search, r, t, current) < LAST_CLOSED:
-                current = search.evaluated(current.sizes_without(t.candidate.key))
-    return current
-
-
-def without_idle(search: Search, current: Fit) -> Fit:
-    """Backward: an effect that the others have made idle goes."""
-    for i in range(len(current.effects) - 1, -1, -1):
-        if len(current.effects) < 2:
-            break
-        least = LEAST_GAIN * max(1, current.effects[i].size) * (ALL_CLOSED if search.is_settled(current.effects[i]) else 1.0)
-        rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
-        if rest.cost["choose"] - current.cost["choose"] < CLEARLY * least:
-            free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None
-            rest = search.refitted(rest, search.fitted, 1, free)
-        if rest.cost["choose"] - current.cost["choose"] < least:
-            current = rest
-    return current

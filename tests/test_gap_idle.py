@@ -1,0 +1,41 @@
+"""Effects that others make idle go, once the others have gone where they must: in a lone joint, as far as that is."""
+
+import numpy as np
+import pytest
+
+from tests.gap_linear import COUNT, LinearSearch, candidate
+from workbench.gap.backward import without_idle
+
+RNG = np.random.default_rng(3)
+AHEAD, BELOW, INERTIA, CEILING = RNG.normal(size=(4, COUNT))
+DOES = {"payload": [INERTIA, AHEAD, 0 * AHEAD, BELOW], "parallel_spring": [BELOW], "zero_offset": [AHEAD],
+        "torque_ceiling": [CEILING]}
+"""What each effect's numbers do: a load pulls as a spring and a zero askew do together, and is slow besides."""
+FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2, 0.0, 0.5], "zero_offset": [1.5]}
+
+
+class Search(LinearSearch):
+    """A step goes most of the way."""
+
+    lone = True
+
+    def refitted(self, fit, takes, steps, free=None):
+        end = self.run(self.refitting(fit, takes, steps))
+        return self.evaluated(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
+
+
+@pytest.mark.parametrize(("lone", "stay"), [(True, {"torque_ceiling", "payload"}), (False, set(FOUND))])
+def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint(lone, stay):
+    search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
+    search.lone = lone
+    fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
+    kept = without_idle(search, fit)
+    assert {c.name for c in kept.effects} == stay
+    assert kept.cost["choose"] < 1e-6
+
+
+def test_what_nothing_else_does_stays():
+    hidden = {name: x for name, x in FOUND.items() if name != "payload"}
+    search = Search(DOES, **hidden)
+    fit = search.evaluated([(candidate(name), np.array(x)) for name, x in hidden.items()])
+    assert without_idle(search, fit).effects == fit.effects

@@ -1,0 +1,43 @@
+"""Backward: effects that were taken and that the others left nothing to say go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.gap.company import HALF, TOGETHER_STEPS
+from workbench.gap.rounds import LEAST_GAIN, Round
+from workbench.gap.search import Fit, Search
+from workbench.gap.worth import ALL_CLOSED, LAST_CLOSED, completed
+
+CLEARLY = 5.0
+"""Times that gain, from which on an effect is missed whatever the others do in its place."""
+
+
+def without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
+    """Without effects, from the last one back, that left half of what was there and that no other completed."""
+    for r in reversed(rounds):
+        for t in r.accepted:
+            if completed(search, r, t, current) < LAST_CLOSED:
+                current = search.evaluated(current.sizes_without(t.candidate.key))
+    return current
+
+
+def without_idle(search: Search, current: Fit) -> Fit:
+    """Backward: an effect that the others have made idle goes. In a lone joint all act alike, and the others may have far to go:
+    a load does by itself what another does with a spring and a zero askew."""
+    for i in range(len(current.effects) - 1, -1, -1):
+        if len(current.effects) < 2:
+            break
+        least = LEAST_GAIN * max(1, current.effects[i].size) * (ALL_CLOSED if search.is_settled(current.effects[i]) else 1.0)
+        rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
+        before = rest.cost["choose"]
+        if search.lone or before - current.cost["choose"] < CLEARLY * least:
+            free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None
+            rest = search.refitted(rest, search.fitted, 1, free)
+        if search.lone and rest.cost["choose"] < HALF * before:
+            rest = search.refitted(rest, search.fitted, TOGETHER_STEPS)
+        if rest.cost["choose"] - current.cost["choose"] < least:
+            current = rest
+            if search.lone:
+                return without_idle(search, current)
+    return current
