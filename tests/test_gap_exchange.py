@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.gap import exchange, selection
+from workbench.gap import exchange
+from workbench.gap import sets as sets_
 from workbench.gap.company import worst_joint
 from workbench.gap.search import Fit
 
@@ -72,16 +73,16 @@ def test_only_what_was_found_together_is_replaced_and_by_nothing_that_is_there(s
 def test_sets_are_replaced_until_none_is_better_unless_the_first_leaves_no_more_than_a_right_model(search, monkeypatch, right,
                                                                                                  replaced):
     first = [trial("viscous_friction"), trial("backlash")]
-    monkeypatch.setattr(selection, "several", lambda *a: [first])
-    monkeypatch.setattr(selection, "RIGHT", right)
+    monkeypatch.setattr(sets_, "several", lambda *a: [first])
+    monkeypatch.setattr(sets_, "RIGHT", right)
 
     def fitted(search, current, sets, takes):
         fits = [fit_of(search, **{t.candidate.name: {"viscous_friction": 1.5, "dead_band": 2.0}.get(t.candidate.name, 1.0)
                                   for t in s}) for s in sets]
         return sorted(zip(fits, sets), key=lambda f: f[0].cost["choose"])
 
-    monkeypatch.setattr(selection, "_fitted", fitted)
-    (fit, chosen), *rest = selection._together(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
+    monkeypatch.setattr(sets_, "_fitted", fitted)
+    (fit, chosen), *rest = sets_.together(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
     assert {t.candidate.name for t in chosen} == {"viscous_friction", "dead_band" if replaced else "backlash"}
     assert bool(rest) is replaced
     assert fit.cost["choose"] <= min((f.cost["choose"] for f, _ in rest), default=np.inf)

@@ -56,6 +56,14 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
     assert load_model(paths[2]).sha256 == puppy_model().sha256
 
 
+@pytest.mark.parametrize(("own", "other", "said"), [(0.5, 0.48, 0.98), (0.4, 0.21, 0.61), (0.7, 0.28, 0.7), (0.9, None, 0.9)])
+def test_of_a_tie_the_confidence_is_that_one_of_the_two_is_there(own: float, other: float | None, said: float) -> None:
+    ties = () if other is None else (Alternative("joint_compliance", ("flm",), other),)
+    told = replace(BACKLASH, confidence=own, alternatives=ties).to_json()
+    assert told["confidence"] == pytest.approx(said)
+    assert [a["confidence"] for a in told["alternatives"]] == [a.confidence for a in ties]
+
+
 def test_no_bound_is_null_and_a_vector_three_numbers() -> None:
     estimate = Estimate((0.0, 0.1, 0.2), (-inf, 0.0, 0.1), (inf, 0.2, inf), "m").to_json()
     assert estimate == {"value": [0, 0.1, 0.2], "low": [None, 0, 0.1], "high": [None, 0.2, None], "unit": "m"}

@@ -52,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {told.diagnosis.verdict}")
     for finding in told.diagnosis.findings:
-        print(f"  {finding.evidence} (confidence {finding.confidence:.2f}; error on unseen stretches "
+        other = f" or {finding.tie.effect}, which these recordings do not tell apart" if finding.tie else ""
+        print(f"  {finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches "
               f"{finding.validation.before:.2f} -> {finding.validation.after:.2f} {finding.validation.unit})")
     print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
     return 0

@@ -29,10 +29,10 @@ NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only foretell."""
 
 
-def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str, alone: Sequence[Candidate]
-              ) -> list[list[Trial]]:
+def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str, alone: Sequence[Candidate],
+              beside: bool = False) -> list[list[Trial]]:
     """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
-    whoever was asked about the joint, on these takes, whose base is held."""
+    whoever was asked about the joint, on these takes, whose base is held. beside: those, too, in which it stands for none."""
     there = fit.sizes_by_key()
     mine = [c for c in alone if c.key in there]
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
@@ -51,7 +51,7 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
     rests = [next(seen) for _ in mine]
     signatures = [[next(seen) - left for _ in points] for points in probes]
     out: list[list[Trial]] = []
-    for k, rest in enumerate(rests):
+    for k, rest in enumerate([*rests, left] if beside else rests):
         staying = [n for n in range(len(mine)) if n != k]
         x = [there[mine[n].key] for n in staying]
         sets = [s for t, points, did in zip(others, probes, signatures)

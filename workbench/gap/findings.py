@@ -18,6 +18,8 @@ Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]
 LIKELY = 0.5
 """Probability from which on a name counts as an explanation."""
+TIED = 0.5
+"""An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
 FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 
@@ -71,8 +73,8 @@ class Alternative:
 
 @dataclass(frozen=True)
 class Finding:
-    """A piece of physics that the model lacked. confidence: probability that it is there, at that place. fit: error on the
-    stretches that were fitted; validation: on those that no choice and no parameter saw. evidence: for a person."""
+    """A piece of physics that the model lacked. confidence: probability that it is there by this name, at that place. fit: error
+    on the stretches that were fitted; validation: on those that no choice and no parameter saw. evidence: for a person."""
 
     effect: str
     where: tuple[str, ...]
@@ -89,12 +91,22 @@ class Finding:
             raise ValueError(f"a tie is one finding with at most one alternative, got {len(self.alternatives)}")
 
     @property
+    def tie(self) -> Alternative | None:
+        """The other name of a tie of two."""
+        return next((a for a in self.alternatives if a.confidence >= TIED * self.confidence), None)
+
+    @property
+    def together(self) -> float:
+        """The finding's confidence: of a tie, that one of the two is there; the data do not say which."""
+        return self.confidence + (self.tie.confidence if self.tie else 0.0)
+
+    @property
     def likely(self) -> bool:
-        """Whether the effect, or the one it ties with, is there rather than not."""
+        """Whether the effect, or another that could be meant, is there rather than not."""
         return self.confidence + sum(a.confidence for a in self.alternatives) >= LIKELY
 
     def to_json(self) -> dict[str, Any]:
-        return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence),
+        return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()},
                 "alternatives": [a.to_json() for a in self.alternatives],
                 "fit": self.fit.to_json(), "validation": self.validation.to_json(), **_said("evidence", self.evidence)}

@@ -5,14 +5,14 @@ First what held takes show, where nothing but the servos moves the robot; then, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from workbench.gap.anew import Played, played_anew
-from workbench.gap.asked import FEW, LONE, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.gap.asked import FEW, TIERS, TIERS_OF_ALL, asked, standing_out
 from workbench.gap.backward import without_idle, without_part_answers
 from workbench.gap.candidate import Candidate
 from workbench.gap.channels import BODY, joint_of
@@ -20,21 +20,17 @@ from workbench.gap.company import (
     HALF,
     MOST_STEPS,
     NEARLY_ALL,
-    TOGETHER_STEPS,
-    begun_again,
     fitted_beside,
     priced,
     seated,
-    several,
-    worst_joint,
 )
-from workbench.gap.exchange import exchanges
 from workbench.gap.gainsaid import heard
 from workbench.gap.ledger import channel_gaps
 from workbench.gap.pulls import in_two
 from workbench.gap.race import Trial
 from workbench.gap.rounds import LEAST_GAIN, Chosen, Round, before_rough
 from workbench.gap.search import Fit, Report, Search
+from workbench.gap.sets import lone_round, set_right, together
 from workbench.gap.weighed_anew import weighed_anew
 from workbench.gap.worth import (
     ALL_CLOSED,
@@ -62,9 +58,6 @@ NEARLY_ALL_WALKING = 0.97
 back, which closes up to 0.93; true effects close more."""
 LAST_STEPS = 3
 """Of a fit of all effects when one was dropped at the end; it ends where little changes."""
-AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
-"""Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
-shares of what a right model does, for which none is replaced."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
 """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
 joint, where the best leaves more than a tenth: there some fit has not come to its end."""
@@ -97,14 +90,15 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
             kept = search.resettled(kept)
-        if kept is not current or _left_walking(search, kept):
+        if kept is not current or _may_go_on(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
     return Chosen(kept, tuple(rounds), played.missed if played else ())
 
 
-def _left_walking(search: Search, fit: Fit) -> bool:
-    """Whether walks still show a gap: of several numbers, fits begun in coarse steps may not have come to their end."""
-    return any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
+def _may_go_on(search: Search, fit: Fit) -> bool:
+    """Whether a fit may not have come to its end: where walks still show a gap, as fits of several numbers begin in coarse steps,
+    and of a lone joint, where all acts alike and valleys are long."""
+    return search.lone or any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
 
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
@@ -120,7 +114,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
         if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:
-            current, seats = _lone_round(search, pool, current, beyond, takes, say)
+            current, seats = lone_round(search, pool, current, beyond, takes, say)
             rounds += seats
             if seats:
                 continue
@@ -146,10 +140,10 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
         of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
-        together = [] if stopped or read_off or of_all else _together(search, current, trials, takes, beyond)
-        if together and priced(together[0][0]) < HALF * priced(after):
-            after = together[0][0]
-            seats = [replace(seats[0], accepted=()), *seated(search, current, together)]
+        sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
+        if sets and priced(sets[0][0]) < HALF * priced(after):
+            after = sets[0][0]
+            seats = [replace(seats[0], accepted=()), *seated(search, current, sets)]
         rounds += seats
         if after is current:
             break
@@ -160,65 +154,10 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             current, rounds[:] = weighed_anew(search, current, rounds, takes)
     if search.jury.walks(takes):
         current, rounds[:] = weighed_anew(search, current, rounds, takes)
+    elif search.lone and search.jury.work <= most_work:
+        current, seats = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
+        rounds[:] = seats or rounds
     return current
-
-
-def _lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
-                say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
-    """Of a robot of one joint, in which all acts: sets of effects before any is fitted alone, if one is nearly all."""
-    groups: list[list[Candidate]] = []
-    on: dict[int, tuple[int, ...]] = {}
-    for tier in range(LONE + 1):
-        more, takes_of = asked(search, pool, current, beyond, takes, tier)
-        on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
-        groups += more
-    looked = search.tried(current, groups, on, say, least=np.inf)
-    together = _together(search, current, looked, takes, beyond)
-    if not together:
-        return current, []
-    best = together[0][0]
-    before, after = ({i: fit.residuals[i] for i in takes} for fit in (current, best))
-    if search.jury.closed(before, after, "choose") <= NEARLY_ALL:
-        return current, []
-    return best, seated(search, current, together)
-
-
-def _together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
-              ) -> list[tuple[Fit, list[Trial]]]:
-    """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
-    replaced, until none of these is better."""
-    joint = worst_joint(beyond)
-    sets = _fitted(search, current, several(search, current, trials, takes, beyond), takes)
-    if joint is None or not sets:
-        return []
-    for _ in range(EXCHANGES):
-        fit, chosen = sets[0]
-        if _is_right(search, fit, takes, joint):
-            break
-        if (again := begun_again(search, fit, takes, TOGETHER_STEPS)) is not fit:
-            sets[0] = again, chosen
-            continue
-        known = {frozenset(t.candidate.key for t in others) for _, others in sets}
-        new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
-               if frozenset(t.candidate.key for t in s) not in known]
-        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: priced(f[0]))
-        if sets[0][0] is fit:
-            break
-    return sets
-
-
-def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
-    """Whether a fit leaves in a joint about what a right model does."""
-    left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
-    return bool(left.sum() < RIGHT * expected.sum())
-
-
-def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...]) -> list[tuple[Fit, list[Trial]]]:
-    """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
-    begun = search.side_by_side([fitted_beside(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
-    ranked = sorted(zip(begun, sets), key=lambda f: priced(f[0]))
-    ended = search.side_by_side([search.refitting(fit, takes, TOGETHER_STEPS) for fit, _ in ranked[:AHEAD]])
-    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[AHEAD:]], key=lambda f: priced(f[0]))
 
 
 def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:

@@ -126,7 +126,8 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
     numbers = []
     for f in diagnosis.findings:
         rival = rival_of(f)
-        sure = f"{100 * f.confidence:.0f} % sure" + (
+        sure = f"{100 * f.together:.0f} % sure" + (
+            f" of it or {title_of(f.tie.effect, f.tie.where)}, which tie" if f.tie else
             f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
         told = max(f.parameters.values(), key=_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
@@ -205,6 +206,8 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
         parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {100 * a.confidence:.0f} %.** These recordings alone do not rule "
                           "that out."))
         sure += f", or {title_of(a.effect, a.where)} {100 * a.confidence:.0f} %"
+    if finding.tie:
+        sure += f": {100 * finding.together:.0f} % for one of the two"
     rows = [["how sure", sure], *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))

@@ -1,0 +1,75 @@
+"""In a lone joint, effects that do nearly the same share the work where no other set leaves what a right model does."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.gap_linear import COUNT, LinearSearch, candidate
+from workbench.gap import sets
+from workbench.gap.race import Trial
+from workbench.gap.rounds import Round
+
+RNG = np.random.default_rng(5)
+SLOW, HEAVY = RNG.normal(size=(2, COUNT))
+DOES = {"supply_voltage": [SLOW], "viscous_friction": [SLOW + 0.3 * RNG.normal(size=COUNT)], "parallel_spring": [HEAVY]}
+
+
+class Search(LinearSearch):
+    def __init__(self, **sizes):
+        super().__init__(DOES, **sizes)
+        self.nominal = SimpleNamespace(joints=("swing",))
+        by_all = self.jury.by_channel
+        self.jury.by_channel = lambda left, use, joint: by_all(left, use)
+
+
+def found(search, **sizes):
+    """A fit, and the round of each of its effects, with friction as the supply's rival."""
+    fit = search.evaluated([(candidate(name), np.array(x)) for name, x in sizes.items()])
+    rounds = []
+    for c, x in fit.sizes():
+        trials = [Trial(c, x, {"fit": 2e5, "choose": 1e5}, None)]
+        if c.name == "supply_voltage":
+            trials += [Trial(candidate(name), np.array([size]), {"fit": 2 * gain, "choose": gain}, None)
+                       for name, size, gain in (("viscous_friction", 3.0, 9e4), ("dead_band", 6.0, 4e4))]
+        rounds.append(Round(fit, tuple(trials), (trials[0],)))
+    return fit, rounds
+
+
+@pytest.mark.parametrize(("hidden", "named"), [
+    ({"supply_voltage": [20.0], "viscous_friction": [20.0], "parallel_spring": [5.0]}, True),
+    ({"supply_voltage": [40.0], "parallel_spring": [5.0]}, False)])
+def test_effects_that_share_the_work_are_named_where_one_alone_leaves_more_than_noise(monkeypatch, hidden, named):
+    search = Search(**hidden)
+    search.recorded = search.recorded + RNG.normal(size=COUNT)
+    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
+    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
+    begun = []
+    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: begun.extend(chosen) or [
+        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
+    after, seats = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
+    assert {c.name for c in after.effects} == set(hidden)
+    assert len(seats) == (3 if named else 0)
+    assert [{t.candidate.name: float(t.x[0]) for t in s} for s in begun] == (
+        [{"supply_voltage": 20.0, "parallel_spring": 5.0, "viscous_friction": 1.5}] if named else [])
+
+
+def test_a_set_that_is_not_right_either_does_not_replace_what_was_found(monkeypatch):
+    search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
+    search.recorded = search.recorded + 3.0 * RNG.normal(size=COUNT)
+    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
+    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
+    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: [
+        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
+    assert sets.set_right(search, [], fit, rounds, (0,), lambda share: None) == (fit, [])
+
+
+def test_a_shape_that_came_to_its_end_begins_in_the_middle():
+    c = next(c for c in (candidate("stribeck_friction"),) if c.shapes.any())
+    _, high = c.bounds()
+    assert sets._free(c, high)[c.shapes] == 0
+    inside = np.where(c.shapes, high / 2, 1.0)
+    np.testing.assert_array_equal(sets._free(replace(c), inside), inside)
