@@ -9,6 +9,7 @@ from workbench.effects.registry import known_effects
 from workbench.gap.candidate import Candidate
 from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
 from workbench.gap.contest import Rival, Standing
+from workbench.gap.evidence import LOOP
 from workbench.gap.findings import Alternative, Change, Finding, Unexplained
 from workbench.gap.point_mass import PointMass
 from workbench.gap.search import Fit
@@ -36,6 +37,13 @@ def test_no_number_is_known_better_than_a_share_of_what_it_differs_from_neutral_
     c = Candidate.of(known_effects()["clock_rate"], (), (1.0,))
     told = estimates(c, np.array([1.0]), np.zeros((1, 1)))["ratio"]
     assert told.high - told.value == pytest.approx(Z90 * LEAST_RELATIVE * abs(told.value - 1.0), rel=1e-6)
+
+
+def test_no_delay_is_known_better_than_models_may_set_out_sooner_or_later():
+    c = Candidate.of(known_effects()["command_delay"], ("knee",), (0.0,))
+    told = estimates(c, np.array([3.0]), np.array([[1e-6]]))["delay"]
+    assert told.high - told.value == pytest.approx(Z90 * LOOP / np.sqrt(3.0), rel=1e-6)
+    assert told.value - told.low == pytest.approx(told.high - told.value)
 
 
 def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_effects_stay_alternatives():

@@ -12,7 +12,7 @@ from workbench.gap.candidate import Candidate
 from workbench.gap.channels import ACROSS, BODY, joint_of
 from workbench.gap.contest import Rival, Standing
 from workbench.gap.covariance import WIDER, Z90
-from workbench.gap.evidence import TakeEvidence, joint_error, ratios
+from workbench.gap.evidence import LOOP, TakeEvidence, joint_error, ratios
 from workbench.gap.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.gap.ledger import GAP_RATIO, in_file_units
 from workbench.gap.point_mass import PointMass
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 LEAST_RELATIVE = 0.005
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
+LEAST_OF = {"command_delay": LOOP / np.sqrt(3.0)}
+"""The same in the contract's unit: every model may set out by LOOP sooner or later, so that no delay is known better [s]."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
@@ -87,7 +89,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
         unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
-    least = Z90 * LEAST_RELATIVE * np.abs(values - neutral)
+    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), LEAST_OF.get(c.name, 0.0))
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
