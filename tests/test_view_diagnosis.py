@@ -223,6 +223,13 @@ def test_a_tie_is_seen_wherever_the_finding_is(model: RobotModel, story: TakeSto
     assert "<b>Or joint compliance at flm: 12 %.</b>" in page
 
 
+def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, story: TakeStory) -> None:
+    tied = replace(finding(confidence=0.5), alternatives=(Alternative("joint_compliance", ("flm",), 0.46),))
+    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [story], "Session small").html()
+    assert "96 % sure that it is this or joint compliance at flm" in page
+    assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
+
+
 def test_a_sentence_is_said_once_in_its_section(model: RobotModel, story: TakeStory) -> None:
     told = finding()
     page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [story], "S").html()
