@@ -29,7 +29,7 @@ def without_idle(search: Search, current: Fit) -> Fit:
         if len(current.effects) < 2:
             break
         least = LEAST_GAIN * max(1, current.effects[i].size) * (ALL_CLOSED if search.is_settled(current.effects[i]) else 1.0)
-        rest = search.evaluated([s for j, s in enumerate(current.sizes()) if j != i])
+        rest = search.evaluated(current.sizes_without(current.effects[i].key))
         before = rest.cost["choose"]
         if search.lone or before - current.cost["choose"] < CLEARLY * least:
             free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None

@@ -20,7 +20,7 @@ from workbench.gap.company import (
     several,
     worst_joint,
 )
-from workbench.gap.exchange import exchanges
+from workbench.gap.exchange import NOTHING, exchanges
 from workbench.gap.race import Trial
 from workbench.gap.rounds import Round
 from workbench.gap.search import Fit, Search
@@ -34,7 +34,7 @@ shares of what a right model does, for which none is replaced."""
 
 
 def lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
-                say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
+               say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
     """Of a robot of one joint, in which all acts: sets of effects before any is fitted alone, if one is nearly all."""
     looked = _looked_at(search, pool, current, beyond, takes, say)
     sets = together(search, current, looked, takes, beyond)
@@ -76,7 +76,7 @@ def _shared(current: Fit, rounds: Sequence[Round], joint: str) -> list[list[Tria
             halves = (t.candidate.key, o.candidate.key)
             sizes = [(c, np.where(c.shapes, x, x / 2) if c.key in halves else x)
                      for c, x in [*((c, _free(c, x)) for c, x in current.sizes()), (o.candidate, o.x)]]
-            out.append([Trial(c, x, t.gain, joint) for c, x in sizes])
+            out.append([Trial(c, x, NOTHING, joint) for c, x in sizes])
     return out
 
 
@@ -99,7 +99,7 @@ def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
 
 
 def together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
-              ) -> list[tuple[Fit, list[Trial]]]:
+             ) -> list[tuple[Fit, list[Trial]]]:
     """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
     replaced, until none of these is better."""
     joint = worst_joint(beyond)

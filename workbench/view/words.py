@@ -12,7 +12,7 @@ from workbench.gap.channels import ACROSS, BODY, joint_of
 from workbench.gap.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.robot import EffectSpec
 
-TIE = 0.1
+NAMED = 0.1
 """A rival this probable is named wherever the finding is."""
 LAYERS: dict[Layer, str] = {
     "timing": "when commands arrive", "actuator": "what the servos do", "structure": "how links sit on their joints",
@@ -52,7 +52,7 @@ def _with_rival(f: Finding) -> str:
 
 def rival_of(finding: Finding) -> Alternative | None:
     """The alternative that is likely enough to be named wherever the finding is."""
-    return next((a for a in finding.alternatives if a.confidence >= TIE), None)
+    return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
 
 
 def title_of(effect: str, where: Sequence[str]) -> str:
