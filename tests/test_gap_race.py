@@ -86,6 +86,21 @@ def test_rivals_know_the_best_at_their_joint_and_of_all():
     assert (_best(race.reached, "flm"), _best(race.reached, "frm"), _best(race.reached, None)) == (5.0, 0.0, 8.0)
 
 
+@pytest.mark.parametrize(("foretold", "fitted"),
+                         [((310, 230, 100), (310,)), ((296, 230, 100), (296, 230)), ((170, 160, 0), ())])
+def test_where_no_rival_is_foretold_enough_the_best_of_those_near_it_are_fitted(foretold, fitted):
+    race = Race(least=300.0)
+    asking = [Trying._worth_fitting(SimpleNamespace(race=race, joints=[None], walking=True, coarse=True), [g]) for g in foretold]
+    for a in asking:
+        next(a)
+    worth = []
+    for g, a in zip(foretold, asking):
+        with pytest.raises(StopIteration) as end:
+            next(a)
+        worth += [g] * len(end.value.value)
+    assert tuple(worth) == fitted
+
+
 def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(quiet):
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)

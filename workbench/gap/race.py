@@ -29,6 +29,9 @@ them, what that one says is tried: where a joint gives way early or late by chan
 WORTH, WORTH_WALKING = 0.3, 0.5
 """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
 where that is cheap, and on a walk."""
+DOUBTED = 0.6
+"""Share of the least gain from which on the best are fitted where none is foretold all of it: signatures say too little where
+only a part of a walk was looked at."""
 BEHIND = 0.6
 """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
 REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
@@ -215,8 +218,9 @@ class Trying:
         yield []  # until all have said what they foretell
         last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
         worth = WORTH_WALKING if self.walking else WORTH
+        least = race.least * (1.0 if max(race.foretold.values()) > race.least else DOUBTED)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > race.least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
+                if g > least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
