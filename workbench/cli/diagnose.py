@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from workbench.cli.options import add_out, positive
+
+if TYPE_CHECKING:
+    from workbench.gap.findings import Finding
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -52,8 +56,15 @@ def run(args: argparse.Namespace) -> int:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {told.diagnosis.verdict}")
     for finding in told.diagnosis.findings:
-        other = f" or {finding.tie.effect}, which these recordings do not tell apart" if finding.tie else ""
-        print(f"  {finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches "
-              f"{finding.validation.before:.2f} -> {finding.validation.after:.2f} {finding.validation.unit})")
+        print(f"  {_line(finding)}")
     print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
     return 0
+
+
+def _line(finding: Finding) -> str:
+    from workbench.view.words import title_of
+
+    tie, error = finding.tie, finding.validation
+    other = f" that it is this or {title_of(tie.effect, tie.where)}, which these recordings do not tell apart" if tie else ""
+    return f"{finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches " \
+           f"{error.before:.2f} -> {error.after:.2f} {error.unit})"
