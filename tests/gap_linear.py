@@ -41,7 +41,7 @@ class LinearSearch:
         self.asked = 0
         self.jury = SimpleNamespace(
             residuals=self.answers, vector=lambda left, use: left[0][:, 0],
-            cost=lambda left, use: (2.0 if use == "fit" else 1.0) * float(np.sum(left[0] ** 2)),
+            cost=lambda left, use: (2.0 if use == "fit" else 1.0) * float(sum(np.sum(r**2) for r in left.values())),
             by_channel=lambda left, use: (np.array([np.sum(left[0] ** 2)]), np.array([COUNT])))
 
     def sum(self, sizes):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
+from workbench.gap import backward
 from workbench.gap.backward import without_idle
 
 RNG = np.random.default_rng(3)
@@ -17,17 +18,20 @@ FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2
 class Search(LinearSearch):
     """A step goes most of the way."""
 
-    lone = True
+    lone, held = True, ()
 
     def refitted(self, fit, takes, steps, free=None):
         end = self.run(self.refitting(fit, takes, steps))
         return self.evaluated(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
 
 
-@pytest.mark.parametrize(("lone", "stay"), [(True, {"torque_ceiling", "payload"}), (False, set(FOUND))])
-def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint(lone, stay):
+@pytest.mark.parametrize(("lone", "against", "stay"), [
+    (True, 0.0, {"torque_ceiling", "payload"}), (False, 0.0, set(FOUND)), (False, 500.0, {"torque_ceiling", "payload"})])
+def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint_or_where_held_takes_gainsay_these(
+        monkeypatch, lone, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
     search.lone = lone
+    monkeypatch.setattr(backward, "gained", lambda *a: against)
     fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)
     assert {c.name for c in kept.effects} == stay

@@ -56,6 +56,21 @@ def test_effects_that_share_the_work_are_named_where_one_alone_leaves_more_than_
         [{"supply_voltage": 20.0, "parallel_spring": 5.0, "viscous_friction": 1.5}] if named else [])
 
 
+@pytest.mark.parametrize(("found_so_far", "replaced"), [([38.0], False), ([10.0], True)])
+def test_a_set_that_is_not_right_replaces_what_leaves_twenty_times_more(monkeypatch, found_so_far, replaced):
+    search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
+    search.recorded = search.recorded + 1.3 * RNG.normal(size=COUNT)
+    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
+    other = [Trial(candidate(name), np.array([1.0]), {}, None) for name in ("supply_voltage", "parallel_spring")]
+    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [other])
+    monkeypatch.setattr(sets, "_shared", lambda *a: [])
+    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: [
+        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    fit, rounds = found(search, supply_voltage=found_so_far, parallel_spring=[5.0])
+    after, _ = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
+    assert (after is not fit) is replaced
+
+
 def test_a_set_that_is_not_right_either_does_not_replace_what_was_found(monkeypatch):
     search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
     search.recorded = search.recorded + 3.0 * RNG.normal(size=COUNT)

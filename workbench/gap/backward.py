@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from workbench.gap.company import HALF, TOGETHER_STEPS
 from workbench.gap.rounds import LEAST_GAIN, Round
-from workbench.gap.search import Fit, Search
+from workbench.gap.search import AGAINST, Fit, Search, gained
 from workbench.gap.worth import ALL_CLOSED, LAST_CLOSED, completed
 
 CLEARLY = 5.0
@@ -23,8 +23,9 @@ def without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) 
 
 
 def without_idle(search: Search, current: Fit) -> Fit:
-    """Backward: an effect that the others have made idle goes. In a lone joint all act alike, and the others may have far to go:
-    a load does by itself what another does with a spring and a zero askew."""
+    """Backward: an effect that the others have made idle goes. The others may have far to go: in a lone joint, where all act
+    alike and a load does by itself what another does with a spring and a zero askew; and where held takes go better without it,
+    as a knee that was not fitted soft enough leaves walks something for play to close."""
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
             break
@@ -34,10 +35,15 @@ def without_idle(search: Search, current: Fit) -> Fit:
         if search.lone or before - current.cost["choose"] < CLEARLY * least:
             free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None
             rest = search.refitted(rest, search.fitted, 1, free)
-        if search.lone and rest.cost["choose"] < HALF * before:
+        if (search.lone and rest.cost["choose"] < HALF * before) or _gainsaid(search, current, i, rest):
             rest = search.refitted(rest, search.fitted, TOGETHER_STEPS)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
             if search.lone:
                 return without_idle(search, current)
     return current
+
+
+def _gainsaid(search: Search, fit: Fit, i: int, without: Fit) -> bool:
+    """Whether held takes speak against what walks make of an effect."""
+    return not search.is_settled(fit.effects[i]) and gained(search.jury, fit, without, search.held, "fit") > AGAINST

@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
 """Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
 shares of what a right model does, for which none is replaced."""
+ALL_THE_REST = 0.95
+"""Share of what is beyond noise that a set closes, too, where it is right but for what engines do otherwise, as at a stop."""
 
 
 def lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
@@ -49,7 +51,7 @@ def lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
 
 def set_right(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], takes: tuple[int, ...],
               say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
-    """Of a robot of one joint: a set that leaves what a right model does, where what was found so far leaves more: with one
+    """Of a robot of one joint: a set that leaves about what a right model does, where what was found so far leaves more: with one
     effect replaced, one more, or one sharing its work with a rival. A weaker supply does nearly all that friction does, and no
     fit that begins with the one comes to both."""
     (joint,) = search.nominal.joints
@@ -61,7 +63,7 @@ def set_right(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     shared = _shared(current, rounds, joint)
     sets = sorted([*_fitted(search, nominal, other, takes), *_fitted(search, nominal, shared, takes, len(shared))],
                   key=lambda f: priced(f[0]))
-    if not sets or not _is_right(search, sets[0][0], takes, joint):
+    if not sets or not (_is_right(search, sets[0][0], takes, joint) or _ends(search, current, sets[0][0], takes, joint)):
         return current, []
     return sets[0][0], seated(search, nominal, sets)
 
@@ -126,6 +128,13 @@ def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> b
     """Whether a fit leaves in a joint about what a right model does."""
     left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
     return bool(left.sum() < RIGHT * expected.sum())
+
+
+def _ends(search: Search, before: Fit, after: Fit, takes: tuple[int, ...], joint: str) -> bool:
+    """Whether nearly all that a fit leaves in a joint beyond noise is gone in another."""
+    both = ({i: fit.residuals[i] for i in takes} for fit in (before, after))
+    (was, expected), (left, _) = (search.jury.by_channel(residuals, "choose", joint) for residuals in both)
+    return bool(left.sum() - expected.sum() < (1 - ALL_THE_REST) * (was.sum() - expected.sum()))
 
 
 def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...], ahead: int = AHEAD
