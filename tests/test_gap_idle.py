@@ -26,12 +26,12 @@ class Search(LinearSearch):
 
 
 @pytest.mark.parametrize(("lone", "against", "stay"), [
-    (True, 0.0, {"torque_ceiling", "payload"}), (False, 0.0, set(FOUND)), (False, 500.0, {"torque_ceiling", "payload"})])
+    (True, False, {"torque_ceiling", "payload"}), (False, False, set(FOUND)), (False, True, {"torque_ceiling", "payload"})])
 def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint_or_where_held_takes_gainsay_these(
         monkeypatch, lone, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
     search.lone = lone
-    monkeypatch.setattr(backward, "gained", lambda *a: against)
+    monkeypatch.setattr(backward, "held_gainsay", lambda *a: against)
     fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)
     assert {c.name for c in kept.effects} == stay

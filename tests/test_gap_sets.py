@@ -37,6 +37,11 @@ def found(search, **sizes):
     return fit, rounds
 
 
+def fitted(search, current, chosen, *a):
+    """Sets at their end at once."""
+    return [(search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen]
+
+
 @pytest.mark.parametrize(("hidden", "named"), [
     ({"supply_voltage": [20.0], "viscous_friction": [20.0], "parallel_spring": [5.0]}, True),
     ({"supply_voltage": [40.0], "parallel_spring": [5.0]}, False)])
@@ -46,8 +51,7 @@ def test_effects_that_share_the_work_are_named_where_one_alone_leaves_more_than_
     monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
     monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
     begun = []
-    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: begun.extend(chosen) or [
-        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    monkeypatch.setattr(sets, "_fitted", lambda of, fit, chosen, *a: begun.extend(chosen) or fitted(of, fit, chosen))
     fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
     after, seats = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
     assert {c.name for c in after.effects} == set(hidden)
@@ -64,8 +68,7 @@ def test_a_set_that_is_not_right_replaces_what_leaves_twenty_times_more(monkeypa
     other = [Trial(candidate(name), np.array([1.0]), {}, None) for name in ("supply_voltage", "parallel_spring")]
     monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [other])
     monkeypatch.setattr(sets, "_shared", lambda *a: [])
-    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: [
-        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    monkeypatch.setattr(sets, "_fitted", fitted)
     fit, rounds = found(search, supply_voltage=found_so_far, parallel_spring=[5.0])
     after, _ = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
     assert (after is not fit) is replaced
@@ -76,8 +79,7 @@ def test_a_set_that_is_not_right_either_does_not_replace_what_was_found(monkeypa
     search.recorded = search.recorded + 3.0 * RNG.normal(size=COUNT)
     monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
     monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
-    monkeypatch.setattr(sets, "_fitted", lambda search, current, chosen, *a: [
-        (search.run(search.refitting(search.evaluated([(t.candidate, t.x) for t in s]), (0,), 1)), s) for s in chosen])
+    monkeypatch.setattr(sets, "_fitted", fitted)
     fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
     assert sets.set_right(search, [], fit, rounds, (0,), lambda share: None) == (fit, [])
 

@@ -62,9 +62,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _line(finding: Finding) -> str:
-    from workbench.view.words import title_of
+    from workbench.view.words import this_or
 
     tie, error = finding.tie, finding.validation
-    other = f" that it is this or {title_of(tie.effect, tie.where)}, which these recordings do not tell apart" if tie else ""
+    other = f" {this_or(tie)}, which these recordings do not tell apart" if tie else ""
     return f"{finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from workbench.gap.company import HALF, TOGETHER_STEPS
 from workbench.gap.rounds import LEAST_GAIN, Round
-from workbench.gap.search import AGAINST, Fit, Search, gained
+from workbench.gap.search import Fit, Search, held_gainsay
 from workbench.gap.worth import ALL_CLOSED, LAST_CLOSED, completed
 
 CLEARLY = 5.0
@@ -29,21 +29,16 @@ def without_idle(search: Search, current: Fit) -> Fit:
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
             break
-        least = LEAST_GAIN * max(1, current.effects[i].size) * (ALL_CLOSED if search.is_settled(current.effects[i]) else 1.0)
-        rest = search.evaluated(current.sizes_without(current.effects[i].key))
+        c, settled = current.effects[i], search.is_settled(current.effects[i])
+        least = LEAST_GAIN * max(1, c.size) * (ALL_CLOSED if settled else 1.0)
+        rest = search.evaluated(current.sizes_without(c.key))
         before = rest.cost["choose"]
         if search.lone or before - current.cost["choose"] < CLEARLY * least:
-            free = range(len(rest.effects)) if search.is_settled(current.effects[i]) else None
-            rest = search.refitted(rest, search.fitted, 1, free)
-        if (search.lone and rest.cost["choose"] < HALF * before) or _gainsaid(search, current, i, rest):
+            rest = search.refitted(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
+        if (search.lone and rest.cost["choose"] < HALF * before) or (not settled and held_gainsay(search, current, rest)):
             rest = search.refitted(rest, search.fitted, TOGETHER_STEPS)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
             if search.lone:
                 return without_idle(search, current)
     return current
-
-
-def _gainsaid(search: Search, fit: Fit, i: int, without: Fit) -> bool:
-    """Whether held takes speak against what walks make of an effect."""
-    return not search.is_settled(fit.effects[i]) and gained(search.jury, fit, without, search.held, "fit") > AGAINST

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from workbench.gap.candidate import Candidate
 from workbench.gap.company import NEARLY_ALL
-from workbench.gap.search import AGAINST, Fit, Search, gained
+from workbench.gap.search import Fit, Search, gained, held_gainsay
 
 
 def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> Fit:
@@ -24,7 +24,7 @@ def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> Fit:
 def _heard(search: Search, current: Fit, c: Candidate) -> Fit:
     held, walks = search.held, search.grounded(search.fitted)
     without = search.evaluated(current.sizes_without(c.key))
-    if gained(search.jury, current, without, held, "fit") < AGAINST:
+    if not held_gainsay(search, current, without):
         return current
     settled = search.settled
     fit = search.resettled(current, c)

@@ -218,7 +218,7 @@ class Trying:
         yield []  # until all have said what they foretell
         last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
         worth = WORTH_WALKING if self.walking else WORTH
-        least = race.least * (1.0 if max(race.foretold.values()) > race.least else DOUBTED)
+        least = race.least * (1.0 if _best(race.foretold, None) > race.least else DOUBTED)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
                 if g > least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
 

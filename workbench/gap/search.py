@@ -29,7 +29,7 @@ SEEN_ELSEWHERE = ("zero_offset",)
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
 AGAINST = 100.0
-"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number of timing."""
+"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number."""
 FINER, FINER_STEPS = 0.5, 3
 """In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
 does is less than what a coarse step makes of it."""
@@ -151,7 +151,7 @@ class Search:
         if not timing or not self.grounded(self.fitted):
             return current
         fit = self.refitted(current, self.fitted, RESETTLING, timing)
-        if gained(self.jury, fit, current, self.held, "fit") > AGAINST:
+        if held_gainsay(self, fit, current):
             return current
         numbers = fit.numbers(timing)
         covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
@@ -322,6 +322,11 @@ def gained(jury: Jury, before: Fit, after: Fit, takes: Sequence[int], use: str) 
     """By how much less chi squared one fit leaves than another, of one use of some takes."""
     was, now = (jury.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
     return was - now
+
+
+def held_gainsay(search: Search, fit: Fit, other: Fit) -> bool:
+    """Whether held takes speak against a fit, beside another."""
+    return gained(search.jury, fit, other, search.held, "fit") > AGAINST
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:

@@ -34,6 +34,7 @@ from workbench.view.words import (
     reason_of,
     rival_of,
     sentence_of,
+    this_or,
     title_of,
     unbroken,
 )
@@ -127,7 +128,7 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
     for f in diagnosis.findings:
         rival = rival_of(f)
         sure = f"{100 * f.together:.0f} % sure" + (
-            f" that it is this or {title_of(f.tie.effect, f.tie.where)}" if f.tie else
+            f" {this_or(f.tie)}" if f.tie else
             f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
         told = max(f.parameters.values(), key=_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))

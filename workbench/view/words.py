@@ -55,6 +55,11 @@ def rival_of(finding: Finding) -> Alternative | None:
     return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
 
 
+def this_or(tie: Alternative) -> str:
+    """What a tie's confidence is of: `that it is this or joint compliance at flm`."""
+    return f"that it is this or {title_of(tie.effect, tie.where)}"
+
+
 def title_of(effect: str, where: Sequence[str]) -> str:
     """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, at which the data cannot tell."""
     return name_of(effect) + (f" at {listed(where, 'or')}" if where else "")
