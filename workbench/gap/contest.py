@@ -193,7 +193,8 @@ def _told(fit: Fit, i: int) -> int:
 
 
 def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
-    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end."""
+    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end; on a
+    walk, what moves another link's centre of mass, which tips the robot as much once it is fitted to its end."""
     r, trial = seats[c.key]
     taken = {e.key for e in effects}
     reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
@@ -201,7 +202,8 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) ->
     alike = {(c.effect.twin, c.where)} if trial.joint is None else set()
     if _at_its_end(c, x):
         alike.add((c.effect.limit, c.where))
-    always = [t for t in there if t.candidate.key in alike]
+    tips = trial.joint is None and c.effect.layer == "inertia"
+    always = [t for t in there if t.candidate.key in alike or (tips and t.candidate.name == c.name and not t.foretold)]
     return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
 
 

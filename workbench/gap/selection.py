@@ -167,7 +167,10 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
         return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
     if not surely:
         return t.closed > ENOUGH
-    return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
+    walks = search.jury.walks(takes)
+    if walks and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia":
+        return False  # what another link carries tips the robot as much
+    return t.closed > (NEARLY_ALL_WALKING if walks else NEARLY_ALL)
 
 
 def _is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
