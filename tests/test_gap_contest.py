@@ -19,6 +19,7 @@ from workbench.gap.contest import (
     _better_by_both,
     _better_held,
     _misfit,
+    _near,
     _outbid,
     _put,
     _temper,
@@ -279,3 +280,18 @@ def test_a_load_is_less_sure_where_a_pull_straight_down_is_about_as_likely(worn,
     fit = replace(search.evaluated([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
     beside = Standing(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
     assert doubted(search, fit, [beside], {})[0].probability == pytest.approx(sure)
+
+
+@pytest.mark.parametrize(("joint", "near"), [(None, ["com_shift(tail)"]), ("one", [])])
+def test_what_moves_another_links_centre_of_mass_is_put_in_its_place_on_a_walk_however_far_behind(joint, near):
+    """A race ends before walks have told such numbers: a tail's was 568 of 2488 behind the body's and ahead when fitted."""
+    com, mass = known_effects()["com_shift"], known_effects()["payload"]
+
+    def trial(effect, link, choose, foretold=False):
+        c = Candidate.of(effect, (link,), effect.neutral(None))
+        return Trial(c, np.zeros(c.size), {"fit": 2 * choose, "choose": choose}, joint, foretold=foretold)
+
+    body, tail, load, foot = (trial(com, "body", 2488.0), trial(com, "tail", 1920.0), trial(mass, "tail", 1941.0),
+                              trial(com, "foot", 0.0, foretold=True))
+    seats = {body.candidate.key: (Round(None, (body, load, tail, foot), (body,)), body)}
+    assert [str(t.candidate) for t in _near(seats, [body.candidate], body.candidate, body.x)] == near
