@@ -44,15 +44,15 @@ def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_t
         assert selection._says_it(search, None, trial, (0,), tier) is enough
 
 
-@pytest.mark.parametrize(("name", "tier", "said"), [("com_shift", 4, False), ("com_shift", 5, True), ("soft_ground", 4, True)])
-def test_a_load_that_closes_all_of_a_walk_does_not_keep_what_other_links_carry_from_being_asked(name, tier, said, monkeypatch):
-    """A tail's centre of mass, moved, looks like a load on the body."""
-    monkeypatch.setattr(selection, "standing_out", lambda *_: set())
+@pytest.mark.parametrize(("name", "tier", "base", "tips"), [("com_shift", 4, "free", True), ("payload", 4, "free", True),
+    ("payload", 5, "free", False), ("soft_ground", 4, "free", False), ("payload", 3, "fixed", False)])
+def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_from_being_asked(name, tier, base, tips):
+    """A tail's, moved, looked like a load on the body."""
     effect = known_effects()[name]
-    heard = Candidate.of(effect, ("body",) if name == "com_shift" else (), (1.0,) * len(effect.parameters))
+    heard = Candidate.of(effect, () if name == "soft_ground" else ("body",), effect.neutral(None))
     trial = Trial(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: True))
-    assert selection._says_it(search, None, trial, (0,), tier) is said
+    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"))
+    assert selection._tips(search, trial, (0,), tier) is tips
 
 
 @pytest.mark.parametrize(("spring", "stop", "chosen"), [(5.6e7, 3.9e7, ["joint_stop"]), (5.6e7, 2.0e7, ["parallel_spring"]),

@@ -203,7 +203,8 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) ->
     if _at_its_end(c, x):
         alike.add((c.effect.limit, c.where))
     tips = trial.joint is None and c.effect.layer == "inertia"
-    always = [t for t in there if t.candidate.key in alike or (tips and t.candidate.name == c.name and not t.foretold)]
+    always = [t for t in there if t.candidate.key in alike
+              or (tips and not t.foretold and t.candidate.name == "com_shift" and t.candidate.where != c.where)]
     return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
 
 

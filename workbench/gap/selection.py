@@ -119,11 +119,12 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             if seats:
                 continue
         trials: list[Trial] = []
+        likely = pool
         for tier in range(TIERS_OF_ALL if closed > LEAST_CLOSED else TIERS):
             stopped = search.jury.work > most_work
             if stopped:
                 break
-            groups, on = asked(search, pool, current, beyond, takes, tier)
+            groups, on = asked(search, likely, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
             trials += search.tried(current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
@@ -131,7 +132,9 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
                                      or _is_of_all(search, current, trials[0], takes, beyond))
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
-                break
+                if not _tips(search, trials[0], takes, tier):
+                    break
+                likely = [c for c in pool if c.name == "com_shift"]
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
@@ -167,10 +170,13 @@ def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tie
         return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
     if not surely:
         return t.closed > ENOUGH
-    walks = search.jury.walks(takes)
-    if walks and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia":
-        return False  # what another link carries tips the robot as much
-    return t.closed > (NEARLY_ALL_WALKING if walks else NEARLY_ALL)
+    return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
+
+
+def _tips(search: Search, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+    """Whether centres of mass of links that are asked last are not to be passed over: they tip a robot on the ground as the best
+    so far does. A load there, with a number more, does so wherever it hangs, which tells nothing."""
+    return search.jury.walks(takes) and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia"
 
 
 def _is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
