@@ -80,7 +80,7 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
     fit = chosen.fit
     seats: Seats = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
     for turn in range(len(fit.effects) + 1):
-        near = [_near(seats, fit.effects, c, x) for c, x in fit.sizes()]
+        near = [_near(search, seats, fit.effects, c, x) for c, x in fit.sizes()]
         put = iter(search.side_by_side([_put(search, fit, i, t) for i, there in enumerate(near) for t in there],
                                        partial(report, f"rivals of {', '.join(map(str, fit.effects))}")))
         rivals = [[next(put) for _ in there] for there in near]
@@ -192,9 +192,9 @@ def _told(fit: Fit, i: int) -> int:
     return told or fit.effects[i].size
 
 
-def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
-    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end; on a
-    walk, what moves another link's centre of mass, which tips the robot as much once it is fitted to its end."""
+def _near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
+    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end; where
+    walks tell it, what moves another link's centre of mass, which tips the robot as much once it is fitted to its end."""
     r, trial = seats[c.key]
     taken = {e.key for e in effects}
     reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
@@ -202,7 +202,7 @@ def _near(seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) ->
     alike = {(c.effect.twin, c.where)} if trial.joint is None else set()
     if _at_its_end(c, x):
         alike.add((c.effect.limit, c.where))
-    tips = trial.joint is None and c.effect.layer == "inertia"
+    tips = _walked(search, c, trial) and c.effect.layer == "inertia"
     always = [t for t in there if t.candidate.key in alike
               or (tips and not t.foretold and t.candidate.name == "com_shift" and t.candidate.where != c.where)]
     return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
