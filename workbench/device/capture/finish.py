@@ -25,8 +25,8 @@ from workbench.device.capture.packets import (
     parse_names,
     stated_number,
 )
-from workbench.recording.motive_write import write_motive
-from workbench.recording.take import BodyTrack
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.motive_write import write_motive
 from workbench.robot import InputError
 from workbench.robot.files import write_whole
 
