@@ -1,0 +1,280 @@
+"""Reading and writing servos by the names of their registers; every answer is looked at, every failure is an exception."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
+
+from workbench.device.bus.errors import BusError, NoAnswerError
+from workbench.device.bus.ports import GONE, StripEcho, gone
+from workbench.robot.servo_profile import Register, ServoProfile
+from workbench.robot.servo_profile_file import model_name
+
+T = TypeVar("T")
+LONGEST = 200
+"""Bytes of parameters in one Sync Write: below the SDK's 250 and the AX-12's receive buffer with some to spare."""
+NOBODY = 0xFC
+"""ID that is asked to find out whether the adapter hears itself; who has it answers after the echo."""
+
+
+@dataclass(frozen=True)
+class BusOptions:
+    """tries: how often a servo is asked before it is said to be silent; at 1 % of answers lost, three leave one in a million.
+    settle: what a servo needs after a byte of EEPROM was written [s] (AX-12: 6 ms a byte, in which it is deaf)."""
+
+    tries: int = 3
+    settle: float = 0.01
+
+
+class Bus:
+    """Servos on one port, of one family.
+
+    port: dynamixel-sdk's, with `pause` and `patience` (`SerialPort`, or a virtual one). joints: by ID, for messages.
+    alarms: what each servo's last answer said of its state. retries: by ID, how often it had to be asked again.
+    strip_echo: for an adapter that is known to hear itself; any other that does is refused.
+    """
+
+    def __init__(self, port: Any, profile: ServoProfile, joints: Mapping[int, str] | None = None,
+                 options: BusOptions | None = None, strip_echo: bool = False) -> None:
+        self.port, self.profile, self.options = port, profile, options or BusOptions()
+        self.joints = dict(joints or {})
+        self.alarms: dict[int, tuple[str, ...]] = {}
+        self.retries: Counter[int] = Counter()
+        self._handler = PacketHandler(float(profile.protocol))
+        self._guarded(lambda: self._check_echo(strip_echo))
+
+    # Time
+
+    def now(self) -> float:
+        """The port's clock [s]."""
+        return float(self.port.getCurrentTime()) / 1000
+
+    def wait_until(self, time: float) -> None:
+        """Lets time go by until then [s]."""
+        self._guarded(lambda: self.port.pause(time - self.now()))
+
+    def pause(self, seconds: float) -> None:
+        """Lets time go by."""
+        self._guarded(lambda: self.port.pause(seconds))
+
+    # One servo
+
+    def read(self, servo: int, *names: str) -> dict[str, int]:
+        """Registers by name, in one packet from the first to the last of them; asked again where the answer is missing or broken.
+
+        NoAnswerError after `tries`, BusError where the servo refuses."""
+        wanted = [self._register(name) for name in names]
+        first = min(r.address for r in wanted)
+        count = max(r.address + r.size for r in wanted) - first
+
+        def call() -> tuple[bytes, int, int]:
+            data, result, error = self._handler.readTxRx(self.port, servo, first, count)
+            return bytes(data or b""), result, error
+
+        data = self._asked(servo, names[0] if len(names) == 1 else None, call, count)
+        return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+
+    def write(self, servo: int, values: Mapping[str, int], check: bool = True) -> None:
+        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written.
+
+        EEPROM of a family that locks it is unlocked before and locked after."""
+        eeprom = any(self._register(name).address < self.profile.eeprom_below for name in values)
+        switch = self.profile.unlock if eeprom else None
+        if switch is not None:
+            self._write(servo, switch.register, switch.open)
+        for name, value in values.items():
+            self._write(servo, name, value)
+            if check and self.read(servo, name)[name] != value:
+                found = self.read(servo, name)[name]
+                raise BusError(f"reads {found} after {value} was written", servo, self.joints.get(servo), name)
+        if switch is not None:
+            self._write(servo, switch.register, switch.closed)
+
+    def exists(self, servo: int) -> int | None:
+        """Model number of a servo, None where none answers."""
+        try:
+            return self.read(servo, "model_number")["model_number"]
+        except NoAnswerError:
+            return None
+
+    def reboot(self, servo: int) -> None:
+        """Has a servo start anew, where its protocol can; clears a latched alarm."""
+        if self.profile.protocol != 2:
+            raise BusError("cannot be started anew over the bus; switch its power off and on", servo, self.joints.get(servo))
+        self._asked(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
+
+    # All
+
+    def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
+        """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when the
+        last byte was handed to the port [s]. ValueError where the registers do not lie side by side."""
+        names = next(iter(values.values())).keys()
+        registers = sorted((self._register(name) for name in names), key=lambda r: r.address)
+        for one, two in itertools.pairwise(registers):
+            if one.address + one.size != two.address:
+                raise ValueError(f"{one.name} and {two.name} do not lie side by side")
+        length = sum(r.size for r in registers)
+        packed = [bytes([servo]) + b"".join(r.encode(v[r.name]) for r in registers) for servo, v in values.items()]
+        sent = self.now()
+        for some in _batched(packed, LONGEST // (length + 1)):
+            parameters = list(b"".join(some))
+            result = self._guarded(lambda: self._handler.syncWriteTxOnly(
+                self.port, registers[0].address, length, parameters, len(parameters)))  # noqa: B023
+            if result != COMM_SUCCESS:
+                raise BusError(f"could not be sent: {self._handler.getTxRxResult(result)}")
+            sent = self.now()
+        return sent
+
+    def release(self, servos: Iterable[int]) -> None:
+        """Torque off, of all at once and twice, as nobody answers; never raises for a servo, only where the port is gone."""
+        off = {servo: {"torque_enable": 0} for servo in servos}
+        if off:
+            self.sync_write(off)
+            self.pause(0.002)
+            self.sync_write(off)
+
+    def find(self, servos: Iterable[int]) -> dict[int, int]:
+        """Model numbers of those that answer, by ID; asked once each, the silent ones twice."""
+        found = {}
+        once = BusOptions(2, self.options.settle)
+        kept, self.options = self.options, once
+        try:
+            for servo in servos:
+                number = self.exists(servo)
+                if number is not None:
+                    found[servo] = number
+        finally:
+            self.options = kept
+        return found
+
+    def find_at_any_rate(self, servos: Iterable[int]) -> dict[int, dict[int, int]]:
+        """Who answers at which of the family's bit rates; the port's own is set again."""
+        wanted, own, found = list(servos), int(self.port.getBaudRate()), {}
+        for rate in sorted(set(self.profile.bit_rates.values()), reverse=True):
+            if self._guarded(lambda: self.port.setBaudRate(rate)):  # noqa: B023
+                here = self.find(wanted)
+                if here:
+                    found[rate] = here
+        self._guarded(lambda: self.port.setBaudRate(own))
+        return found
+
+    def answers(self, servo: int) -> int:
+        """How many servos seem to answer to one ID, of five pings: 2 where answers are longer than one, or broken, again and
+        again."""
+        ping = self._ping(servo)
+        expected = 6 if self.profile.protocol == 1 else 14
+        heard = [self._guarded(lambda: self._raw(ping, 4 * expected)) for _ in range(5)]
+        if not any(heard):
+            return 0
+        odd = sum(bool(answer) and (len(answer) != expected or not self._intact(answer)) for answer in heard)
+        return 2 if odd >= 3 else 1
+
+    # Inside
+
+    def _register(self, name: str) -> Register:
+        if name not in self.profile.registers:
+            raise BusError(f"{self.profile.name} has no such register", register=name)
+        return self.profile.registers[name]
+
+    def _write(self, servo: int, name: str, value: int) -> None:
+        register = self._register(name)
+        data = list(register.encode(value))
+
+        def call() -> tuple[bytes, int, int]:
+            return b"", *self._handler.writeTxRx(self.port, servo, register.address, register.size, data)
+
+        self._asked(servo, name, call, 0)
+        if register.address < self.profile.eeprom_below:
+            self.pause(self.options.settle * register.size)
+
+    def _asked(self, servo: int, register: str | None, call: Callable[[], tuple[bytes, int, int]], count: int) -> bytes:
+        """An answer, asked for again and again; its error byte is the servo's alarms, or a refusal."""
+        joint, result = self.joints.get(servo), COMM_SUCCESS
+        for attempt in range(self.options.tries):
+            data, result, error = self._guarded(call)
+            if result == COMM_SUCCESS and len(data) == count:
+                if attempt:
+                    self.retries[servo] += attempt
+                refused = self._look(servo, error)
+                if refused:
+                    raise BusError(f"refused: {refused}", servo, joint, register)
+                return data
+        how = "only broken answers" if result in (COMM_RX_CORRUPT, COMM_SUCCESS) else "no answer"
+        raise NoAnswerError(f"{how} in {self.options.tries} tries", servo, joint, register)
+
+    def _look(self, servo: int, error: int) -> str:
+        """Takes note of the alarms in an error byte; what the instruction was refused for, or ""."""
+        profile = self.profile
+        if profile.protocol == 1:
+            self.alarms[servo] = tuple(name for bit, name in profile.alarms.items() if error >> bit & 1)
+            return ", ".join(name for bit, name in profile.refusals.items() if error >> bit & 1)
+        if error & 0x80 and "hardware_error" in profile.registers:
+            register = profile.registers["hardware_error"]
+            data, result, _ = self._guarded(
+                lambda: self._handler.readTxRx(self.port, servo, register.address, register.size))
+            bits = register.decode(bytes(data)) if result == COMM_SUCCESS and data else 0
+            self.alarms[servo] = tuple(name for bit, name in profile.alarms.items() if bits >> bit & 1) or ("unknown",)
+        else:
+            self.alarms[servo] = ()
+        return profile.refusals.get(error & 0x7F, f"error {error & 0x7F}") if error & 0x7F else ""
+
+    def _guarded(self, call: Callable[[], T]) -> T:
+        """Whatever happens, the port may be used again afterwards."""
+        try:
+            return call()
+        except BusError:
+            raise
+        except GONE as e:
+            raise gone(e) from None
+        finally:
+            self.port.is_using = False
+
+    def _ping(self, servo: int) -> bytes:
+        if self.profile.protocol == 1:
+            body = bytes([servo, 2, 1])
+            return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
+        head = b"\xff\xff\xfd\x00" + bytes([servo, 3, 0, 1])
+        return head + int(self._handler.updateCRC(0, head, len(head))).to_bytes(2, "little")
+
+    def _raw(self, data: bytes, most: int) -> bytes:
+        """What comes back within the time of `most` bytes after a packet, whatever it is."""
+        port = self.port
+        port.clearPort()
+        port.writePort(list(data))
+        deadline = port.getCurrentTime() + (len(data) + most) * port.tx_time_per_byte + port.patience
+        back = b""
+        while port.getCurrentTime() < deadline:
+            back += bytes(port.readPort(most))
+        return back
+
+    def _intact(self, answer: bytes) -> bool:
+        if self.profile.protocol == 1:
+            return answer[:2] == b"\xff\xff" and ~sum(answer[2:-1]) & 0xFF == answer[-1]
+        crc = int(self._handler.updateCRC(0, answer, len(answer) - 2))
+        return answer[:4] == b"\xff\xff\xfd\x00" and crc.to_bytes(2, "little") == answer[-2:]
+
+    def _check_echo(self, strip: bool) -> None:
+        """An adapter that hears itself makes every ID seem to exist: refused, unless it is known to."""
+        if strip:
+            self.port = StripEcho(self.port)
+            return
+        ping = self._ping(NOBODY)
+        if self._raw(ping, len(ping) + 14).startswith(ping):
+            raise BusError("the adapter hears what it sends itself, so that every ID seems to answer; use one that does not "
+                           "(U2D2, USB2Dynamixel), or say --echo")
+
+    def wrong_model(self, servo: int, number: int) -> BusError:
+        """The error of a servo that is of another kind than the profile's."""
+        found = model_name(number, self.profile.protocol)
+        expected = " or ".join(sorted(self.profile.models.values()))
+        return BusError(f"is {found} ({number}); expected {expected}", servo, self.joints.get(servo))
+
+
+def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:
+    for k in range(0, len(items), max(size, 1)):
+        yield items[k:k + size]

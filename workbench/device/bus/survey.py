@@ -1,0 +1,165 @@
+"""What hangs on the bus, against the model: who answers, as what, in what state, set how."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+from workbench.device.bus.bus import Bus
+from workbench.device.bus.errors import BusError, NoAnswerError
+from workbench.robot import BUS_IDS, InputError, RobotModel
+from workbench.robot.servo_profile import ServoProfile
+from workbench.robot.servo_profile_file import model_name, servo_profile
+from workbench.robot.servo_registers import ServoReading, ServoRegisters
+
+STATE = ("present_position", "present_voltage", "present_temperature")
+ALL_IDS = range(253)
+
+
+@dataclass(frozen=True)
+class FoundServo:
+    """One servo. joint: the model's, None for a stranger. registers: in counts; angle [rad], voltage [V], temperature [deg C]."""
+
+    id: int
+    joint: str | None
+    number: int
+    model: str
+    registers: Mapping[str, int]
+    angle: float
+    voltage: float
+    temperature: int
+    alarms: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Survey:
+    """found: by ID. missing: joints that do not answer. doubled: IDs to which two seem to answer. rate: bit/s."""
+
+    profile: ServoProfile
+    rate: int
+    found: Mapping[int, FoundServo]
+    missing: tuple[str, ...]
+    doubled: tuple[int, ...]
+
+    def problems(self) -> tuple[str, ...]:
+        """What has to be mended before anything moves, a line each."""
+        out = [f"joint {joint} does not answer" for joint in self.missing]
+        out += [f"servo {i}: two servos seem to have this ID, or its cable is bad" for i in self.doubled]
+        low, high = self.profile.supply
+        for servo in self.found.values():
+            name = f"servo {servo.id}" + (f" ({servo.joint})" if servo.joint else "")
+            if servo.number not in self.profile.models:
+                out.append(f"{name}: is {servo.model} ({servo.number}); expected {self.profile.name}")
+                continue
+            if servo.alarms:
+                out.append(f"{name}: alarm: {', '.join(servo.alarms)}")
+            if not low <= servo.voltage <= high:
+                out.append(f"{name}: {servo.voltage:.1f} V; expected {low:g} to {high:g} V")
+            limit = servo.registers.get("temperature_limit", 70)
+            if servo.temperature > limit - COOLER:
+                out.append(f"{name}: {servo.temperature} deg C; expected at least {COOLER} below its limit of {limit}")
+            out += [f"{name}: {problem}" for problem in _mode(servo, self.profile)]
+        return tuple(out)
+
+    def registers(self) -> ServoRegisters:
+        """As evidence of a session."""
+        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        return ServoRegisters(self.profile.name, now, {
+            s.joint: ServoReading(s.id, s.model, s.registers) for s in self.found.values() if s.joint is not None})
+
+
+COOLER = 10
+"""How far below its limit a servo has to be before it starts to move [deg C]: one minute at stall warms an AX-12 by about as
+much."""
+
+
+def bus_ids(model: RobotModel) -> Mapping[str, int]:
+    """IDs by joint; InputError where the model does not say them."""
+    ids = dict(model.bus_ids or {j: i for j, i in BUS_IDS.items() if j in model.joints})
+    missing = [joint for joint in model.joints if joint not in ids]
+    if missing:
+        raise InputError(model.description, f"joint {missing[0]} has no bus ID; give them as robot.bus_ids in a session.yaml")
+    return ids
+
+
+def family_of(model: RobotModel) -> ServoProfile:
+    """The one family of a model's servos; InputError where there are several, or none that is known."""
+    families = {servo_profile(model.servo(joint).model).name for joint in model.joints}
+    if len(families) > 1:
+        raise InputError(model.description, f"servos of several families ({', '.join(sorted(families))}); a bus takes one")
+    return servo_profile(families.pop())
+
+
+def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
+           progress: Callable[[str, float], None] | None = None) -> Survey:
+    """Asks every ID, then every servo for all its registers. BusError in one line where nobody answers, with who does at which
+    other bit rate."""
+    joints = {i: joint for joint, i in bus_ids(model).items()}
+    bus.joints.update(joints)
+    wanted = sorted({*ids, *joints})
+    numbers: dict[int, int] = {}
+    for k, servo in enumerate(wanted):
+        if progress is not None:
+            progress("asking each ID", k / len(wanted))
+        numbers |= bus.find([servo])
+    doubled = tuple(i for i in wanted if (i in numbers or i in joints) and bus.answers(i) > 1)
+    if not numbers and not doubled:
+        raise _nobody(bus, wanted)
+    found = {}
+    for k, (servo, number) in enumerate(numbers.items()):
+        if progress is not None:
+            progress("reading registers", k / len(numbers))
+        if servo not in doubled:
+            found[servo] = _found(bus, servo, number, joints.get(servo))
+    missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
+    return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled)
+
+
+def read_registers(bus: Bus, servo: int) -> dict[str, int]:
+    """All registers of a servo, in as few packets as the family's table allows (up to 80 bytes each)."""
+    out: dict[str, int] = {}
+    group: list[str] = []
+    start = 0
+    for register in sorted(bus.profile.registers.values(), key=lambda r: r.address):
+        if group and register.address + register.size - start > 80:
+            out |= bus.read(servo, *group)
+            group = []
+        if not group:
+            start = register.address
+        group.append(register.name)
+    return out | bus.read(servo, *group)
+
+
+def _found(bus: Bus, servo: int, number: int, joint: str | None) -> FoundServo:
+    name = model_name(number, bus.profile.protocol)
+    if number not in bus.profile.models:  # its table is another one
+        return FoundServo(servo, joint, number, name, {}, math.nan, math.nan, 0, ())
+    try:
+        registers = read_registers(bus, servo)
+    except NoAnswerError as e:
+        raise BusError(f"answered once, then not any more: {e.said}", servo, joint) from None
+    return FoundServo(servo, joint, number, name, registers, bus.profile.angle(registers["present_position"]),
+                      registers["present_voltage"] / 10, registers["present_temperature"], bus.alarms.get(servo, ()))
+
+
+def _mode(servo: FoundServo, profile: ServoProfile) -> Iterable[str]:
+    """Ways in which a servo would not do as the model says."""
+    r = servo.registers
+    if r["cw_angle_limit"] == r["ccw_angle_limit"]:
+        yield f"both angle limits are {r['cw_angle_limit']}: it turns without end (wheel mode); set them with --write"
+    if r["torque_limit"] == 0 or r["max_torque"] == 0:
+        yield "its torque is limited to nothing: an alarm shut it down, or somebody set it so; switch its power off and on"
+    for name, expected in profile.position_mode.items():
+        if r[name] != expected:
+            yield f"{name} is {r[name]}; expected {expected}, for plain position control"
+
+
+def _nobody(bus: Bus, wanted: list[int]) -> BusError:
+    rate = int(bus.port.getBaudRate())
+    elsewhere = bus.find_at_any_rate(wanted)
+    if elsewhere:
+        other, servos = max(elsewhere.items(), key=lambda item: len(item[1]))
+        return BusError(f"nobody answers at {rate} bit/s, but {len(servos)} do at {other}; say --rate {other}")
+    return BusError(f"nobody answers, at {rate} bit/s or any other; is the servos' power on, and is this the right port?")

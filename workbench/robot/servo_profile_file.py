@@ -1,0 +1,199 @@
+"""Reading servo profiles, and finding the family of a servo by its name or number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from workbench.robot.errors import InputError
+from workbench.robot.resources import resource_dir
+from workbench.robot.servo_profile import LAW_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
+from workbench.robot.yaml_file import Fields, read_yaml
+
+_NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
+                 "reflected_inertia", *LAW_KEYS)
+_NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
+           "min_voltage_limit", "torque_enable", "goal_position", "moving_speed", "torque_limit", "max_torque",
+           "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
+
+
+def load_profile(path: str | Path) -> ServoProfile:
+    """Reads a profile; InputError names the file, the key and what was expected."""
+    path = Path(path)
+    top = Fields(path, read_yaml(path))
+    if top.raw("format") != 1:
+        raise top.error("format", "expected 1")
+    position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
+    registers = _registers(_needed(top, "registers"))
+    profile = ServoProfile(
+        name=str(top.required("name", top.text("name"))), models=_names(_needed(top, "models")),
+        protocol=top.required("protocol", top.whole("protocol", least=1)),
+        supply=_range(top, "supply"), position_mode=_position_mode(top.mapping("position_mode"), registers),
+        counts=position.required("counts", position.whole("counts", least=2)),
+        span=math.radians(_number(position, "span")), centre=position.required("centre", position.whole("centre")),
+        speed_unit=math.radians(_number(speed, "unit")), largest_speed=speed.required("largest", speed.whole("largest", least=1)),
+        load_unit=_number(load, "unit"), full_torque=top.required("full_torque", top.whole("full_torque", least=1)),
+        bit_rates=_bit_rates(_needed(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
+        eeprom_below=top.required("eeprom_below", top.whole("eeprom_below")), registers=registers,
+        law=_law(_needed(top, "law"), registers), nominal=_nominal(_needed(top, "nominal")),
+        alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
+        unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
+        source=str(path))
+    if profile.protocol not in (1, 2):
+        raise top.error("protocol", f"expected 1 or 2, got {profile.protocol}")
+    for f in (position, speed, load, top):
+        f.done()
+    try:
+        profile.constants()
+    except (TypeError, ValueError) as e:
+        raise top.error("nominal", str(e)) from None
+    return profile
+
+
+@cache
+def servo_profiles() -> Mapping[str, ServoProfile]:
+    """The families that ship with the workbench, by name."""
+    found = [load_profile(path) for path in sorted((resource_dir("data") / "servos").glob("*.yaml"))]
+    return MappingProxyType({p.name: p for p in found})
+
+
+def servo_profile(model: str) -> ServoProfile:
+    """The family of a servo by its name or a model's (as `model` in servo.yaml); InputError where nobody knows it."""
+    wanted = _plain(model)
+    for profile in servo_profiles().values():
+        if wanted in (_plain(profile.name), *map(_plain, profile.models.values())):
+            return profile
+    raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}")
+
+
+def model_name(number: int, protocol: int) -> str:
+    """What a model number stands for."""
+    for profile in servo_profiles().values():
+        if profile.protocol == protocol and number in profile.models:
+            return profile.models[number]
+    return f"unknown model {number}"
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
+def _needed(f: Fields, key: str) -> Fields:
+    found = f.mapping(key)
+    if found is None:
+        raise f.error(key, "is missing")
+    return found
+
+
+def _number(f: Fields, key: str) -> float:
+    value: float = f.required(key, f.number(key, least=0))
+    return value
+
+
+def _range(f: Fields, key: str) -> tuple[float, float]:
+    value = f.raw(key)
+    numbers = isinstance(value, list) and len(value) == 2 and all(isinstance(x, (int, float)) for x in value)
+    if not (numbers and value[0] < value[1]):
+        raise f.error(key, f"expected [lowest, highest], got {value!r}")
+    return float(value[0]), float(value[1])
+
+
+def _by_number(f: Fields) -> dict[int, Any]:
+    out: dict[int, Any] = {}
+    for key, value in list(f._left.items()):
+        if isinstance(key, bool) or not isinstance(key, int) or key < 0:
+            raise f.error(str(key), "expected a whole number as key")
+        out[key] = value
+    return out
+
+
+def _names(f: Fields) -> Mapping[int, str]:
+    return {k: str(v) for k, v in _by_number(f).items()}
+
+
+def _bit_rates(f: Fields) -> Mapping[int, int]:
+    rates = _by_number(f)
+    for key, rate in rates.items():
+        if isinstance(rate, bool) or not isinstance(rate, int) or rate < 1:
+            raise f.error(str(key), f"expected bit/s, got {rate!r}")
+    return rates
+
+
+def _registers(f: Fields) -> Mapping[str, Register]:
+    out = {}
+    for name, value in f.items():
+        if not isinstance(value, list) or not 2 <= len(value) <= 3 or value[1] not in (1, 2, 4):
+            raise f.error(name, f"expected [address, size] or [address, size, sign], got {value!r}")
+        sign = value[2] if len(value) == 3 else ""
+        if sign not in ("", "two") and not (isinstance(sign, int) and 0 < sign < 8 * value[1]):
+            raise f.error(name, f"expected `two` or a bit as sign, got {sign!r}")
+        out[name] = Register(name, int(value[0]), int(value[1]), sign)
+    missing = [name for name in _NEEDED if name not in out]
+    if missing:
+        raise f.error(missing[0], "is missing")
+    return out
+
+
+def _position_mode(f: Fields | None, registers: Mapping[str, Register]) -> Mapping[str, int]:
+    if f is None:
+        return {}
+    mode = dict(f.items())
+    for name, value in mode.items():
+        if name not in registers or not isinstance(value, int):
+            raise f.error(name, "expected a register and a whole number")
+    return mode
+
+
+def _law(f: Fields, registers: Mapping[str, Register]) -> Mapping[str, LawRegister]:
+    out = {}
+    for key in LAW_KEYS:
+        entry = f.mapping(key)
+        if entry is None:
+            continue
+        names = entry.raw("registers")
+        if not isinstance(names, list) or not names or not set(names) <= set(registers):
+            raise entry.error("registers", f"expected names of registers, got {names!r}")
+        steps = entry.raw("steps") or []
+        unit = entry.number("unit", least=0)
+        entry.done()
+        out[key] = LawRegister(tuple(names), 1.0 if unit is None else unit, tuple(steps))
+    f.done()
+    return out
+
+
+def _nominal(f: Fields) -> Mapping[str, Uncertain]:
+    out = {}
+    for key in _NOMINAL_KEYS:
+        entry = f.mapping(key)
+        if entry is not None:
+            out[key] = Uncertain(_number(entry, "value"), _number(entry, "sd"))
+            entry.done()
+    f.done()
+    return out
+
+
+def _unlock(f: Fields | None, registers: Mapping[str, Register]) -> Switch | None:
+    if f is None:
+        return None
+    switch = Switch(_register_name(f, registers), f.required("open", f.whole("open")), f.required("closed", f.whole("closed")))
+    f.done()
+    return switch
+
+
+def _watchdog(f: Fields | None, registers: Mapping[str, Register]) -> tuple[str, float] | None:
+    if f is None:
+        return None
+    found = _register_name(f, registers), _number(f, "unit")
+    f.done()
+    return found
+
+
+def _register_name(f: Fields, registers: Mapping[str, Register]) -> str:
+    name: str = f.required("register", f.text("register"))
+    if name not in registers:
+        raise f.error("register", f"no register '{name}'")
+    return name
