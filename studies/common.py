@@ -20,8 +20,8 @@ from workbench.cli.progress import Progress
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.robot.files import write_together
-from workbench.view.report import Report
-from workbench.view.style import styled
+from workbench.view.figures.style import styled
+from workbench.view.report.page import Report
 
 Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]

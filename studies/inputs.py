@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.gap.registered import RegisteredTake, read_takes, register_takes
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import RegisteredTake, read_takes, register_takes
 from workbench.motion import (
     Trajectory,
     filter_derivatives,

@@ -3,7 +3,7 @@
     python -m studies.next_experiment [--out runs/studies/next_experiment] [--quick]
 
 For each pair a quadruped of the other engine (MuJoCo) gets one of the two, and is filmed in a first, cautious motion. Both names
-are fitted to it; where it leaves them tied, workbench.gap.experiment designs a motion from the two fitted models alone. The
+are fitted to it; where it leaves them tied, workbench.experiment.design designs a motion from the two fitted models alone. The
 concealed robot plays it before the same cameras, both names are fitted to both recordings, and the likelihoods are read off.
 Quick: one pair.
 """
@@ -21,11 +21,11 @@ from matplotlib.figure import Figure
 
 from studies.common import publish, run_study, sign
 from studies.next_experiment_robot import Fitted, Hidden, Jury
-from workbench.gap.experiment import SEPARATED, Experiment, design_experiment
+from workbench.experiment.design import SEPARATED, Experiment, design_experiment
 from workbench.motion import Motion
 from workbench.robot import EffectSpec, RobotModel
-from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
-from workbench.view.style import ACCENT, COMMAND, OTHERS, RECORDED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, RECORDED, legend_above, new_figure, styled
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 SEED = 5
 N_JOBS = 2

@@ -15,11 +15,11 @@ from studies.concealed_effects.robots import quadruped
 from studies.other_engine.excitation import MotionRows
 from studies.other_engine.make_session import TakePlan, random_camera, record, servo_yaml, session_entry
 from studies.other_engine.motive_file import write_motive_csv
-from workbench.gap.comparison import noise_of
-from workbench.gap.experiment import Sight
-from workbench.gap.experiment_shown import Shown, left_open
-from workbench.gap.registered import RegisteredTake, read_takes, register_takes
-from workbench.gap.session import Session, load_session
+from workbench.compare.comparison import noise_of
+from workbench.compare.session import Session, load_session
+from workbench.compare.session_takes import RegisteredTake, read_takes, register_takes
+from workbench.experiment.design import Sight
+from workbench.experiment.projection import Shown, left_open
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel

@@ -26,8 +26,8 @@ from workbench.motion import load_motion
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import Job, Simulation, SimulationConfig
 from workbench.simulation.play import motion_job
-from workbench.view import style
-from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
+from workbench.view.figures import style
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 DRIVES = {"servo": "servo law", "ideal": "ideal joints"}
 CONTACTS = ("point", "hydroelastic")

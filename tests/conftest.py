@@ -3,8 +3,8 @@
 import pytest
 
 from tests.gap_worn import CONFIG, HIDDEN, gathered
-from workbench.gap.jury import Jury
-from workbench.gap.search import Search
+from workbench.identify.fitting.fits import Search
+from workbench.identify.rollouts import Jury
 
 
 @pytest.fixture(scope="module")

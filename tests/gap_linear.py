@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from workbench.effects.registry import known_effects
-from workbench.gap.candidate import Candidate
-from workbench.gap.race import Trial
-from workbench.gap.search import Fit
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.parameters import Candidate
+from workbench.identify.selection.screening import Trial
 from workbench.robot import puppy_model
 
 COUNT = 900

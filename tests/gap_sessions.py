@@ -9,8 +9,8 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
-from workbench.gap.bench.arm import arm_sdf
-from workbench.gap.session import load_session
+from workbench.bench.arm import arm_sdf
+from workbench.compare.session import load_session
 from workbench.recording import BodyTrack, Measurement, observe, write_motive
 from workbench.simulation import Simulation, SimulationConfig
 

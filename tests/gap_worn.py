@@ -1,10 +1,10 @@
 """A small arm whose joint `three` is stiffer than its model says, recorded, registered and ready to be searched."""
 
 from tests.gap_sessions import record_arm
-from workbench.gap.compare_session import roll_out, run_of
-from workbench.gap.evidence import gather
-from workbench.gap.registered import read_takes, register_takes
-from workbench.gap.session import load_session
+from workbench.compare.compare_session import roll_out, run_of
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes, register_takes
+from workbench.identify.problem import gather
 from workbench.simulation import SimulationConfig
 
 NOMINAL, HIDDEN = 0.06, 0.14

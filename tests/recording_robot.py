@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from workbench.recording import BodyTrack, Recording
-from workbench.recording.tracks import capture_axes, turned, turned_quaternion
+from workbench.recording.mocap.tracks import capture_axes, turned, turned_quaternion
 from workbench.robot import RobotModel
 
 _LEGS = {"fl": ("body", 0.06, 0.05), "fr": ("body", 0.06, -0.05), "bl": ("tail", -0.06, 0.05), "br": ("tail", -0.06, -0.05)}

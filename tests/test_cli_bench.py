@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
-from workbench.gap.bench.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
-from workbench.gap.bench.diagnose_time import RACE, READING, Stages, diagnose_time
-from workbench.gap.bench.sysid import fit_against_mujoco_sysid
-from workbench.gap.registered import read_takes
+from workbench.bench import drives, engine
+from workbench.bench.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
+from workbench.bench.bare_plant import BarePlant
+from workbench.bench.diagnose_time import RACE, READING, Stages, diagnose_time
+from workbench.bench.figure import Figure, in_turns, median_and_quartiles
+from workbench.bench.sysid import fit_against_mujoco_sysid
+from workbench.compare.session_takes import read_takes
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
-from workbench.simulation.bench import drives, engine
-from workbench.simulation.bench.bare_plant import BarePlant
-from workbench.simulation.bench.figure import Figure, in_turns, median_and_quartiles
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from tests.command import refused, succeeds
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.dynamics import load_inverse_dynamics
-from workbench.recording.rollout_table import load_rollout
+from workbench.recording.formats.rollout_table import load_rollout
 
 
 @pytest.fixture

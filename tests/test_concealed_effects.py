@@ -14,7 +14,7 @@ from studies.concealed_effects.plan import MAKERS, SessionPlan, dealt_again, pla
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import logged_takes
 from studies.other_engine.hidden import OUTSIDE
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.recording import read_recording
 from workbench.robot import EffectSpec, InputError
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import write_session
+from workbench.compare.session import load_session
 from workbench.dynamics import InverseDynamics
 from workbench.dynamics.trajectory import RobotTrajectory
-from workbench.gap.session import load_session
 from workbench.robot import EffectSpec, RobotModel
 
 

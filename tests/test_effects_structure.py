@@ -11,14 +11,14 @@ from scipy.spatial.transform import Rotation
 from tests.recording_robot import write_robot
 from tests.servo_rig import GRAVITY, LENGTH, rig_model
 from tests.shared_data import shared
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes, register_take
 from workbench.effects.apply import physics_of, seen
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
-from workbench.gap.registered import read_takes, register_take
-from workbench.gap.session import load_session
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Recording, Take, observe, take_from_recording
-from workbench.recording.tracks import model_axes
+from workbench.recording.mocap.tracks import model_axes
 from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel, ServoConstants, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
 

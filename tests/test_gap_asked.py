@@ -6,13 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from workbench.compare.channels import ACROSS
 from workbench.effects.registry import known_effects
-from workbench.gap import asked, selection
-from workbench.gap.candidate import Candidate
-from workbench.gap.candidates import candidates, heavy_links
-from workbench.gap.channels import ACROSS
-from workbench.gap.race import Trial
-from workbench.gap.search import Search
+from workbench.identify.fitting.fits import Search
+from workbench.identify.parameters import Candidate
+from workbench.identify.proposals import candidates, heavy_links
+from workbench.identify.selection import forward as selection
+from workbench.identify.selection import scheduling as asked
+from workbench.identify.selection.screening import Trial
 from workbench.robot import puppy_model
 
 

@@ -8,13 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
-from workbench.gap import built
-from workbench.gap.candidate import Candidate
-from workbench.gap.contest import SUREST
-from workbench.gap.findings import Change
+from workbench.identify.estimators import geometry as built
+from workbench.identify.findings import Change
+from workbench.identify.parameters import Candidate
+from workbench.identify.selection.model_comparison import SUREST
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.mocap.tracks import capture_axes
 from workbench.recording.recording import Measurement, Recording
-from workbench.recording.take import BodyTrack
-from workbench.recording.tracks import capture_axes
 from workbench.robot import EffectSpec, Kinematics, puppy_model
 
 YAW, DROOP, ROWS = 0.3, np.deg2rad(2.0), 400

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.gap.company import Seen, _best_sets, begun_again, several, variants
-from workbench.gap.fitting import together
-from workbench.gap.rounds import LEAST_GAIN
-from workbench.gap.search import Fit
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants
+from workbench.identify.selection.record import LEAST_GAIN
 
 
 def seen(name, signature, size=1.0):

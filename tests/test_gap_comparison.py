@@ -11,12 +11,12 @@ import pytest
 
 from tests.gap_sessions import STARTS_AT, record_arm, session_content, write_session
 from tests.shared_data import shared
-from workbench.gap.compare_files import compare_files, file_kind
-from workbench.gap.compare_session import compare_session
-from workbench.gap.comparison import compare_takes
-from workbench.gap.results import Comparison
-from workbench.gap.session import load_session
-from workbench.recording.rollout_table import save_rollout
+from workbench.compare.compare_files import compare_files, file_kind
+from workbench.compare.compare_session import compare_session
+from workbench.compare.comparison import compare_takes
+from workbench.compare.results import Comparison
+from workbench.compare.session import load_session
+from workbench.recording.formats.rollout_table import save_rollout
 from workbench.recording.take import Take
 from workbench.robot import InputError
 from workbench.simulation import Simulation, SimulationConfig

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.gap.candidate import Candidate
-from workbench.gap.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
-from workbench.gap.contest import Rival, Standing
-from workbench.gap.evidence import LOOP
-from workbench.gap.findings import Alternative, Change, Finding, Unexplained
-from workbench.gap.point_mass import PointMass
-from workbench.gap.search import Fit
+from workbench.identify.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
+from workbench.identify.findings import Alternative, Change, Finding, Unexplained
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.parameters import Candidate
+from workbench.identify.point_mass import PointMass
+from workbench.identify.problem import LOOP
+from workbench.identify.selection.model_comparison import Rival, Standing
 
 FRAME = {0: np.ones((1, 1))}
 EVERY = np.ones(1, dtype=bool)

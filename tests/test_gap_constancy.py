@@ -7,9 +7,9 @@ import pytest
 
 from tests.gap_worn import CONFIG
 from workbench.effects.registry import known_effects
-from workbench.gap.candidate import Candidate, with_effects
-from workbench.gap.constancy import drifts
-from workbench.gap.search import Search
+from workbench.identify.fitting.constancy import drifts
+from workbench.identify.fitting.fits import Search
+from workbench.identify.parameters import Candidate, with_effects
 from workbench.simulation.batch import run_job
 
 

@@ -8,10 +8,14 @@ import pytest
 
 from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
-from workbench.gap import doubts
-from workbench.gap.candidate import Candidate
-from workbench.gap.candidates import candidates
-from workbench.gap.contest import (
+from workbench.identify.fitting.covariance import TEMPER_WALKING
+from workbench.identify.fitting.downward_force import hanging
+from workbench.identify.parameters import Candidate
+from workbench.identify.point_mass import PointMass
+from workbench.identify.proposals import candidates
+from workbench.identify.selection import calibration as doubts
+from workbench.identify.selection.calibration import doubted
+from workbench.identify.selection.model_comparison import (
     TEMPER,
     WALKS_SAY,
     Rival,
@@ -27,12 +31,8 @@ from workbench.gap.contest import (
     _twin,
     contest,
 )
-from workbench.gap.covariance import TEMPER_WALKING
-from workbench.gap.doubts import doubted
-from workbench.gap.hanging import hanging
-from workbench.gap.point_mass import PointMass
-from workbench.gap.race import Trial
-from workbench.gap.rounds import Chosen, Round
+from workbench.identify.selection.record import Chosen, Round
+from workbench.identify.selection.screening import Trial
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):

@@ -8,8 +8,8 @@ import yaml
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli.main import main
 from workbench.cli.memory import rollout_memory
-from workbench.gap.diagnosis import diagnose_session
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
+from workbench.identify.diagnosis import diagnose_session
 from workbench.robot import InputError, load_model
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.gap import exchange
-from workbench.gap import sets as sets_
-from workbench.gap.company import worst_joint
-from workbench.gap.search import Fit
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.selection import single_joint as sets_
+from workbench.identify.selection import swap as exchange
+from workbench.identify.selection.best_subsets import worst_joint
 
 RNG = np.random.default_rng(8)
 FRICTION, PLAY, OTHER = RNG.normal(size=(3, 600))

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import write_session
+from workbench.compare.footfalls import foot_points
+from workbench.compare.session import load_session
 from workbench.device.limits import check_limits
-from workbench.gap.experiment import Experiment, Separation, Sight, design_experiment
-from workbench.gap.experiment_moves import JointMoves, Path, gravity_torque, joined, long_runs
-from workbench.gap.experiment_reach import Reach
-from workbench.gap.experiment_rivals import Pair
-from workbench.gap.experiment_shown import Shown
-from workbench.gap.experiment_stance import BodyMoves
-from workbench.gap.footfalls import foot_points
-from workbench.gap.session import load_session
+from workbench.experiment.design import Experiment, Separation, Sight, design_experiment
+from workbench.experiment.limits import Reach
+from workbench.experiment.moves import JointMoves, Path, gravity_torque, long_runs
+from workbench.experiment.projection import Shown
+from workbench.experiment.rivals import Pair
+from workbench.experiment.segment import joined
+from workbench.experiment.stance import BodyMoves
 from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import EffectSpec, puppy_model
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.gap.findings import (
+from workbench.identify.findings import (
     Alternative,
     Change,
     Diagnosis,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.gap.footfalls import foot_heights, foot_phases, foot_points, force_phases
+from workbench.compare.footfalls import foot_heights, foot_phases, foot_points, force_phases
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 

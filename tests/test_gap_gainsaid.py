@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import candidate
-from workbench.gap.gainsaid import heard
-from workbench.gap.search import Fit
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.selection.fixed_base_check import heard
 
 CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 

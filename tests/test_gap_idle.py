@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.gap import backward
-from workbench.gap.backward import without_idle
+from workbench.identify.selection import backward
+from workbench.identify.selection.backward import without_idle
 
 RNG = np.random.default_rng(3)
 AHEAD, BELOW, INERTIA, CEILING = RNG.normal(size=(4, COUNT))

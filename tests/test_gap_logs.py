@@ -11,12 +11,12 @@ import yaml
 
 from tests.command import succeeds
 from tests.servo_rig import SDF
-from workbench.gap.compare_session import compare_session
-from workbench.gap.prediction import predict_session
-from workbench.gap.registered import read_takes, register_takes
-from workbench.gap.session import load_session
+from workbench.compare.compare_session import compare_session
+from workbench.compare.prediction import predict_session
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes, register_takes
 from workbench.recording import read_recording, write_joint_log
-from workbench.recording.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.log_state import state_at
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, Simulation, SimulationConfig, Start, simulate_batch

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from workbench.gap import metrics
+from workbench.compare import metrics
 
 TIME = np.arange(0, 4, 1 / 120)
 ALL = np.ones(len(TIME), dtype=bool)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.gap.conclusions import Z90, estimates
-from workbench.gap.point_mass import DISTANCE, PointMass, SwungMass, point_mass
+from workbench.identify.conclusions import Z90, estimates
+from workbench.identify.point_mass import DISTANCE, PointMass, SwungMass, point_mass
 from workbench.robot import RobotModel
 from workbench.robot.kinematics import Kinematics
 

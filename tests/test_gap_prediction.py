@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.command import refused, succeeds
 from tests.gap_sessions import STARTS_AT, record_arm, session_content, write_session
-from workbench.gap.prediction import predict_session
-from workbench.gap.session import load_session
-from workbench.recording.read import read_recording
+from workbench.compare.prediction import predict_session
+from workbench.compare.session import load_session
+from workbench.recording.formats.read import read_recording
 from workbench.robot import EffectSpec, InputError, save_model
 from workbench.simulation import Simulation, SimulationConfig
 

@@ -11,10 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.shared_data import shared
-from workbench.gap.prediction import predict_session
-from workbench.gap.session import load_session
+from workbench.compare.prediction import predict_session
+from workbench.compare.session import load_session
 from workbench.recording import BodyTrack
-from workbench.recording.read import read_recording
+from workbench.recording.formats.read import read_recording
 from workbench.robot import EffectSpec
 
 HIDDEN = {

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.gap import pulls
-from workbench.gap.race import Trial
-from workbench.gap.rounds import Round
+from workbench.identify.selection import pair_move as pulls
+from workbench.identify.selection.record import Round
+from workbench.identify.selection.screening import Trial
 
 FORWARD, LEFT, SLIPPERY, LIFTS, SOFT = np.random.default_rng(4).normal(size=(5, COUNT)) * 2.0
 DOES = {"ground_tilt": [FORWARD, LEFT], "tether_force": [FORWARD, LEFT, 0.8 * SLIPPERY + 0.6 * LIFTS],

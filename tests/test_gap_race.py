@@ -8,14 +8,14 @@ import pytest
 
 from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
-from workbench.gap.asked import _when_held
-from workbench.gap.candidate import Candidate
-from workbench.gap.covariance import _scattered
-from workbench.gap.fitting import WALKING, Solved, fit_blocks, lowest, together
-from workbench.gap.guess import SCANNED, SCANNED_GROUND, guess, scan, sizes_of
-from workbench.gap.jury import STRETCHES, Jury, Question
-from workbench.gap.race import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
-from workbench.gap.search import Search
+from workbench.identify.fitting.covariance import _scattered
+from workbench.identify.fitting.fits import Search
+from workbench.identify.fitting.levenberg_marquardt import WALKING, Solved, fit_blocks, lowest, together
+from workbench.identify.fitting.responses import SCANNED, SCANNED_GROUND, guess, scan, sizes_of
+from workbench.identify.parameters import Candidate
+from workbench.identify.rollouts import STRETCHES, Jury, Question
+from workbench.identify.selection.scheduling import _when_held
+from workbench.identify.selection.screening import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
 
@@ -158,7 +158,7 @@ def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypa
         yield next(iter(simulate_stream(jobs, n_jobs)))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("workbench.gap.jury.simulate_stream", killed)
+    monkeypatch.setattr("workbench.identify.rollouts.simulate_stream", killed)
     with pytest.raises(KeyboardInterrupt):
         Jury(evidence, CONFIG, 1, tmp_path).residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)])
     assert len(list(tmp_path.glob("*.npy"))) == 1
@@ -169,7 +169,7 @@ def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monke
     jury = Walking(evidence, CONFIG, n_jobs=1)
     since = evidence[0].since
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
-    monkeypatch.setattr("workbench.gap.race.LOOKED", 0.8)  # these takes are short
+    monkeypatch.setattr("workbench.identify.selection.screening.LOOKED", 0.8)  # these takes are short
     for begins, most in ((0.0, 0.8), (1.2, 2.0)):
         missing = np.where(since[:, None] >= begins, 5.0, 0.1) * np.isfinite(evidence[0].recorded)
         t = Trying(jury, session.model, [], {0: missing}, [c], Race(), False, {})

@@ -8,20 +8,28 @@ import pytest
 
 from tests.gap_sessions import record_arm
 from tests.gap_worn import CONFIG
+from workbench.compare.compare_session import roll_out, run_of
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes, register_takes
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
-from workbench.gap.anew import Played, read_anew
-from workbench.gap.candidate import Candidate, with_effects
-from workbench.gap.compare_session import roll_out, run_of
-from workbench.gap.evidence import gather
-from workbench.gap.findings import Change
-from workbench.gap.jury import Jury, Question
-from workbench.gap.missed import LEAST_CLOSED, SURELY, Missed, _least_closed, _lost, _stands_at_an_end, with_missed
-from workbench.gap.passed_over import _suspects, passed_over, played_without
-from workbench.gap.registered import read_takes, register_takes
-from workbench.gap.search import Search
-from workbench.gap.session import load_session
-from workbench.gap.special import _stop, special
+from workbench.identify.estimators.dropped_again import Played, read_anew
+from workbench.identify.estimators.dropped_commands import (
+    LEAST_CLOSED,
+    SURELY,
+    Missed,
+    _least_closed,
+    _lost,
+    _stands_at_an_end,
+    with_missed,
+)
+from workbench.identify.estimators.dropped_in_motion import _suspects, passed_over, played_without
+from workbench.identify.estimators.stops_and_mounts import _stop, special
+from workbench.identify.findings import Change
+from workbench.identify.fitting.fits import Search
+from workbench.identify.parameters import Candidate, with_effects
+from workbench.identify.problem import gather
+from workbench.identify.rollouts import Jury, Question
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.motion.commands import Commands
-from workbench.recording.rollout_table import is_rollout, load_rollout, save_rollout
+from workbench.recording.formats.rollout_table import is_rollout, load_rollout, save_rollout
 from workbench.recording.take import Take
 from workbench.robot import InputError
 

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from tests.gap_worn import CONFIG, HIDDEN, NOMINAL, gathered
+from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.gap import selection
-from workbench.gap.candidate import Candidate
-from workbench.gap.candidates import candidates
-from workbench.gap.channels import joint_of
-from workbench.gap.evidence import ratios, smoothed
-from workbench.gap.fitting import fit_blocks, together
-from workbench.gap.jury import Jury, Question
-from workbench.gap.ledger import layer_of, ledger
-from workbench.gap.point_mass import PointMass, SwungMass
-from workbench.gap.search import Fit, Search
+from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks, together
+from workbench.identify.ledger import layer_of, ledger
+from workbench.identify.parameters import Candidate
+from workbench.identify.point_mass import PointMass, SwungMass
+from workbench.identify.problem import ratios, smoothed
+from workbench.identify.proposals import candidates
+from workbench.identify.rollouts import Jury, Question
+from workbench.identify.selection import forward as selection
 
 
 def test_residuals_are_as_large_as_noise_where_nothing_is_hidden(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from tests.gap_sessions import MOTION, session_content, write_session
 from tests.shared_data import shared
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.robot import BUS_IDS, RIGID_BODIES, InputError
 
 MISSING = object()

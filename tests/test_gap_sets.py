@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.gap import sets
-from workbench.gap.race import Trial
-from workbench.gap.rounds import Round
+from workbench.identify.selection import single_joint as sets
+from workbench.identify.selection.record import Round
+from workbench.identify.selection.screening import Trial
 
 RNG = np.random.default_rng(5)
 SLOW, HEAVY = RNG.normal(size=(2, COUNT))

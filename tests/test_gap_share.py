@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import record_arm, session_content, write_session
-from workbench.gap import share
-from workbench.gap.compare_session import roll_out, run_of
-from workbench.gap.diagnosis import diagnose_session
-from workbench.gap.evidence import JUDGES, gather, part_of
-from workbench.gap.jury import Jury, Question
-from workbench.gap.registered import read_takes, register_takes
-from workbench.gap.session import load_session
-from workbench.gap.share import floors_everywhere, judged_fairly, searched, share_of
+from workbench.compare.compare_session import roll_out, run_of
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes, register_takes
+from workbench.identify import subset as share
+from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.problem import JUDGES, gather, part_of
+from workbench.identify.rollouts import Jury, Question
+from workbench.identify.subset import floors_everywhere, judged_fairly, searched, share_of
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)

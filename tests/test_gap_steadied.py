@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from workbench.gap.steadied import SETTLES, WINDOW, base_states, edges, unsettled
+from workbench.identify.shooting import SETTLES, WINDOW, base_states, edges, unsettled
 from workbench.recording.take import Take
 
 SPEED, TURNING = np.array([0.05, -0.02, 0.01]), np.array([0.1, -0.2, 0.8])

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.gap import worth
-from workbench.gap.candidate import Candidate
-from workbench.gap.candidates import candidates
-from workbench.gap.race import Trial
-from workbench.gap.rounds import Round, before_rough, taken
-from workbench.gap.search import Search
+from workbench.identify.fitting.fits import Search
+from workbench.identify.parameters import Candidate
+from workbench.identify.proposals import candidates
+from workbench.identify.selection import acceptance as worth
+from workbench.identify.selection.record import Round, before_rough, taken
+from workbench.identify.selection.screening import Trial
 
 
 def leaving(worn, **sizes):

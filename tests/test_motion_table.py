@@ -67,7 +67,7 @@ def test_what_the_registers_cannot_hold_is_refused(angle: float, time: float, me
 
 def test_table_and_motion_agree(walk: Motion) -> None:
     """Back from counts the angles are within half a count, and converting them again gives the same goals and dwells."""
-    back = walk.as_table().as_motion()
+    back = Motion.from_table(walk.as_table())
     assert np.abs(back.angles - walk.angles).max() <= COUNT / 2
     assert back.closes
     assert np.array_equal(back.as_table().goals, walk.as_table().goals)

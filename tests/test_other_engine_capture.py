@@ -13,8 +13,8 @@ from studies.other_engine.excitation import MotionRows, stand_motion, sway_motio
 from studies.other_engine.firmware import read_rows
 from studies.other_engine.make_session import TakePlan, make_session, record, servo_yaml
 from tests.other_engine_models import as_take
-from workbench.gap.session import load_session
-from workbench.motion.motion import load_motion
+from workbench.compare.session import load_session
+from workbench.motion import load_motion
 from workbench.recording import read_recording, register, take_from_recording
 from workbench.robot import EffectSpec, data_file, puppy_model
 

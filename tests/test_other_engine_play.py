@@ -13,7 +13,7 @@ from studies.other_engine.mjcf import compile_model
 from studies.other_engine.servo import ServoBank
 from tests.other_engine_models import CROOKED, FRICTIONLESS, as_take, commands, joint, link, model_of, pendulum, sphere
 from tests.shared_data import shared
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.recording import read_recording, register, take_from_recording
 from workbench.robot import EffectSpec, InputError
 

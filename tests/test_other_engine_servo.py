@@ -5,7 +5,7 @@ import pytest
 
 from studies.other_engine.firmware import commands_from_rows, read_rows
 from studies.other_engine.servo import Reference, ServoBank
-from workbench.motion.motion import load_motion
+from workbench.motion import load_motion
 from workbench.robot import COUNT, ServoConstants, data_file
 from workbench.servo import ServoLaw
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from studies.other_engine import synthetic_walk
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.recording import read_recording
 from workbench.robot import data_file, puppy_model
 

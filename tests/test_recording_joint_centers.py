@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from workbench.recording.joint_centers import LEAST_FRAMES, across, joint_center, spans
-from workbench.recording.tracks import SeenJoint, Tracks
+from workbench.recording.mocap.joint_centers import LEAST_FRAMES, across, joint_center, spans
+from workbench.recording.mocap.tracks import SeenJoint, Tracks
 
 X, Y = np.eye(3)[0], np.eye(3)[1]
 HIP, KNEE = np.array([0.02, 0.05, -0.01]), np.array([0.004, 0.006, -0.08])

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from tests.shared_data import shared
-from workbench.motion.motion import load_motion
+from workbench.motion import load_motion
 from workbench.recording import observe, read_recording, register, session_yaw, take_from_recording
 from workbench.robot import RobotModel, load_servo_constants
 from workbench.simulation import Simulation, SimulationConfig

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import session_content, write_session
-from workbench.gap.registered import read_takes
-from workbench.gap.session import load_session
-from workbench.recording.read import read_recording, recording_of_take
-from workbench.recording.sage import JOINTS, URDF_JOINTS, sage_programmes
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import read_takes
+from workbench.recording.formats.read import read_recording, recording_of_take
+from workbench.recording.formats.sage import JOINTS, URDF_JOINTS, sage_programmes
 from workbench.recording.take_from import named_by_model
 from workbench.robot import InputError, RobotModel
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.motion.commands import Commands
-from workbench.recording.start import find_start, lagged_reference
+from workbench.recording.mocap.start import find_start, lagged_reference
 
 JOINTS = ("one", "two", "three")
 

@@ -212,7 +212,7 @@ def test_bodies_that_hide_a_link_are_told(model):
 def test_a_take_resampled_keeps_what_servos_do_not_turn(model):
     made = capture(model, noise=2e-3)
     m = register(made.recording, model, None, predicted(model))
-    take = Take.from_recording(made.recording, m, model, name="walk")
+    take = take_from_recording(made.recording, m, model, name="walk")
     assert (take.name, take.source, take.base) == ("walk", "recording", "free")
     half = take.resampled(take.time[::2])
     np.testing.assert_allclose(half.off_axis, take.off_axis[::2], atol=1e-12)

@@ -18,7 +18,7 @@ from studies.riddles.loose_screws import loose
 from studies.riddles.rounding import exact_dwells, rounding_errors, with_dwells
 from studies.riddles.small import lateness, without_last
 from studies.riddles.speed_order import misplaced_goals, sweep_motion
-from workbench.gap.results import Channel
+from workbench.compare.results import Channel
 from workbench.motion import interpolate_motion
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, EffectSpec, puppy_model

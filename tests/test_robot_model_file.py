@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from tests.gap_sessions import write_session
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.robot import (
     EffectSpec,
     Ground,

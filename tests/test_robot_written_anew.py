@@ -1,6 +1,6 @@
 """A robot's file that is written anew in one process, as studies and other projects do, is read anew."""
 
-from workbench.gap.footfalls import foot_points
+from workbench.compare.footfalls import foot_points
 from workbench.robot import Kinematics
 
 

@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 import pytest
 
-from workbench.motion.motion import load_motion
+from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 

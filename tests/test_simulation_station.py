@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
-from workbench.motion.motion import load_motion
+from workbench.motion import load_motion
 from workbench.robot import EffectSpec, Ground, InputError, RobotModel, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, MakePuppyStation, Simulation, SimulationConfig, simulate_batch
 

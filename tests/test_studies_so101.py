@@ -20,8 +20,8 @@ from studies.so101.rows import Rows, gravity
 from studies.so101.session import write_session
 from studies.so101.zero import Zero
 from tests.shared_data import shared
-from workbench.gap.session import load_session
-from workbench.recording.sage import JOINTS, URDF_JOINTS
+from workbench.compare.session import load_session
+from workbench.recording.formats.sage import JOINTS, URDF_JOINTS
 from workbench.robot import Kinematics
 from workbench.servo import ServoLaw
 

@@ -15,7 +15,7 @@ from studies.xl330.rig import DUTY_PER_UNIT, Log, find_logs, nominal_servo, publ
 from studies.xl330.selection import fit_effects, select
 from studies.xl330.station import station_errors
 from tests.shared_data import shared
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.recording import write_joint_log
 from workbench.robot import InputError
 

@@ -11,9 +11,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import small_robot, swing
+from workbench.bench.arm import arm_sdf
 from workbench.cli.diagnose import _line
-from workbench.gap.bench.arm import arm_sdf
-from workbench.gap.findings import (
+from workbench.identify.findings import (
     Alternative,
     Change,
     Diagnosis,
@@ -25,12 +25,12 @@ from workbench.gap.findings import (
     Unexplained,
     Verdict,
 )
-from workbench.gap.story import TakeStory
+from workbench.identify.take_report import TakeStory
 from workbench.robot import EffectSpec, RobotModel
-from workbench.view.diagnosis_report import diagnosis_report, write_diagnosis
 from workbench.view.figures import encode
-from workbench.view.gap_figures import before_after, gap_map, robot_map, unseen_errors
-from workbench.view.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of, title_of
+from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
+from workbench.view.report.diagnosis import diagnosis_report, write_diagnosis
+from workbench.view.report.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of, title_of
 
 SIGMA = np.deg2rad(0.1)
 

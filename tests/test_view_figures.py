@@ -9,14 +9,14 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import capture, small_robot, swing
-from workbench.gap.comparison import compare_takes
-from workbench.gap.footfalls import FootPhases, force_phases
-from workbench.gap.results import Channel
+from workbench.compare.comparison import compare_takes
+from workbench.compare.footfalls import FootPhases, force_phases
+from workbench.compare.results import Channel
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel, ServoConstants
 from workbench.view import figures
-from workbench.view.stance import intervals
-from workbench.view.style import NOISE, RECORDED, SIMULATED, STANCE
+from workbench.view.figures.stance import intervals
+from workbench.view.figures.style import NOISE, RECORDED, SIMULATED, STANCE
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_drawing_leaves_no_trace(model: RobotModel, takes: tuple[Take, Take]) ->
     before = dict(mpl.rcParams)
     everything(model, *takes)
     assert dict(mpl.rcParams) == before
-    code = "import sys, workbench.view.figures; sys.exit('matplotlib.pyplot' in sys.modules)"
+    code = "import sys, workbench.view.figures.files; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 

@@ -12,9 +12,9 @@ from tests.test_view_scene import film
 from tests.view_takes import small_robot, swing
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.view.gap_marks import PATH, TILT, Errors
-from workbench.view.heat import colours, gradient, shares
-from workbench.view.scene import write_replay
+from workbench.view.figures.heat import colours, gradient, shares
+from workbench.view.scene.marks import PATH, TILT, Errors
+from workbench.view.scene.replay import write_replay
 
 GREY = (0xD9 / 255, 0xD9 / 255, 0xDD / 255)
 

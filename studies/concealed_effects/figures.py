@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from studies.concealed_effects.score import ParameterScore
 from studies.concealed_effects.summary import NOTHING, Bin
-from workbench.view.style import ACCENT, COMMAND, RECORDED, SIMULATED, legend_above, new_figure, styled
+from workbench.view.figures.style import ACCENT, COMMAND, RECORDED, SIMULATED, legend_above, new_figure, styled
 
 LAST = ("abstained", "failed")
 """Columns that stand behind all names."""

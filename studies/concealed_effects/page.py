@@ -10,7 +10,7 @@ from typing import Any
 from studies.concealed_effects.figures import confusion_figure, reliability_figure, sizes_figure, time_figure
 from studies.concealed_effects.score import Score
 from studies.concealed_effects.summary import Criterion, bounds, by_effect, confusion, criteria, reliability, sizes
-from workbench.view.report import Details, Part, Picture, Provenance, Report, Section, Table, Text
+from workbench.view.report.page import Details, Part, Picture, Provenance, Report, Section, Table, Text
 
 ABOUT = (
     "Robots of another engine (MuJoCo, with servo law, firmware, contact and cameras of its own, and none of the workbench's "

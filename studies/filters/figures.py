@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from studies.filters.measure import NAMES, Result
 from studies.inputs import JOINT
-from workbench.view import style
+from workbench.view.figures import style
 
 COLOURS = dict(zip(NAMES, ("#AAAAAA", *style.OTHERS[:3], style.ACCENT)))
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from studies.common import body_track
 from studies.riddles.cameras import Recorded, record
 from studies.riddles.hypotheses import Run
-from workbench.gap.comparison import compare_takes
-from workbench.gap.metrics import lag, rms
-from workbench.gap.results import Channel, TakeComparison
+from workbench.compare.comparison import compare_takes
+from workbench.compare.metrics import lag, rms
+from workbench.compare.results import Channel, TakeComparison
 from workbench.motion import Trajectory
 from workbench.recording.take import Take
 from workbench.robot import RobotModel

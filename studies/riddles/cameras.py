@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording import quaternions as quat
-from workbench.recording.observe import observe
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.observe import observe
+from workbench.recording.mocap.registration import register
 from workbench.recording.recording import Measurement, Recording
-from workbench.recording.registration import register
-from workbench.recording.take import BodyTrack, Take
+from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
 from workbench.robot import RobotModel
 

@@ -29,10 +29,10 @@ from studies.riddles.loose_screws import (
     measure,
 )
 from studies.riddles.page import Answer, Progress, listed, picture, run_subject, shade_stance, times, told
-from workbench.gap.metrics import heading
+from workbench.compare.metrics import heading
 from workbench.robot import RobotModel
-from workbench.view import style
-from workbench.view.report import Part, Table, Text
+from workbench.view.figures import style
+from workbench.view.report.page import Part, Table, Text
 
 BOUND = 1.3
 """Sigma below which nothing is claimed (contract, section 6)."""

@@ -16,12 +16,12 @@ from matplotlib.figure import Figure
 from studies.common import publish, sign
 from studies.riddles.apart import Number
 from studies.riddles.hypotheses import Hypothesis, Progress
-from workbench.gap.footfalls import foot_phases
+from workbench.compare.footfalls import foot_phases
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, puppy_model
-from workbench.view import style
-from workbench.view.report import Part, Picture, Provenance, Report, Section, Table
-from workbench.view.stance import intervals
+from workbench.view.figures import style
+from workbench.view.figures.stance import intervals
+from workbench.view.report.page import Part, Picture, Provenance, Report, Section, Table
 
 METHOD = (
     "Everything here is simulated with the puppy that ships and the ROBOTIS walk of the thesis's figure 3.4. Each recording is "

@@ -31,8 +31,8 @@ from studies.riddles.rounding import (
 )
 from workbench.motion import interpolate_motion
 from workbench.robot import RobotModel
-from workbench.view import style
-from workbench.view.report import Part, Table, Text
+from workbench.view.figures import style
+from workbench.view.report.page import Part, Table, Text
 
 SHOWN = "flb"
 """The joint that the thesis shows most."""

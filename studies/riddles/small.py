@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from studies.common import COORDINATES, body_track
 from studies.riddles.cameras import record
 from studies.riddles.hypotheses import LEAD, Hypothesis, Progress, Setting, run_all, walk
-from workbench.gap.footfalls import foot_points
+from workbench.compare.footfalls import foot_points
 from workbench.motion import Commands, Motion
 from workbench.recording.take import Take
 from workbench.robot import FEET, RobotModel

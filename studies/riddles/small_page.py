@@ -13,8 +13,8 @@ from studies.riddles.hypotheses import Hypothesis, walk
 from studies.riddles.page import Answer, Progress, listed, picture, run_subject, shade_stance, times
 from studies.riddles.small import AFTER, ALL, LAST, WALKED, Result, measure
 from workbench.robot import RobotModel
-from workbench.view import style
-from workbench.view.report import Part, Table, Text
+from workbench.view.figures import style
+from workbench.view.report.page import Part, Table, Text
 
 LATE = np.radians(1.0)
 """From here on a joint is said to be late."""

@@ -27,8 +27,8 @@ from studies.riddles.speed_order import (
     measure,
 )
 from workbench.robot import RobotModel
-from workbench.view import style
-from workbench.view.report import Part, Table, Text
+from workbench.view.figures import style
+from workbench.view.report.page import Part, Table, Text
 
 
 def speed_order(out: Path, quick: bool, progress: Progress) -> str:

@@ -30,11 +30,11 @@ from studies.so101.read_off import read_off
 from studies.so101.session import write_session
 from workbench.cli.memory import rollout_memory
 from workbench.cli.progress import Progress
-from workbench.gap.session import Session, load_session
-from workbench.recording.sage import JOINTS
+from workbench.compare.session import Session, load_session
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import InputError, RobotModel
 from workbench.robot.model_file import load_model
-from workbench.view.report import Picture, Provenance, Report, Section
+from workbench.view.report.page import Picture, Provenance, Report, Section
 
 Array = NDArray[np.float64]
 Say = Callable[[str, float | None], None]
@@ -92,8 +92,8 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
 
 def _diagnosed(session: Session, out: Path, n_jobs: int, progress: Say) -> RobotModel:
     """The workbench's diagnosis of the training session; its files go into OUT/diagnosis."""
-    from workbench.gap.diagnosis import diagnose_session
-    from workbench.view.diagnosis_report import write_diagnosis
+    from workbench.identify.diagnosis import diagnose_session
+    from workbench.view.report.diagnosis import write_diagnosis
 
     with rollout_memory(out / "diagnosis", session) as memory:
         told = diagnose_session(session, progress, n_jobs, memory)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.so101.programmes import Programme
-from workbench.gap.registered import read_takes
-from workbench.gap.session import Session
-from workbench.recording.sage import JOINTS
+from workbench.compare.session import Session
+from workbench.compare.session_takes import read_takes
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch

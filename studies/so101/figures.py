@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from studies.so101.programmes import Programme
 from studies.so101.rest import Current
 from studies.so101.rows import Rows
-from workbench.recording.sage import JOINTS
-from workbench.view import style
+from workbench.recording.formats.sage import JOINTS
+from workbench.view.figures import style
 
 Array = NDArray[np.float64]
 COLOURS = {"nominal": style.SIMULATED, "delay and gain": style.FLOOR, "read off": style.OTHERS[0], "diagnosed": style.ACCENT}

@@ -10,7 +10,7 @@ from studies.so101.response import Response, response
 from studies.so101.rest import Current, Fastest, Standing, current, fastest, standing
 from studies.so101.rows import Rows, rows_of
 from studies.so101.zero import Zero, zeros
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import Kinematics
 
 

@@ -11,9 +11,9 @@ from studies.so101.programmes import Clock, Programme
 from studies.so101.response import Response
 from studies.so101.rest import Current, Fastest, Standing
 from studies.so101.zero import Zero
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
-from workbench.view.report import Table, Text
+from workbench.view.report.page import Table, Text
 
 Array = NDArray[np.float64]
 DEGREES = float(np.degrees(1))

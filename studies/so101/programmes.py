@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.so101.robot import COUNT
-from workbench.recording.read import read_recording
+from workbench.recording.formats.read import read_recording
+from workbench.recording.formats.sage import JOINTS, sage_programmes
 from workbench.recording.recording import Recording
-from workbench.recording.sage import JOINTS, sage_programmes
 from workbench.robot import InputError
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from studies.so101.robot import ARMATURE, DUTY_PER_RADIAN, KT, RESISTANCE, VOLTAGE
 from studies.so101.rows import LOADED, Rows
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 
 Array = NDArray[np.float64]
 DELAYS = np.arange(-0.040, 0.0601, 0.002)

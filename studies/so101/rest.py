@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import Rows
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 
 Array = NDArray[np.float64]
 LEAST_HOLDS = 5

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from studies.so101.programmes import Programme
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import GRAVITY, Kinematics
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from studies.so101.programmes import FILE, VALIDATION
 from studies.so101.robot import BASE, arm_sdf, servo, servo_yaml
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot.files import write_together
 from workbench.robot.yaml_file import yaml_text
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import LOADED, Rows, gravity
-from workbench.recording.sage import JOINTS
+from workbench.recording.formats.sage import JOINTS
 from workbench.robot import Kinematics
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from studies.thesis_runs.figures import draw_runs
 from studies.thesis_runs.findings import contact_table, ends_table, findings
 from studies.thesis_runs.runs import ANIMATION, SMOOTH, STEPS, Run, five_runs
 from workbench.robot import puppy_model
-from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 _SYNTHETIC = (
     "The recording is **synthetic**: the same puppy in another engine (MuJoCo) with the servo law, filmed as a motion capture "

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from studies.common import COORDINATES, LABELS, REAL, SIMULATED_M, SIMULATED_OWN
 from studies.thesis_runs.runs import ANIMATION, Run
-from workbench.view import style
+from workbench.view.figures import style
 
 COLOURS = {ANIMATION: style.RECORDED, "robotis M": style.SIMULATED, "robotis": style.OTHERS[1], "mocap M": style.OTHERS[0],
            "mocap": style.ACCENT}

@@ -8,7 +8,7 @@ import numpy as np
 
 from studies.common import COORDINATES, REAL, SIMULATED_M, SIMULATED_OWN, sign, with_floor
 from studies.thesis_runs.runs import ANIMATION, SIMULATED, SMOOTH, STEPS, Run
-from workbench.view.report import Table
+from workbench.view.report.page import Table
 
 THESIS: Mapping[str, tuple[str, ...]] = {
     ANIMATION: (*(sign(v, 2) for v in REAL), "–", "–", "–"),

@@ -20,7 +20,7 @@ from studies.walk_spread.design import FACTORS, Design, make_design, state
 from studies.walk_spread.figures import NAMES, draw_cloud, draw_levels, draw_shares
 from studies.walk_spread.runs import Ends, run_design
 from workbench.robot import puppy_model
-from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 FALLEN = 45.0
 """Tilt [deg] beyond which the robot is said to have fallen."""

@@ -12,7 +12,7 @@ from studies.common import COORDINATES, REAL, SIMULATED_M, SIMULATED_OWN
 from studies.walk_spread.analysis import Shares, cloud
 from studies.walk_spread.design import FACTORS, Design
 from studies.walk_spread.runs import Ends
-from workbench.view import style
+from workbench.view.figures import style
 
 COLOURS = {"servo": style.SIMULATED, "ideal": style.ACCENT}
 NAMES = {"servo": "servo law", "ideal": "ideal joints"}

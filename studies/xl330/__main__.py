@@ -25,7 +25,7 @@ from studies.xl330.questions import ask, full_duty
 from studies.xl330.rig import find_logs, nominal_servo, published, write_session
 from studies.xl330.selection import fit_published, select, training
 from studies.xl330.station import DIAGNOSED, station_errors, with_specs
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
 from workbench.robot import InputError, load_model
 
 DATA = ROOT.parent / "shared/data/xl330"

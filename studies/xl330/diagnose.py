@@ -14,8 +14,8 @@ from studies.common import run_study
 from studies.xl330.__main__ import DATA, GAINS
 from studies.xl330.rig import find_logs, published, write_session
 from studies.xl330.station import DIAGNOSED
-from workbench.gap.diagnosis import diagnose_session
-from workbench.gap.session import load_session
+from workbench.compare.session import load_session
+from workbench.identify.diagnosis import diagnose_session
 from workbench.robot import save_model
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from studies.xl330.bam import Logs
 from studies.xl330.rig import Log
 from workbench.robot import GRAVITY
-from workbench.view import style
+from workbench.view.figures import style
 
 Array = NDArray[np.float64]
 SLOW = 1.0

@@ -14,7 +14,7 @@ from studies.xl330.bam import Logs
 from studies.xl330.questions import Question
 from studies.xl330.selection import Model, mean_errors
 from workbench.robot import RobotModel
-from workbench.view.report import Picture, Provenance, Report, Section, Table, Text
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 Array = NDArray[np.float64]
 

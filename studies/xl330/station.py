@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.gap.registered import read_takes
-from workbench.gap.session import Session
+from workbench.compare.session import Session
+from workbench.compare.session_takes import read_takes
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 

@@ -25,17 +25,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Measures, prints and writes."""
+    from workbench.bench.run import run_bench
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.gap.bench import fit_figures
     from workbench.robot import InputError
-    from workbench.simulation.bench import run_bench
 
     if args.out is not None and args.out.is_dir():
         raise InputError(args.out, "expected a file to write, found a directory")
     with ExitStack() as stack:
         folder = None if args.out is None else stack.enter_context(output_directory(args.out.parent))
-        text = json.dumps(run_bench(args.quick, stack.enter_context(Progress("bench")), fit_figures), indent=2)
+        text = json.dumps(run_bench(args.quick, stack.enter_context(Progress("bench"))), indent=2)
         if folder is not None:
             (folder / args.out.name).write_text(text + "\n", encoding="utf-8")
     print(text)

@@ -31,11 +31,11 @@ def run(args: argparse.Namespace) -> int:
     """Compares, writes, and prints the table."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.gap.compare_files import compare_files
-    from workbench.gap.compare_session import compare_session
-    from workbench.gap.session import load_session
+    from workbench.compare.compare_files import compare_files
+    from workbench.compare.compare_session import compare_session
+    from workbench.compare.session import load_session
     from workbench.simulation import SimulationConfig
-    from workbench.view.comparison_report import write_comparison
+    from workbench.view.report.comparison import write_comparison
 
     config = SimulationConfig(contact=args.contact)
     with output_directory(args.out) as folder, Progress("compare") as progress:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
-    from workbench.gap.findings import Finding
+    from workbench.identify.findings import Finding
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -34,11 +34,11 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.memory import rollout_memory
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.gap.diagnosis import diagnose_session
-    from workbench.gap.prediction import predict_session
-    from workbench.gap.session import load_session
+    from workbench.compare.prediction import predict_session
+    from workbench.compare.session import load_session
+    from workbench.identify.diagnosis import diagnose_session
     from workbench.motion import save_motion
-    from workbench.view.diagnosis_report import write_diagnosis
+    from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _line(finding: Finding) -> str:
-    from workbench.view.words import this_or
+    from workbench.view.report.words import this_or
 
     tie, error = finding.tie, finding.validation
     other = f" {this_or(tie)}, which these recordings do not tell apart" if tie else ""

@@ -31,10 +31,10 @@ def run(args: argparse.Namespace) -> int:
     """Computes, writes the table and the figures, and prints the margins."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
+    from workbench.compare.forces import forces_of_file, forces_of_take
     from workbench.dynamics import save_inverse_dynamics
-    from workbench.gap.forces import forces_of_file, forces_of_take
     from workbench.view.figures import save_figure
-    from workbench.view.forces import force_figures, margin_table
+    from workbench.view.report.forces import force_figures, margin_table
 
     with output_directory(args.out) as folder, Progress("inverse-dynamics") as progress:
         if args.take:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.gap.session import Session
+from workbench.compare.session import Session
 
 STAYS = 16
 """Letters of the digest in the folder's name."""

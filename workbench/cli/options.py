@@ -37,8 +37,8 @@ def _folder(text: str) -> Path:
 
 def load_model(name: str) -> RobotModel:
     """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
+    from workbench.compare.session import load_session
     from workbench.effects.apply import resolved
-    from workbench.gap.session import load_session
     from workbench.robot import InputError, RobotModel, puppy_model
     from workbench.robot.model_file import load_model as read_model_file
     from workbench.robot.yaml_file import read_yaml

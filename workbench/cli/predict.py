@@ -27,8 +27,8 @@ def run(args: argparse.Namespace) -> int:
     """Simulates and writes."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.gap.prediction import predict_session
-    from workbench.gap.session import load_session
+    from workbench.compare.prediction import predict_session
+    from workbench.compare.session import load_session
     from workbench.simulation import SimulationConfig
 
     session = load_session(args.session)

@@ -32,12 +32,12 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.motion import load_motion
-    from workbench.recording.rollout_table import save_rollout
+    from workbench.recording.formats.rollout_table import save_rollout
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
     from workbench.view.figures import save_figure
-    from workbench.view.rollout_figures import rollout_figures
-    from workbench.view.scene import write_replay
+    from workbench.view.figures.rollout import rollout_figures
+    from workbench.view.scene.replay import write_replay
 
     model = load_model(args.model)
     model.check_base(floating=args.base == "free")

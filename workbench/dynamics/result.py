@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
-from workbench.recording.numbers import number_columns
+from workbench.recording.formats.numbers import number_columns
 from workbench.robot import InputError
 from workbench.robot.files import read_text, write_whole
 

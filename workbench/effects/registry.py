@@ -16,7 +16,7 @@ ENTRY_POINT_GROUP = "workbench.effects"
 @cache
 def known_effects() -> dict[str, Effect]:
     """Effects by name; an installed plug-in may not take the name of another effect."""
-    import workbench.effects as room
+    import workbench.effects.library as room
 
     found: dict[str, Effect] = {}
     for module in iter_modules(room.__path__):

@@ -1,7 +1,8 @@
 """Motions as tables of poses, and what they become on the bus."""
 
 from workbench.motion.commands import Commands
-from workbench.motion.motion import Motion, load_motion, save_motion
+from workbench.motion.files import load_motion, save_motion
+from workbench.motion.motion import Motion
 from workbench.motion.mtn import MtnFile, MtnPage, load_mtn
 from workbench.motion.smoothing import (
     Trajectory,

@@ -9,16 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.motion.motion import Motion
 from workbench.robot import COUNT, InputError
 from workbench.robot.files import read_text
-
-if TYPE_CHECKING:
-    from workbench.motion.motion import Motion
 
 Array = NDArray[np.float64]
 
@@ -87,8 +84,6 @@ class MtnFile:
         The first row is the page's last step where it repeats or follows itself, else the neutral pose. InputError if
         the file moves an ID that no joint has: it was written for another robot.
         """
-        from workbench.motion.motion import Motion
-
         page = self.page(which)
         moved = [int(i) for i in np.flatnonzero(self.enable)]
         by_id = {i: joint for joint, i in bus_ids.items()}

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.robot import COUNT, SPEED_UNIT, InputError
-
-if TYPE_CHECKING:
-    from workbench.motion.motion import Motion
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -91,14 +87,6 @@ class PoseTable:
             end=float(ends[-1]),
             poses=np.tile(np.arange(len(self)), cycles),
         )
-
-    def as_motion(self) -> Motion:
-        """The poses as angles at their arrival times; the first row is the last pose, where the cycle closes."""
-        from workbench.motion.motion import Motion
-
-        angles = self.angles()
-        times = np.concatenate([[0.0], np.cumsum(self.dwells_ms) / 1000])
-        return Motion(self.source, times, self.joints, np.vstack([angles[-1:], angles]), self.source)
 
 
 def _nearest(x: Array, lost: float = 1e-9) -> Counts:

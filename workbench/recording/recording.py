@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-from workbench.recording.take import BodyTrack
+from workbench.recording.body_track import BodyTrack
 
 Array = NDArray[np.float64]
 

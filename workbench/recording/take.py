@@ -4,28 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-
-if TYPE_CHECKING:
-    from workbench.recording.recording import Measurement, Recording
-    from workbench.robot import RobotModel
+from workbench.recording.body_track import BodyTrack
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class BodyTrack:
-    """Path of a rigid body: p (N, 3) [m] and quaternion wxyz (N, 4), continuous in sign, NaN where unseen;
-    error (N,) [m] mean marker error, if known."""
-
-    p: Array
-    quat: Array
-    error: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -66,14 +52,6 @@ class Take:
     off_axis: Array | None = None
     servo_q: Array | None = None
     links: Mapping[str, BodyTrack] = field(default_factory=dict)
-
-    @staticmethod
-    def from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
-                       base: str = "free") -> Take:
-        """The take that a recording holds; see `take_from_recording`."""
-        from workbench.recording.take_from import take_from_recording
-
-        return take_from_recording(recording, measurement, model, name, base)
 
     def __len__(self) -> int:
         return len(self.time)

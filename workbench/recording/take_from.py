@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording import quaternions as quat
-from workbench.recording.angles import angle_sigma, base_row, in_world, joint_angles
-from workbench.recording.mending import mend
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.sage import URDF_JOINTS
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.angles import angle_sigma, base_row, in_world, joint_angles
+from workbench.recording.mocap.mending import mend
+from workbench.recording.mocap.tracks import Tracks, check_assets, tracks_of
 from workbench.recording.recording import Measurement, Recording
-from workbench.recording.sage import URDF_JOINTS
-from workbench.recording.take import BodyTrack, Take
-from workbench.recording.tracks import Tracks, check_assets, tracks_of
+from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]

@@ -9,23 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.compare import metrics
+from workbench.compare.compare_session import compare_session
+from workbench.compare.footfalls import foot_phases
+from workbench.compare.results import Comparison
+from workbench.compare.session import load_session
 from workbench.device import export
 from workbench.device.limits import Violation
-from workbench.gap import metrics
-from workbench.gap.compare_session import compare_session
-from workbench.gap.footfalls import foot_phases
-from workbench.gap.results import Comparison
-from workbench.gap.session import load_session
 from workbench.motion import Motion, load_motion
-from workbench.recording.rollout_table import save_rollout
+from workbench.recording.formats.rollout_table import save_rollout
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
-from workbench.view.comparison_report import headline, take_section
 from workbench.view.figures import body_attitude, body_path, film_strip, footfalls, joint_grid, joint_torques, stance_of
-from workbench.view.report import Details, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.scene import write_replay
+from workbench.view.report.comparison import headline, take_section
+from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.scene.replay import write_replay
 
 SECONDS, CYCLES = 6.0, 13
 """Of the walk, from rest (thesis, chapter 7.2); its cycles take 0.468 s."""

@@ -1,0 +1,110 @@
+"""Any two files side by side: recordings, motions, rollout tables, in any pairing."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.compare.compare_session import Run, provenance, roll_out
+from workbench.compare.comparison import compare_takes
+from workbench.compare.results import Comparison
+from workbench.compare.session import Base, TakeSpec
+from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, readable, register_take
+from workbench.motion import load_motion
+from workbench.recording.formats.file_kind import file_kind
+from workbench.recording.formats.rollout_table import load_rollout
+from workbench.recording.mocap.tracks import check_assets
+from workbench.recording.take import Take
+from workbench.robot import InputError, RobotModel
+from workbench.simulation import SimulationConfig
+
+
+def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *, cycles: int = 1,
+                  base: Base = "free", progress: Progress = no_progress, n_jobs: int = 2) -> Comparison:
+    """Compares two files; a motion is first played `cycles` times on `model`, its base free or fixed.
+
+    Starts are laid over each other: a rollout's is known; a recording is registered against the other file, or, where both are
+    recordings, the first by its own first motion and the second against it. A recording is the side that is "recorded" in
+    the result, wherever it stands; of two recordings, motions or rollouts, A is. With a motion as the other side the
+    numerical floor and the contact spread are known, else not. InputError names the file that does not fit.
+    """
+    began = time.monotonic()
+    config = config or SimulationConfig()
+    model.check_base(floating=base == "free")
+    kinds = file_kind(a), file_kind(b)
+    if kinds[1] == "recording" and kinds[0] != "recording":
+        a, b, kinds = b, a, (kinds[1], kinds[0])
+    files = Path(a), Path(b)
+    made_by = {"recorded": str(a), "simulated": str(b)}
+    recording = _read(files[0], model, base) if kinds[0] == "recording" else None
+    runs = {i: _run(f, model, cycles, base, recording) for i, (f, kind) in enumerate(zip(files, kinds)) if kind == "motion"}
+    rollouts = dict(zip(runs, roll_out(list(runs.values()), config, progress=progress, n_jobs=n_jobs)))
+    takes = [rollouts[i].nominal if i in rollouts else load_rollout(f) if kind == "rollout" else None
+             for i, (f, kind) in enumerate(zip(files, kinds))]
+    finer = rollouts[1].finer if 1 in rollouts else ()
+    other = rollouts[1].other_contact if 1 in rollouts else ()
+    progress("comparing", None)
+    if recording is not None:
+        if kinds[1] == "recording":
+            first = _by_first_motion(recording).recorded
+            takes = [first, register_take(_read(files[1], model, base), _bridged(first), None).recorded]
+        else:
+            predicted = takes[1]
+            assert predicted is not None
+            commands = recording.commands or predicted.commands
+            t = register_take(replace(recording, commands=commands), predicted, None)
+            takes = [t.recorded, t.observed(predicted)]
+            finer, other = (tuple(t.observed(r) for r in rs) for rs in (finer, other))
+    recorded, simulated = takes
+    assert recorded is not None
+    assert simulated is not None
+    result = compare_takes(replace(recorded, name=files[0].stem), replace(simulated, name=files[1].stem), model, finer=finer,
+                           other_contact=other)
+    return Comparison((result,), provenance=provenance(model, config, time.monotonic() - began) | made_by)
+
+
+def _by_first_motion(read: ReadTake) -> RegisteredTake:
+    """A recording of which nothing is known but itself: its start is where its first joint leaves rest."""
+    if read.recording.kind != "motive" or read.commands is not None:
+        return register_take(read, None, None)
+    start = float(read.recording.time[0])
+    for _ in range(2):  # the zero is taken before the start, and the start found from zeroed angles
+        take = register_take(replace(read, spec=replace(read.spec, starts_at=start)), None, None).recorded
+        start = _first_motion(take)
+    return register_take(replace(read, spec=replace(read.spec, starts_at=start)), None, None)
+
+
+def _first_motion(take: Take, least: float = np.deg2rad(1.0)) -> float:
+    """Time at which the first joint has left its first angles by `least` [rad], three frames in a row [s]."""
+    first = np.nanmedian(take.q[: max(3, len(take) // 100)], axis=0)
+    away = np.nan_to_num(np.abs(take.q - first)).max(axis=1) > least
+    held = np.flatnonzero(away[:-2] & away[1:-1] & away[2:])
+    if not len(held):
+        raise InputError(take.name, f"start: expected a joint that moves by more than {np.rad2deg(least):.0f} deg")
+    return float(take.time[held[0]])
+
+
+def _bridged(take: Take) -> Take:
+    """The take with its gaps filled straight, for something else to be laid over it."""
+    q = take.q.copy()
+    for column in q.T:
+        seen = np.isfinite(column)
+        if seen.any():
+            column[~seen] = np.interp(take.time[~seen], take.time[seen], column[seen])
+    return replace(take, q=np.nan_to_num(q))
+
+
+def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
+    recording = readable(path, model)
+    if recording.rigid_bodies:
+        check_assets(recording, model)
+    return ReadTake(TakeSpec(path.stem, path, base=base), model, recording, recording.commands)
+
+
+def _run(path: Path, model: RobotModel, cycles: int, base: Base, beside: ReadTake | None) -> Run:
+    """A motion's run, as long as the recording beside it."""
+    commands = load_motion(path, model).commands(cycles)
+    return Run(path.stem, model, commands, commands.end if beside is None else beside.duration, base)

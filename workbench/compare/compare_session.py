@@ -1,0 +1,120 @@
+"""Every take of a session against the nominal robot."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from workbench.compare.comparison import Noise, compare_takes, noise_of
+from workbench.compare.results import Comparison, TakeComparison
+from workbench.compare.session import Session
+from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, read_takes, register_takes
+from workbench.motion.commands import Commands
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig, Start
+from workbench.simulation.batch import Job, simulate_batch
+from workbench.simulation.steady import BaseStates
+
+LEAD = 0.3
+"""Rest before the first command of each rollout [s]."""
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """One take simulated: as configured, with the step halved and quartered, with the other contact model."""
+
+    nominal: Take
+    finer: tuple[Take, ...] = ()
+    other_contact: tuple[Take, ...] = ()
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is to be simulated. start: where it begins other than at rest in neutral; steadied: where its base is put back to."""
+
+    name: str
+    model: RobotModel
+    commands: Commands | None
+    duration: float
+    base: str
+    start: Start | None = None
+    steadied: BaseStates | None = None
+
+
+def compare_session(session: Session, config: SimulationConfig | None = None, *, progress: Progress = no_progress,
+                    n_jobs: int = 2) -> Comparison:
+    """Simulates, registers and compares every take. config: of the nominal rollout, its base set by each take.
+
+    A damaged take is left out and named in the result; InputError where none remains. The rollouts of all takes, steps and
+    contact models run over `n_jobs` processes. progress: called with (what, share done or None).
+    """
+    began = time.monotonic()
+    config = config or SimulationConfig()
+    progress("reading recordings", None)
+    takes, unreadable = read_takes(session)
+    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
+    nominal = {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}
+    registered, unregistered = register_takes(session, takes, nominal, progress)
+    by_name = dict(zip(nominal, rollouts))
+    noise = noise_of([t.recorded for t in registered])
+    compared = []
+    for i, t in enumerate(registered):
+        progress(f"comparing {t.spec.name}", i / len(registered))
+        compared.append(_compared(t, by_name[t.spec.name], noise))
+    return Comparison(tuple(compared), unreadable + unregistered, provenance(session.model, config, time.monotonic() - began))
+
+
+def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progress = no_progress, n_jobs: int = 2,
+             floors: bool = True) -> list[Rollouts]:
+    """Simulates each run; with `floors` also at finer steps and, where the robot stands on the ground, with the other contact."""
+    jobs: list[tuple[int, str, Job]] = []
+    for i, run in enumerate(runs):
+        own = replace(config, base=run.base)
+        variants = {"nominal": [own], "finer": [], "other_contact": []}
+        if floors and own.time_step > 0:
+            # what is written down stays on the same times
+            variants["finer"] = [replace(own, time_step=own.time_step / k, log_period=own.logged_every) for k in (2, 4)]
+        if floors and run.base == "free":
+            variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
+        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name, start=run.start,
+                          steadied=run.steadied))
+                 for kind, configs in variants.items() for c in configs]
+    jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
+    done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
+    out = []
+    for i in range(len(runs)):
+        mine: dict[str, list[Take]] = {"nominal": [], "finer": [], "other_contact": []}
+        for (of, kind, _), take in zip(jobs, done):
+            if of == i:
+                mine[kind].append(take)
+        out.append(Rollouts(mine["nominal"][0], tuple(mine["finer"]), tuple(mine["other_contact"])))
+    return out
+
+
+def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:
+    """What made a result."""
+    from dataclasses import asdict
+    from importlib.metadata import version
+
+    return {"workbench": version("drake-workbench"), "drake": version("drake"), "model_sha256": model.sha256,
+            "config": asdict(config), "seconds": round(seconds, 1)}
+
+
+def _cost(job: Job) -> float:
+    """Steps to take; a surface contact costs about twice a point contact."""
+    steps = (job.duration or 0.0) / (job.config.time_step or 1e-4)
+    return steps * (2 if job.config.contact == "hydroelastic" else 1)
+
+
+def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
+    return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
+
+
+def _compared(t: RegisteredTake, rollouts: Rollouts, noise: Noise) -> TakeComparison:
+    compared = compare_takes(
+        t.recorded, t.observed(rollouts.nominal), t.model, finer=[t.observed(r) for r in rollouts.finer],
+        other_contact=[t.observed(r) for r in rollouts.other_contact], noise=noise)
+    return replace(compared, starts_at_sigma=t.measurement.starts_at_sigma)

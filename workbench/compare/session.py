@@ -1,0 +1,176 @@
+"""The session file: one robot, one day of recordings (contract, section 1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+from workbench.motion import load_motion
+from workbench.motion.commands import Commands
+from workbench.recording.formats.read import recording_of_take
+from workbench.robot import InputError, RobotModel
+from workbench.robot.robot_section import read_model
+from workbench.robot.yaml_file import Fields, read_yaml
+
+Base = Literal["free", "fixed"]
+
+
+@dataclass(frozen=True)
+class TakeSpec:
+    """One take of a session: what was commanded, what was recorded.
+
+    motion: pose table, played `cycles` times; None where the recording carries its own commands. starts_at: recording
+    time of the first command [s]; None: estimate it. servos: constants that differ in this take. use: "fit", "validate"
+    or None.
+    """
+
+    name: str
+    recording: Path
+    motion: Path | None = None
+    cycles: int = 1
+    base: Base = "free"
+    starts_at: float | None = None
+    servos: Mapping[str, float] = field(default_factory=dict)
+    use: Literal["fit", "validate"] | None = None
+
+    def commands(self, model: RobotModel) -> Commands | None:
+        """What went out on the bus; None where only the recording knows."""
+        return None if self.motion is None else load_motion(self.motion, model).commands(self.cycles)
+
+
+@dataclass(frozen=True)
+class PredictSpec:
+    """To foretell: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+
+    name: str
+    motion: Path | None = None
+    cycles: int = 1
+    commands: Path | None = None
+    start: Path | None = None
+    starts_at: float | None = None
+    frames: int | None = None
+    base: Base = "free"
+    servos: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Session:
+    """One robot, one day of recordings. model: the nominal robot. All files named exist; all names fit the model."""
+
+    path: Path
+    model: RobotModel
+    takes: tuple[TakeSpec, ...] = ()
+    predict: tuple[PredictSpec, ...] = ()
+
+    def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
+        """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
+        return (model or self.model).with_servos(take.servos)
+
+    def with_model(self, model: RobotModel) -> Session:
+        """The same recordings beside another model of the robot; InputError where that is another robot."""
+        if model.joints != self.model.joints or model.kinematics.links != self.model.kinematics.links:
+            raise InputError(model.description, f"expected the links and joints of the robot in {self.path}")
+        return replace(self, model=model)
+
+
+def load_session(path: str | Path) -> Session:
+    """Reads `session.yaml`, or of a folder the one in it.
+
+    InputError names the file, the key and what was expected: an unknown key anywhere, a missing file, a wrong type, a
+    joint or link that the model lacks, a base that cannot float where a take says free, a motion that cannot be played.
+    """
+    path = Path(path)
+    if path.is_dir():
+        if not (path / "session.yaml").exists():
+            raise InputError(path, "expected a session file; this folder holds no session.yaml")
+        path /= "session.yaml"
+    top = Fields(path, read_yaml(path))
+    if top.raw("format") != 1:
+        raise top.error("format", "expected 1")
+    model = read_model(top)
+    takes = tuple(_take(f, model) for f in top.sequence("takes"))
+    predict = tuple(_predict(f, model) for f in top.sequence("predict"))
+    top.done()
+    for key, entries in (("takes", takes), ("predict", predict)):
+        names = [e.name for e in entries]
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
+    if not takes and not predict:
+        raise top.error("takes", "expected at least one take")
+    return Session(path, model, takes, predict)
+
+
+def _take(f: Fields, model: RobotModel) -> TakeSpec:
+    name = _entry_name(f)
+    use = f.text("use", choices=("fit", "validate"))
+    take = TakeSpec(
+        name=name, recording=_recording(f, name), motion=f.file("motion"),
+        cycles=f.whole("cycles", 1, least=1) or 1, base=_base(f, model), starts_at=f.number("starts_at", least=0),
+        servos=_changes(f, model), use=use,  # type: ignore[arg-type]
+    )
+    f.done()
+    take.commands(model)  # a motion that the robot cannot play is the session's error, not a damaged take
+    return take
+
+
+def _recording(f: Fields, take: str) -> Path:
+    written = f.required("recording", f.text("recording"))
+    try:
+        return recording_of_take(f.path.parent / written, take)
+    except InputError as e:
+        raise f.error("recording", e.problem) from None
+
+
+def _predict(f: Fields, model: RobotModel) -> PredictSpec:
+    spec = PredictSpec(
+        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1) or 1,
+        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0),
+        frames=f.whole("frames", least=1),
+        base=_base(f, model), servos=_changes(f, model),
+    )
+    f.done()
+    if (spec.motion is None) == (spec.commands is None):
+        raise f.error("motion", "expected either motion (with start, starts_at, frames) or commands")
+    if spec.motion is not None:
+        for key in ("start", "starts_at", "frames"):
+            f.required(key, getattr(spec, key))
+        load_motion(spec.motion, model)
+    return spec
+
+
+def _entry_name(f: Fields) -> str:
+    name = str(f.required("name", f.text("name")))
+    if name != Path(name).name or name in (".", ".."):
+        raise f.error("name", f"expected a name that can be a file's, got '{name}'")
+    return name
+
+
+def _base(f: Fields, model: RobotModel) -> Base:
+    """free or fixed; where the take does not say: free, unless the SDF itself holds the robot."""
+    said = f.text("base", choices=("free", "fixed"))
+    base: Base = "fixed" if said == "fixed" or (said is None and model.kinematics.fixed_to_world) else "free"
+    try:
+        model.check_base(floating=base == "free")
+    except InputError as e:
+        raise f.error("base", f"'{base}', but {e.problem} ({model.description})") from None
+    return base
+
+
+def _changes(f: Fields, model: RobotModel) -> dict[str, float]:
+    given = f.mapping("servos")
+    if given is None:
+        return {}
+    changes: dict[str, float] = {}
+    for key, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise given.error(key, f"expected a number, got {value!r}")
+        changes[key] = float(value)
+    try:
+        model.with_servos(changes)
+    except ValueError as e:
+        raise f.error("servos", str(e)) from None
+    return changes

@@ -1,0 +1,148 @@
+"""A session's recordings, read and brought into the model's frame and clock; damaged takes are named and left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from workbench.compare.comparison import aligned
+from workbench.compare.session import Session, TakeSpec
+from workbench.effects.apply import seen
+from workbench.motion.commands import Commands
+from workbench.recording.formats.read import read_recording
+from workbench.recording.log_state import first_command, state_at
+from workbench.recording.mocap.observe import observe
+from workbench.recording.mocap.registration import register
+from workbench.recording.mocap.tracks import check_assets
+from workbench.recording.mocap.yaw import session_yaw
+from workbench.recording.recording import Measurement, Recording
+from workbench.recording.take import Take
+from workbench.recording.take_from import named_by_model, take_from_recording
+from workbench.robot import InputError, RobotModel
+from workbench.simulation import Start
+
+Progress = Callable[[str, float | None], None]
+LeftOut = tuple[tuple[str, str], ...]
+
+
+def no_progress(what: str, done: float | None = None) -> None:
+    """Says nothing."""
+
+
+@dataclass(frozen=True)
+class ReadTake:
+    """A take as it stands in its file, with the robot as it was then and what went out on the bus."""
+
+    spec: TakeSpec
+    model: RobotModel
+    recording: Recording
+    commands: Commands | None
+
+    @property
+    def duration(self) -> float:
+        """Time from the first command to the recording's end, if it began with the recording [s]."""
+        logged = self.recording.kind != "motive"
+        begin = first_command(self.recording, self.spec.starts_at) if logged else self.spec.starts_at or 0.0
+        return float(self.recording.time[-1] - begin)
+
+    def start_state(self) -> Start | None:
+        """What the joints did at the first command, where a rollout cannot begin at rest in neutral: of a log of a held robot, as
+        its servos told it. None for captured takes, for a robot on the ground, and for a log that begins at rest in neutral to
+        within its resolution."""
+        if self.recording.kind == "motive" or self.spec.base != "fixed":
+            return None
+        state = state_at(self.recording, self.model.joints, first_command(self.recording, self.spec.starts_at))
+        return None if state is None else Start(*state, logged=True)
+
+
+@dataclass(frozen=True)
+class RegisteredTake(ReadTake):
+    """A take in the model's frame. recorded: zeroed at rest as seen; measurement: how a rollout is looked at in the same way."""
+
+    measurement: Measurement
+    recorded: Take
+
+    def observed(self, rollout: Take, model: RobotModel | None = None) -> Take:
+        """A rollout of this take as the recording would show it: on its clock, zeroed in the same way (a log is not).
+
+        model: the robot that was simulated, where its effects are not this take's: some change what cameras see."""
+        if not self.recorded.zeroed:
+            return aligned(rollout.as_logged(), self.recorded)
+        model = model or self.model
+        return observe(rollout, seen(self.measurement, model), model, self.recorded.time)[0]
+
+
+def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
+    """All recordings of a session, and those left out with the reason. InputError where none remains, or where a recording has
+    an asset to which the session gives no link: that is the session's error, not a damaged take."""
+    read: list[ReadTake] = []
+    left: list[tuple[str, str]] = []
+    for spec in session.takes:
+        model = session.model_of(spec)
+        try:
+            recording = readable(spec.recording, model)
+        except InputError as e:
+            left.append((spec.name, str(e)))
+            continue
+        if recording.rigid_bodies:
+            check_assets(recording, model)
+        commands = spec.commands(model) or recording.commands
+        if commands is None:
+            raise InputError(session.path, f"take '{spec.name}': motion: is missing, and the recording has no commands")
+        read.append(ReadTake(spec, model, recording, commands))
+    return read, remaining(session, read, tuple(left))
+
+
+def readable(path: Path, model: RobotModel) -> Recording:
+    """A recording that can be compared: InputError where it cannot be read, or has neither rigid bodies nor joints."""
+    recording = read_recording(path)
+    if recording.channels:
+        return named_by_model(recording, model)
+    if not recording.rigid_bodies:
+        found = f"{len(recording.markers)} markers" if recording.markers else "nothing"
+        raise InputError(path, f"expected rigid bodies or joint channels, found {found}")
+    return recording
+
+
+def remaining(session: Session, takes: Sequence[ReadTake], left_out: LeftOut) -> LeftOut:
+    """`left_out`; InputError where no take is left."""
+    if takes:
+        return left_out
+    if not left_out:
+        raise InputError(session.path, "takes: expected at least one")
+    raise InputError(session.path, "no take can be used: " + "; ".join(f"{name}: {why}" for name, why in left_out))
+
+
+def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mapping[str, Take],
+                   progress: Progress = no_progress) -> tuple[list[RegisteredTake], LeftOut]:
+    """Registers each take against its rollout (by the take's name), with one yaw for all of them."""
+    yaw = capture_yaw(session, takes)
+    registered: list[RegisteredTake] = []
+    left: list[tuple[str, str]] = []
+    for i, t in enumerate(takes):
+        progress(f"registering {t.spec.name}", i / len(takes))
+        try:
+            registered.append(register_take(t, rollouts[t.spec.name], yaw))
+        except InputError as e:
+            left.append((t.spec.name, str(e)))
+    return registered, remaining(session, registered, tuple(left))
+
+
+def capture_yaw(session: Session, takes: Sequence[ReadTake]) -> float | None:
+    """One yaw [rad] for all takes that cameras saw; None without any."""
+    captured = [t for t in takes if t.recording.rigid_bodies]
+    if not captured:
+        return None
+    try:
+        return session_yaw([t.recording for t in captured], session.model, [t.commands for t in captured]).yaw
+    except InputError as e:
+        raise InputError(e.source or session.path, e.problem) from None
+
+
+def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:
+    """Registers one take against what a simulation (or another recording) says. InputError where it cannot be."""
+    spec, model, recording, commands = take.spec, take.model, take.recording, take.commands
+    measurement = register(recording, model, commands, predicted, spec.starts_at, yaw, spec.base)
+    recorded = take_from_recording(recording, measurement, model, name=spec.name, base=spec.base)
+    return RegisteredTake(spec, model, recording, commands, measurement, replace(recorded, commands=commands))

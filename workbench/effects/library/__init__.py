@@ -1,0 +1,1 @@
+"""One file for each effect of the contract, section 7."""

@@ -1,0 +1,221 @@
+"""The next experiment: a motion, within the servos' limits, that tells apart what a session could not.
+
+Pieces of motion that load, reverse, jerk or hold what the rivals speak of are rolled out with both. A piece counts by what is
+left of the difference between the two, over sigma, once the better imitator has moved its own numbers to come as near as it
+can: where a somewhat softer spring imitates a flatter servo law, nothing is left. Pieces are then put together, greedily, so
+that what imitates in one gives itself away in the next; the motion that comes of it is rolled out as a whole and each rival
+fitted to the other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.registry import effect_named
+from workbench.experiment.limits import Reach
+from workbench.experiment.moves import JointMoves, long_runs
+from workbench.experiment.projection import Shown, Sight, channels, fitted_to_each_other, reshown, seen, shown
+from workbench.experiment.rivals import Pair
+from workbench.experiment.runs import TIME_STEP, Progress, Runs, spans
+from workbench.experiment.segment import Segment
+from workbench.experiment.stance import BodyMoves
+from workbench.identify.findings import NextExperiment
+from workbench.motion import Motion
+from workbench.recording.take import Take
+from workbench.robot import FEET, RobotModel
+
+__all__ = ["Experiment", "Separation", "Sight", "design_experiment"]
+
+Array = NDArray[np.float64]
+Base = Literal["free", "fixed"]
+LONGEST = 12.0
+"""Of the motion [s]."""
+SEPARATED = 5.0
+"""Log-likelihood ratio from which on names count as separated: odds of 150 to 1."""
+WORTH = 0.2
+"""How much another piece has to bring, in the logarithm of the log-likelihood ratio, summed over pairs."""
+KEPT = 4
+"""Pieces, of those tried, on which sensitivities are found."""
+
+
+@dataclass(frozen=True)
+class Separation:
+    """How far a motion keeps two rivals apart after each was fitted to the other, the better imitator counting.
+
+    effects: the names of the two. where: the channel (joint, or of the body) that shows it best; in_sigma: RMS difference there,
+    over sigma. log_likelihood_ratio: expected, of the true one over the other; frames that err alike count as one.
+    """
+
+    effects: tuple[str, str]
+    where: str
+    in_sigma: float
+    log_likelihood_ratio: float
+
+    @property
+    def separated(self) -> bool:
+        return self.log_likelihood_ratio >= SEPARATED
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """A motion to record next, on a base free or fixed; separations: of the pairs asked for, in their order."""
+
+    motion: Motion
+    base: Base
+    separations: tuple[Separation, ...]
+
+    def entry(self, file: str = "next_experiment.csv") -> NextExperiment | None:
+        """For findings.json; None where nothing would be separated."""
+        told = [s for s in self.separations if s.separated]
+        return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
+                              ) if told else None
+
+
+def no_progress(what: str, done: float | None = None) -> None:
+    """Says nothing."""
+
+
+def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]], sights: Mapping[Base, Sight],
+                      n_jobs: int = 2, progress: Progress = no_progress) -> Experiment:
+    """The motion that best separates rivals.
+
+    nominal: the robot without effects. rivals: pairs of fitted models (nominal and effects) that a session cannot tell apart, the
+    most urgent first; effects that only one of a pair has may adapt their numbers. sights: how the next recording will see the
+    robot on each base that is allowed. ValueError without rivals or bases. The same call gives the same motion.
+    """
+    if not rivals or not sights:
+        raise ValueError("expected at least one pair of rivals, and one base")
+    pairs = [Pair.of(a, b) for a, b in rivals]
+    best: Experiment | None = None
+    for base in sorted(sights, key=lambda b: b != _better_base(pairs[0], nominal)):
+        experiment = _Bench(nominal, base, sights[base], n_jobs, progress).design(pairs)
+        if best is None or _worth(experiment.separations) > _worth(best.separations):
+            best = experiment
+        if all(s.separated for s in best.separations):
+            break
+    assert best is not None
+    return best
+
+
+def _worth(separations: Iterable[Separation]) -> float:
+    return sum(math.log1p(s.log_likelihood_ratio) for s in separations)
+
+
+def _better_base(pair: Pair, nominal: RobotModel) -> Base:
+    """The ground, and what the base itself carries, show on a free base alone; what acts in a joint shows best on a held one."""
+    ground = any(effect_named(e.effect).layer == "ground" for e in pair.effects)
+    carried = any(w in (nominal.base, *_trunk(nominal)) for e in pair.effects for w in e.where)
+    return "free" if ground or carried else "fixed"
+
+
+def _trunk(model: RobotModel) -> list[str]:
+    """Links that carry feet's legs: those from which the legs' last three joints hang."""
+    k = model.kinematics
+    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints] for f in FEET if f in k.frames]
+    return [k.frames[leg[-3]].parent for leg in legs if len(leg) >= 3]
+
+
+def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
+    """The joints that a pair speaks of: its own; the joint that carries its link; else thighs and knees, or all of them."""
+    k = model.kinematics
+    named = [w if w in model.joints else k.parent_joint.get(w) for e in pair.effects for w in e.where]
+    joints = tuple(dict.fromkeys(j for j in named if j in model.joints))
+    if joints:
+        return joints
+    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints][-2:] for f in FEET if f in model.joints]
+    return tuple(j for leg in legs for j in leg) or model.joints
+
+
+class _Bench:
+    """Tries pieces on one base, puts them together and proves the whole."""
+
+    def __init__(self, nominal: RobotModel, base: Base, sight: Sight, n_jobs: int, progress: Progress) -> None:
+        self.nominal, self.base, self.sight, self.progress = nominal, base, sight, progress
+        self.reach = Reach(nominal)
+        self.runs = Runs(self.reach, base, sight, n_jobs, progress)
+
+    def design(self, pairs: Sequence[Pair]) -> Experiment:
+        """The best motion."""
+        pieces: dict[str, Segment] = {}
+        tried: list[dict[str, Shown]] = []
+        for i, pair in enumerate(pairs):
+            library = self._library(pair)
+            pieces |= {s.name: s for s in library}
+            tried.append(self._tried(pair, library, f"trying motions, {i + 1} of {len(pairs)}"))
+        chosen = [pieces[name] for name in _chosen(pieces, tried)]
+        if not chosen:
+            still = Segment("rest", self.base, np.array([0.0, 1.0]), np.zeros((2, len(self.nominal.joints))))
+            return Experiment(self.runs.motion([still]), self.base, tuple(Separation(p.names, "", 0.0, 0.0) for p in pairs))
+        separations = tuple(self._proved(p, chosen, shows) for p, shows in zip(pairs, tried))
+        return Experiment(self.runs.motion(chosen), self.base, separations)
+
+    def _library(self, pair: Pair) -> list[Segment]:
+        if self.base == "free":
+            return BodyMoves(self.nominal, self.reach).segments()
+        focus = _focus(pair, self.nominal)
+        pieces = JointMoves(self.nominal, self.reach, focus).segments()
+        lasting = any(not e.where for e in pair.effects)
+        return pieces + (long_runs(self.nominal, self.reach, focus, LONGEST) if lasting else [])
+
+    def _tried(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, Shown]:
+        """What pieces show of a pair, by name: both on all of them, their neighbours on those where they differ most."""
+        takes = self.runs.played(pair.models, [[s] for s in library], what)
+        rough = {s.name: (s, of, shown(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
+        best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:KEPT]
+        if not best:
+            return {}
+        kept = [[s] for s, *_ in best]
+        beside = self.runs.played(pair.neighbours, kept, what) if pair.neighbours else [[] for _ in kept]
+        finer: list[Take | None] = [None for _ in kept]
+        if self.base == "free":  # a robot on its feet multiplies small errors; a held one hardly does
+            finer = [fine for fine, in self.runs.played(pair.models[:1], kept, what, TIME_STEP / 2)]
+        return {s.name: shown(pair, [*of, *more], self.sight, fine)
+                for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}
+
+    def _proved(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, Shown]) -> Separation:
+        """What is left between two rivals on the whole motion, each fitted to the other by rollouts."""
+        named = [s.name for s in chosen if s.name in tried]
+        if not named:
+            return Separation(pair.names, "", 0.0, 0.0)
+        frames = np.concatenate([np.r_[span] for name, span in spans(chosen, self.sight.rate).items() if name in named])
+
+        def play(models: Sequence[RobotModel]) -> list[Array]:
+            said = f"fitting {pair.names[0]} and {pair.names[1]} to each other"
+            return [seen(take, self.sight)[frames].ravel() for take in self.runs.played(models, [chosen], said)[0]]
+
+        known = Shown.joined([tried[name] for name in named])
+        a, b = play(pair.models)
+        known = reshown(reshown(known, a, "a"), b, "b")
+        nearest = min(fitted_to_each_other(pair, known, play), key=lambda c: c.cost)
+        rms = known.rms(nearest.left)
+        where = channels(self.sight, self.base)[int(np.argmax(rms))]
+        return Separation(pair.names, where, float(rms.max()), nearest.cost / 2)
+
+
+def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]]) -> list[str]:
+    """Which pieces to play, one after the other; tried: what they show of each pair."""
+
+    def value(names: Sequence[str]) -> float:
+        shows = [[of[name] for name in names if name in of] for of in tried]
+        return sum(math.log1p(Shown.joined(s).chi_squared() / 2) for s in shows if s)
+
+    def fits(names: Sequence[str]) -> bool:
+        alone = any(pieces[name].long for name in names)
+        return sum(pieces[name].duration for name in names) <= LONGEST and not (alone and len(names) > 1)
+
+    useful = [name for name in pieces if any(name in of for of in tried)]
+    chosen: list[str] = []
+    had = 0.0
+    while True:
+        options = [[*chosen, name] for name in useful if name not in chosen and fits([*chosen, name])]
+        values = [value(o) for o in options]
+        if not values or max(values) <= had + WORTH:
+            return chosen
+        had = max(values)
+        chosen = options[values.index(had)]

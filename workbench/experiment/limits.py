@@ -1,0 +1,119 @@
+"""What a robot may be asked to do: joint ranges, speeds, and links that stay clear of each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.experiment.segment import Segment
+from workbench.motion import Motion
+from workbench.robot import InputError, RobotModel
+
+Array = NDArray[np.float64]
+WIDEST = math.radians(110)
+"""No joint is sent farther from neutral."""
+MARGIN = math.radians(5)
+"""Kept to a joint's ends, as links overshoot."""
+SPEED_SHARE = 0.9
+"""Of the speed that a servo reaches unloaded against its own friction."""
+CLEAR = 0.02
+"""Distance that links keep from each other [m], where they have it in neutral; else NEARER times what they have there."""
+NEARER = 0.6
+POINTS = 4
+"""On each bone of a link, from its joint to the next ones."""
+
+
+class Reach:
+    """Limits of one robot. speeds: (n,) [rad/s] that each servo can keep, by the model's order of joints."""
+
+    def __init__(self, model: RobotModel) -> None:
+        self.model = model
+        self.speeds = np.array([_reached(model, j) for j in model.joints])
+
+    def within(self, joint: str, angle: float, room: float = 0.0) -> float:
+        """The angle, cut to the joint's range less a margin and `room` [rad]."""
+        low, high = self.range(joint)
+        return float(np.clip(angle, min(low + room, 0.0), max(high - room, 0.0)))
+
+    def range(self, joint: str) -> tuple[float, float]:
+        """Of goals [rad]; neutral is always inside."""
+        frame = self.model.kinematics.frames[joint]
+        lower, upper = (b if math.isfinite(b) else math.copysign(WIDEST, b) for b in (frame.lower, frame.upper))
+        return min(max(lower + MARGIN, -WIDEST), 0.0), max(min(upper - MARGIN, WIDEST), 0.0)
+
+    def allows(self, segment: Segment) -> bool:
+        """Whether registers, ranges and speeds hold what is asked: goals and speeds 0 to 1023, dwells of 1 ms or more."""
+        try:
+            table = Motion(segment.name, segment.times, self.model.joints, segment.angles).as_table()
+        except InputError:
+            return False
+        count = math.radians(300 / 1023)
+        ends = np.array([self.range(j) for j in self.model.joints])
+        asked = np.abs(np.diff(segment.angles, axis=0)) / np.diff(segment.times)[:, None]
+        angles = table.angles()
+        return bool((angles > ends[:, 0] - count).all() and (angles < ends[:, 1] + count).all()
+                    and (asked <= self.speeds * 1.001).all())
+
+    def cleared(self, segment: Segment) -> Segment | None:
+        """The segment, its angles made smaller until links stay clear of each other; None where that takes too much."""
+        for share in (1.0, 0.8, 0.6, 0.4):
+            smaller = replace(segment, angles=segment.angles * share)
+            at = np.arange(0, segment.duration, 0.03)
+            q = np.column_stack([np.interp(at, segment.times, c) for c in smaller.angles.T])
+            if self.clear(q).all() and self.allows(smaller):
+                return smaller
+        return None
+
+    def clear(self, q: Array, share: float = 1.0) -> NDArray[np.bool_]:
+        """Whether in poses (N, n) [rad] links that do not touch in neutral keep this share of their distance (N,)."""
+        k = self.model.kinematics
+        poses = k.forward(q, self.model.joints)
+        at = {link: poses[link][0][:, None] + np.einsum("nij,mj->nmi", poses[link][1], points)
+              for link, points in self._bones.items()}
+        out = np.ones(len(q), dtype=bool)
+        for (a, b), least in self._least.items():
+            out &= _distance(at[a], at[b]) > share * least
+        return out
+
+    @cached_property
+    def _bones(self) -> dict[str, Array]:
+        """Points (M, 3) of each link, in its frame: on lines from its origin to the joints that it carries, or through its
+        centre of mass to as far beyond."""
+        k = self.model.kinematics
+        ends: dict[str, list[Array]] = {link: [] for link in k.links}
+        for f in k.frames.values():
+            ends[f.parent].append(f.X_PF_p)
+        share = np.linspace(0, 1, POINTS)[:, None]
+        return {link: np.vstack([share * e for e in (to or [2 * k.centers[link]])]) for link, to in ends.items()}
+
+    @cached_property
+    def _least(self) -> Mapping[tuple[str, str], float]:
+        k = self.model.kinematics
+        neutral = k.forward(np.zeros((1, len(self.model.joints))), self.model.joints)
+        at = {link: neutral[link][0][:, None] + np.einsum("nij,mj->nmi", neutral[link][1], p) for link, p in self._bones.items()}
+        links = k.links
+        out = {}
+        for i, a in enumerate(links):
+            for b in links[i + 1:]:
+                have = float(_distance(at[a], at[b])[0])
+                if have > 1e-3:  # else one carries the other
+                    out[a, b] = min(CLEAR, NEARER * have)
+        return out
+
+
+def _distance(a: Array, b: Array) -> Array:
+    """Least distance (N,) between points (N, M, 3) and (N, L, 3)."""
+    return np.asarray(np.linalg.norm(a[:, :, None] - b[:, None], axis=-1).min(axis=(1, 2)))
+
+
+def _reached(model: RobotModel, joint: str) -> float:
+    servo = model.servo(joint)
+    surplus = max(servo.torque_at_full_duty - servo.coulomb_friction, 0.0)
+    no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
+    register = 1020 * 114 / 1023 * 2 * math.pi / 60
+    return SPEED_SHARE * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, register)

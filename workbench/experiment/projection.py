@@ -1,0 +1,183 @@
+"""What takes of two rivals show, and how near each could come to the other by moving its own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import BODY, GAIN_SPAN, body_channels
+from workbench.experiment.rivals import Pair, Rival
+from workbench.identify.problem import LEAST_BODY_SIGMA
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+ROUNDS = 2
+"""How often rivals are fitted to each other."""
+SETTLED = 0.99
+"""Of chi squared: a round that leaves more of it has settled."""
+TOGETHER = 0.05
+"""Frames within so many seconds err alike and count as one [s]."""
+ZERO = np.deg2rad(0.3)
+"""How far dry friction lets a joint stand from where it is thought to stand when angles are zeroed [rad]."""
+START = 0.01
+"""How far the first command's time may be off where cameras see the robot [s]."""
+Imitator = Literal["a", "b"]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """How the next recording will see the robot, on one base.
+
+    sigma: joint -> what a frame's angle may err by, noise and numerical floor [rad]; joints not named are not seen.
+    captured: by cameras, which see the links' angles, zeroed at rest, and not the first command's time; else the servos' own log.
+    rate: frames a second.
+    """
+
+    sigma: Mapping[str, float]
+    captured: bool = True
+    rate: float = 120.0
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What takes of a pair's cast show, over sigma, flat, frames that err alike weighed down so that they count as one.
+
+    a, b (m,): of each rival. of_a, of_b (m, p): sensitivities of each to its own numbers; nuisance (m, k): to what any recording
+    leaves open, in units of its standard deviation. channel (m,): index of each entry's channel. weight (m,): by which what is
+    seen over sigma stands in a and b; counts (m,): its part that is owed to frames that err alike, the rest to the floor.
+    """
+
+    a: Array
+    b: Array
+    of_a: Array
+    of_b: Array
+    nuisance: Array
+    channel: NDArray[np.int_]
+    weight: Array
+    counts: Array
+
+    @staticmethod
+    def joined(parts: Sequence[Shown]) -> Shown:
+        """Of takes that follow each other."""
+        return Shown(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(Shown)))
+
+    def chi_squared(self) -> float:
+        """What the better imitator has to pay: for what is left, and for going far from where the session put it."""
+        return min(self.closest("a").cost, self.closest("b").cost)
+
+    def closest(self, imitator: Imitator, x: Array | None = None, moving: bool = True) -> Closest:
+        """How near one comes to the other, now at x (p,), by moving its numbers (unless not `moving`) and all that is open."""
+        S = self.of_a if imitator == "a" else self.of_b
+        D = self.b - self.a if imitator == "a" else self.a - self.b
+        x = np.zeros(S.shape[1]) if x is None else x
+        p = S.shape[1] if moving else 0
+        T = np.hstack([S[:, :p], self.nuisance])
+        pull = np.concatenate([x[:p], np.zeros(self.nuisance.shape[1])])
+        y = np.linalg.solve(T.T @ T + np.eye(T.shape[1]), T.T @ D - pull)
+        at = x.copy()
+        at[:p] += y[:p]
+        left = D - T @ y
+        return Closest(at, left / self.counts, float(left @ left + at @ at + y[p:] @ y[p:]))
+
+    def rms(self, left: Array) -> Array:
+        """RMS of what is left (m,) in each channel, over sigma."""
+        return np.array([np.sqrt(np.mean(np.square(left[self.channel == c]))) for c in range(int(self.channel.max()) + 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Closest:
+    """Numbers x (p,) in units of their freedom; what is left of the difference (m,), over sigma; chi squared of it and of x."""
+
+    x: Array
+    left: Array
+    cost: float
+
+
+def channels(sight: Sight, base: str) -> tuple[str, ...]:
+    """Seen: the joints that have a sigma, and on the ground the body, where cameras see it."""
+    return (*sight.sigma, *(BODY if base == "free" and sight.captured else ()))
+
+
+def seen(take: Take, sight: Sight) -> Array:
+    """Channels (N, c) of a simulated take over their sigma, rests left out."""
+    take = take.zeroed_at_rest() if sight.captured else take.as_logged()
+    q = take.q[:, [take.column(j) for j in sight.sigma]] / np.array(list(sight.sigma.values()))
+    if take.base == "free" and sight.captured:
+        q = np.hstack([q, body_channels(take) / LEAST_BODY_SIGMA])
+    return np.asarray(np.nan_to_num(q[~take.resting]))
+
+
+def shown(pair: Pair, takes: Sequence[Take], sight: Sight, finer: Take | None = None) -> Shown:
+    """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
+    a, b, *others = (seen(t, sight) for t in takes)
+    floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(seen(finer, sight) - a), axis=0))
+    n, c = a.shape
+    p = len(pair.a.steps())
+    counts = _counts(sight, c)
+    weight = counts / np.sqrt(1 + floor**2)
+    of_a = [(o - a) / s for o, s in zip(others[:p], pair.a.steps())]
+    of_b = [(o - b) / s for o, s in zip(others[p:], pair.b.steps())]
+    return Shown((weight * a).ravel(), (weight * b).ravel(), _flat(of_a, weight, n), _flat(of_b, weight, n),
+                 _flat(left_open(a, sight), weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
+
+
+def left_open(y: Array, sight: Sight) -> list[Array]:
+    """What a recording leaves open of channels (N, c) over sigma, each (N, c) by one standard deviation: before cameras, when the
+    first command came, and where each joint stood when its angle was called zero."""
+    if not sight.captured:
+        return []
+    out = [np.gradient(y, axis=0) * sight.rate * START]
+    for i, sigma in enumerate(sight.sigma.values()):
+        column = np.zeros(y.shape)
+        column[:, i] = ZERO / sigma
+        out.append(column)
+    return out
+
+
+def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
+    """The same where the imitator shows y (m,), over sigma."""
+    return replace(known, a=known.weight * y) if imitator == "a" else replace(known, b=known.weight * y)
+
+
+def _counts(sight: Sight, count: int) -> Array:
+    """Of each channel (c,): the root of one over the number of frames that err alike; the body's are gains over a span."""
+    counts = np.full(count, 1 / np.sqrt(max(1.0, TOGETHER * sight.rate)))
+    counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, GAIN_SPAN * sight.rate))
+    return counts
+
+
+def _flat(columns: Sequence[Array], weight: Array, frames: int) -> Array:
+    if not columns:
+        return np.zeros((frames * len(weight), 0))
+    return np.stack([(weight * c).ravel() for c in columns], axis=1)
+
+
+def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[RobotModel]], Sequence[Array]]) -> list[Closest]:
+    """How near each rival comes to the other: Gauss-Newton with the sensitivities that are known, both at once.
+
+    play: what models show over sigma, each (m,) as in `known`.
+    """
+    rivals: dict[Imitator, Rival] = {"a": pair.a, "b": pair.b}
+    best = {i: (known, known.closest(i, moving=False)) for i in rivals}
+    settled = {i for i, r in rivals.items() if not len(r.steps())}
+    for _ in range(ROUNDS):
+        trials = [(i, at.x + share * (here.closest(i, at.x).x - at.x))
+                  for i, (here, at) in best.items() if i not in settled for share in (1.0, 0.4)]
+        if not trials:
+            break
+        ends: dict[Imitator, list[tuple[Shown, Closest]]] = {}
+        for (i, x), y in zip(trials, play([rivals[i].moved(x).model for i, x in trials])):
+            now = reshown(known, y, i)
+            ends.setdefault(i, []).append((now, now.closest(i, x, moving=False)))
+        for i, options in ends.items():
+            nearest = min(options, key=lambda o: o[1].cost)
+            if nearest[1].cost > SETTLED * best[i][1].cost:
+                settled.add(i)
+            if nearest[1].cost < best[i][1].cost:
+                best[i] = nearest
+    return [at for _, at in best.values()]

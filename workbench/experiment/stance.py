@@ -1,0 +1,131 @@
+"""Short motions of a robot that stands on its feet: the body moves, the feet stay where they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from workbench.compare.footfalls import foot_points
+from workbench.experiment.limits import Reach
+from workbench.experiment.moves import Path
+from workbench.experiment.segment import Segment
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+Body = tuple[float, float, float, float, float, float]
+"""Displacement of the base: forward, left, up as shares of the legs' length; roll, pitch, yaw [deg]."""
+CALM, BRISK = math.radians(90), math.radians(200)
+LEG_JOINTS = 3
+MISSED = 0.05
+"""Share of the legs' length by which a foot may miss its place."""
+
+
+class BodyMoves:
+    """Segments for a robot on its feet; none for a robot without feet (of the puppy's names)."""
+
+    def __init__(self, model: RobotModel, reach: Reach) -> None:
+        self.model, self.reach = model, reach
+
+    def segments(self) -> list[Segment]:
+        """All that its legs can do."""
+        if not self._legs:
+            return []
+        return [s for s in map(self.reach.cleared, self._all()) if s is not None]
+
+    def _all(self) -> Iterator[Segment]:
+        low = -0.15
+        down: Body = (0, 0, low, 0, 0, 0)
+        moves: dict[str, tuple[float, Sequence[Body]]] = {
+            "down and up, calm": (CALM, [down, (0, 0, low / 2, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), down]),
+            "down and up, brisk": (BRISK, [down, (0, 0, low / 3, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), (0, 0, low / 3, 0, 0, 0)]),
+            "forward and back": (CALM, [down, (0.14, 0, low, 0, 0, 0), (-0.14, 0, low, 0, 0, 0), (0.07, 0, low, 0, 0, 0)]),
+            "to both sides": (CALM, [down, (0, 0.12, low, 0, 0, 0), (0, -0.12, low, 0, 0, 0), (0, 0.06, low, 0, 0, 0)]),
+            "jerks": (BRISK, [down, (0.1, 0, low, 0, 0, 0), (-0.1, 0, low, 0, 0, 0), (0, 0.09, low, 0, 0, 0),
+                              (0, -0.09, low, 0, 0, 0), down]),
+            "turned about": (CALM, [down, (0, 0, low, 0, 0, 14), (0, 0, low, 0, 0, -14), down]),
+            "tipped": (CALM, [down, (0, 0, low, 0, 10, 0), (0, 0, low, 0, -10, 0), (0, 0, low, 8, 0, 0), (0, 0, low, -8, 0, 0)]),
+        }
+        for name, (speed, bodies) in moves.items():
+            path = Path(self.model.joints, self.reach.speeds)
+            poses = [self._pose(b) for b in bodies]
+            if any(p is None for p in poses):
+                continue
+            for pose in poses:
+                assert pose is not None
+                path.to(pose, speed, least=0.12).hold(0.2)
+            yield path.home(CALM).segment(name, "free")
+        k = self.model.kinematics
+        carrying = {j for foot in self._legs for j in k.chain(k.frames[foot].child)}
+        counterweights = [j for j in self.model.joints if j not in carrying]
+        deep = self._pose(down)
+        if counterweights and deep is not None:
+            path = Path(self.model.joints, self.reach.speeds).to(deep, CALM).hold(0.2)
+            for share in (1, -1, 0.5):
+                path.to({j: self.reach.within(j, share * math.radians(40)) for j in counterweights}, BRISK).hold(0.25)
+            yield path.home(CALM).segment("counterweights", "free")
+
+    @cached_property
+    def _legs(self) -> Mapping[str, tuple[str, ...]]:
+        """Foot -> the last joints of its leg, from the trunk on."""
+        k = self.model.kinematics
+        return {foot: tuple(j for j in k.chain(k.frames[foot].child) if j in self.model.joints)[-LEG_JOINTS:]
+                for foot in foot_points(self.model.path)}
+
+    def _pose(self, body: Body) -> dict[str, float] | None:
+        """Angles of the legs' joints that move the base so, its feet where they stand in neutral; None where they cannot."""
+        k = self.model.kinematics
+        out: dict[str, float] = {}
+        length = self._length
+        R_WB = Rotation.from_euler("ZYX", body[:2:-1], degrees=True).as_matrix()
+        for foot, joints in self._legs.items():
+            goal = R_WB.T @ (self._foot(foot, joints, np.zeros(len(joints))) - length * np.array(body[:3]))
+            ends = np.array([self.reach.range(j) for j in joints])
+            tries = []
+            for bend in (1.0, -1.0):
+                first = np.zeros(len(joints))
+                # knees bend backwards: the shank's joint goes back of the line from hip to foot
+                first[-2:] = bend * np.array([0.4, 0.8 * self._opposed(foot, joints)])
+                tries.append(least_squares(partial(self._missed, foot, joints, goal),
+                                           np.clip(first, ends[:, 0] + 1e-3, ends[:, 1] - 1e-3), bounds=(ends[:, 0], ends[:, 1])))
+            good = [t.x for t in tries if np.linalg.norm(t.fun) < MISSED * length]
+            if not good:
+                return None
+            out |= dict(zip(joints, map(float, min(good, key=partial(self._knee, foot)))))
+        assert set(out) <= set(k.joints)
+        return out
+
+    def _opposed(self, foot: str, joints: tuple[str, ...]) -> float:
+        """-1 where hip and knee turn about the same axis, so that one has to go back as the other goes on; else 1."""
+        k = self.model.kinematics
+        poses = k.forward(np.zeros((1, len(k.joints))))
+        hip, knee = (poses[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent for j in joints[-2:])
+        return -1.0 if float(hip @ knee) > 0 else 1.0
+
+    def _missed(self, foot: str, joints: tuple[str, ...], goal: Array, x: Array) -> Array:
+        """From its goal to the foot (3,) [m]."""
+        return self._foot(foot, joints, x) - goal
+
+    def _foot(self, foot: str, joints: tuple[str, ...], x: Array) -> Array:
+        """Middle of the foot's points (3,) [m] in the root link's frame."""
+        k = self.model.kinematics
+        p, R = k.forward(x[None], joints)[k.frames[foot].child]
+        return np.asarray(p[0] + R[0] @ foot_points(self.model.path)[foot][0].mean(axis=0))
+
+    def _knee(self, foot: str, x: Array) -> float:
+        """How far forward the knee is [m]."""
+        k = self.model.kinematics
+        return float(k.forward(x[None], self._legs[foot])[k.frames[foot].child][0][0, 0])
+
+    @cached_property
+    def _length(self) -> float:
+        """Of a leg, from the joint of its thigh to its foot [m]."""
+        k = self.model.kinematics
+        foot, joints = next(iter(self._legs.items()))
+        hip = k.forward(np.zeros((1, 1)), joints[:1])[k.frames[joints[-2]].child][0][0]
+        return float(np.linalg.norm(self._foot(foot, joints, np.zeros(len(joints))) - hip))

@@ -1,1 +1,0 @@
-"""Session in, findings out: what the model lacks that the recording shows."""

@@ -1,0 +1,210 @@
+"""From a fit to findings: numbers with intervals, rivals, what is left over, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import ACROSS, BODY, joint_of
+from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
+from workbench.identify.fitting.covariance import WIDER, Z90
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.ledger import GAP_RATIO, in_file_units
+from workbench.identify.parameters import Candidate
+from workbench.identify.point_mass import PointMass
+from workbench.identify.problem import LOOP, TakeEvidence, joint_error, ratios
+from workbench.identify.selection.model_comparison import Rival, Standing
+from workbench.identify.selection.record import Round
+from workbench.robot import EffectSpec
+from workbench.robot.model_file import Posterior, parameter_names
+
+Array = NDArray[np.float64]
+Residuals = Mapping[int, Array]
+LEAST_RELATIVE = 0.005
+"""Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
+LEAST_OF = {"command_delay": LOOP / np.sqrt(3.0)}
+"""The same in the contract's unit: every model may set out by LOOP sooner or later, so that no delay is known better [s]."""
+SAME_ELSEWHERE = 0.1
+"""Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
+
+
+class ReadOff(Protocol):
+    """An effect of one number that was read off the recordings: its mean and variance, in the contract's unit."""
+
+    @property
+    def spec(self) -> EffectSpec: ...
+    @property
+    def mean(self) -> float: ...
+    @property
+    def variance(self) -> float: ...
+
+
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
+    """The contract's word; what has a name that is less likely than not is not explained by it."""
+    if not gap:
+        return "no_gap"
+    if not findings:
+        return "unexplained"
+    return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
+
+
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals
+            ) -> Finding:
+    """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
+    the nominal and the fitted model."""
+    c, x = fit.sizes()[i]
+    elsewhere = _elsewhere(c, standing)
+    where = (*c.where, *(place for r in elsewhere for place in r.candidate.where))
+    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
+                         if r not in elsewhere and r.probability >= 0.01)[:1]
+    own = fit.slices()[i]
+    numbers = estimates(c, x, WIDER**2 * fit.covariance[own, own])
+    return Finding(
+        effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
+        alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
+        validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
+
+
+def _elsewhere(c: Candidate, standing: Standing) -> list[Rival]:
+    """The same effect where the data cannot tell it from this place."""
+    return [r for r in standing.rivals if r.candidate.name == c.name and r.probability >= SAME_ELSEWHERE * standing.probability]
+
+
+def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
+    """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
+    half = Z90 * np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore"):
+        ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
+    values = np.array(c.values(x))
+    unknown = np.ones(len(values), dtype=bool)
+    if isinstance(c, PointMass):  # where it is says a moment over a mass: both err, together
+        slopes, known = _slopes(c, x), np.isfinite(half)
+        spread = Z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
+        ends = np.array([values - spread, values + spread])
+        unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
+    else:
+        unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
+    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), LEAST_OF.get(c.name, 0.0))
+    low, high = np.minimum(low, values - least), np.maximum(high, values + least)
+    low[unknown], high[unknown] = -np.inf, np.inf
+    out: dict[str, Estimate] = {}
+    at = 0
+    for p in c.effect.parameters:
+        if p.vector:
+            three = [tuple(float(v) for v in column[at:at + 3]) for column in (values, low, high)]
+            out[p.name] = Estimate(three[0], three[1], three[2], p.unit)  # type: ignore[arg-type]
+        else:
+            out[p.name] = Estimate(float(values[at]), float(low[at]), float(high[at]), p.unit)
+        at += 3 if p.vector else 1
+    return out
+
+
+def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Residuals, after: Residuals, use: str) -> Change:
+    """RMS error [deg] of the joints concerned (all of them for a robot, foot or link), before and after."""
+    all_joints = list(evidence[0].joints)
+    joints = [c for c in all_joints if c in where] or all_joints
+    return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
+
+
+def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
+             ) -> tuple[Rejected, ...]:
+    """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
+    unseen = any(e.uses["validate"].any() for e in evidence)
+    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, standings) for r in _elsewhere(c, s)}
+    out: dict[object, Rejected] = {}
+    for c, standing in zip(fit.effects, standings):
+        for rival in standing.rivals:
+            if rival.candidate.key not in kept and rival.fit is not None:
+                more = f"{rival.behind:.0f} more" if rival.behind >= 0 else f"only {-rival.behind:.0f} less"
+                reason = f"in place of {c} it leaves {more} of chi squared on stretches that no fit saw"
+                left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
+                out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where, reason, left)
+    for r in rounds:
+        for t in r.trials:
+            key = t.candidate.key
+            if key in kept or key in out:
+                continue
+            best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
+            if t.foretold:
+                reason = "its signature is not that of what is missing"
+            elif best is None:
+                reason = "what it takes away is no more than chance, or too little of what is missing there"
+            else:
+                reason = f"{best.candidate} takes {best.gain['choose']:.0f} off chi squared on the choosing stretches, this " \
+                         f"{t.gain['choose']:.0f}"
+            out[key] = Rejected(t.candidate.name, t.candidate.where, reason)
+    return tuple(out.values())
+
+
+def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+    """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on.
+
+    residuals: of takes that are judged. floors: by take, numerical floor (c,) over sigma of the fitted model, which may be
+    rougher than the nominal one's."""
+    out = []
+    for i in sorted(residuals):
+        e = evidence[i]
+        for c, r in ratios(e, residuals[i], "validate").items():
+            column = e.channels.index(c)
+            wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0
+            if not r > GAP_RATIO * wider:
+                continue
+            sigma, unit = in_file_units(float(e.sigma[column]), c)
+            out.append(Unexplained(() if c in BODY else (joint_of(c),), r * sigma, wider * sigma, unit,
+                                   f"{e.name}: {_depends(e, residuals[i][:, column], c)}"))
+    return tuple(out)
+
+
+def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
+    """What a residual goes with: its joint's angle, speed, acceleration (load), direction, or time."""
+    what = f"{channel}, " if channel in BODY else f"across its axis ({channel}), " if ACROSS in channel else ""
+    signals = {"time": e.take.recorded.time}
+    if channel not in BODY:
+        q = e.take.recorded.q[:, e.take.recorded.column(joint_of(channel))]
+        v = np.gradient(q, e.take.recorded.time)
+        signals |= {"angle": q, "size of the angle": np.abs(q), "speed": v, "direction of motion": np.sign(v) * (np.abs(v) > 0.2)}
+    found = {}
+    for name, s in signals.items():
+        good = np.isfinite(residual) & np.isfinite(s)
+        if good.sum() > 20 and np.std(s[good]) > 0 and np.std(residual[good]) > 0:
+            found[name] = abs(float(np.corrcoef(residual[good], s[good])[0, 1]))
+    best = max(found, key=lambda k: found[k]) if found else ""
+    told = best and found[best] > 0.3
+    return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
+
+
+def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
+    """Of all numbers in the contract's units; variances by the local slope between a size and its value. read_off: effects of one
+    number that no fit told."""
+    if not fit.effects and not read_off:
+        return Posterior()
+    names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))
+    mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
+    slopes = np.zeros((len(mean), len(fit.x)))
+    for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
+        slopes[row:row + len(c.neutral), s] = _slopes(c, fit.x[s])
+    known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
+    inner = WIDER**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
+    covariance = slopes @ inner @ slopes.T
+    lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
+    covariance[lost] = covariance[:, lost] = np.inf
+    for r in read_off:
+        names += list(parameter_names([r.spec]))
+        mean = np.append(mean, r.mean)
+        wider = np.zeros((len(mean), len(mean)))
+        wider[:-1, :-1] = covariance
+        wider[-1, -1] = r.variance
+        covariance = wider
+    return Posterior(tuple(names), mean, covariance)
+
+
+def _slopes(c: Candidate, x: Array) -> Array:
+    """Of a candidate's values with respect to its sizes."""
+    steps = 1e-4 * np.eye(c.size)
+    columns = [(np.array(c.values(x + h)) - np.array(c.values(x - h))) / 2e-4 for h in steps]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(c.neutral), 0))

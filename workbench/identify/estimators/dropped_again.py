@@ -1,0 +1,55 @@
+"""What is looked at anew once held takes have told what the robot is: which poses a servo never got, as the nominal robot may
+have said so of what went otherwise for other reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from workbench.identify.estimators.dropped_commands import Missed, with_missed
+from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.parameters import with_effects
+from workbench.identify.problem import TakeEvidence
+from workbench.identify.rollouts import Jury, Question
+from workbench.identify.selection.record import Round
+
+STEPS = 4
+"""Of a fit to takes that are played otherwise."""
+
+
+@dataclass(frozen=True)
+class Played:
+    """sent: takes with all poses that went out; missed: what was taken for missed, and left out of what is played."""
+
+    sent: Jury
+    missed: tuple[Missed, ...] = ()
+
+
+def played_anew(search: Search, current: Fit, rounds: list[Round], played: Played) -> tuple[Fit, Played]:
+    """What was found with the base held, fitted to takes that are played without what servos missed as it tells that; `rounds`
+    as these takes judge them."""
+    jury = search.jury
+    played = read_anew(search, current, played)
+    if search.jury is not jury:
+        rounds[:] = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
+        current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, STEPS)
+    return current, played
+
+
+def read_anew(search: Search, current: Fit, played: Played) -> Played:
+    """Missed poses as the robot with these effects tells them; the search's takes are played without these instead."""
+    model, sent = with_effects(search.nominal, current.sizes()), played.sent
+    residuals = sent.residuals([Question(model, tuple(range(len(sent.evidence))))])[0]
+    jury, missed = with_missed(sent, model, residuals)
+    if _poses(missed) != _poses(played.missed):
+        search.jury = search.jury.on(played_as(search.jury.evidence, jury.evidence))
+    return replace(played, missed=missed)
+
+
+def played_as(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:
+    """Takes played as others are, which are the same takes."""
+    return [replace(e, take=o.take) for e, o in zip(evidence, others)]
+
+
+def _poses(missed: Sequence[Missed]) -> Mapping[str, Mapping[int, tuple[int, ...]]]:
+    return {m.joint: m.poses for m in missed}

@@ -1,0 +1,178 @@
+"""Poses that a servo never got: read off each take, as which ones are missed is chance and no search finds chance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from workbench.effects.registry import known_effects
+from workbench.identify.estimators.dropped_in_motion import LEAST_STEP, TURNS, end_of, passed_over, played_without, steps
+from workbench.identify.estimators.stops_and_mounts import AT_STOP
+from workbench.identify.findings import Change, Estimate, Finding
+from workbench.identify.problem import TakeEvidence, joint_error
+from workbench.identify.rollouts import Jury, Question
+from workbench.robot import EffectSpec, RobotModel
+
+Array = NDArray[np.float64]
+MOST = 0.6
+"""Share of poses that may be missed: of more, something else is the matter."""
+STAYED, WENT = 0.3, 0.5
+"""Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
+has gone at least the second."""
+LEAST_CLOSED, SURELY = 0.5, 0.8
+"""Share of a joint's gap that the poses taken for missed must explain; the second where none was missed with the base held: on
+the ground a joint may be kept from going."""
+
+
+@dataclass(frozen=True)
+class Missed:
+    """One joint's missed poses, by take. of: how many would have moved it, in all takes."""
+
+    joint: str
+    poses: Mapping[int, tuple[int, ...]]
+    of: int
+    fit: Change
+    validation: Change
+
+    @property
+    def count(self) -> int:
+        return sum(map(len, self.poses.values()))
+
+    @property
+    def probability(self) -> float:
+        return self.count / self.of
+
+    @property
+    def mean(self) -> float:
+        return self.probability
+
+    @property
+    def variance(self) -> float:
+        return self.probability * (1 - self.probability) / self.of
+
+    @property
+    def spec(self) -> EffectSpec:
+        """The effect, for a model."""
+        return EffectSpec("dropped_command", (self.joint,), {"probability": self.probability})
+
+    def finding(self) -> Finding:
+        """With the 90 % interval of a share (Clopper and Pearson 1934)."""
+        low = float(beta.ppf(0.05, self.count, self.of - self.count + 1))
+        high = 1.0 if self.count == self.of else float(beta.ppf(0.95, self.count + 1, self.of - self.count))
+        return Finding("dropped_command", (self.joint,), 0.95, {"probability": Estimate(self.probability, low, high, "1")},
+                       self.fit, self.validation,
+                       evidence=known_effects()["dropped_command"].sentence(self.spec) + f" ({self.count} of {self.of} here.)")
+
+
+def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> tuple[Jury, tuple[Missed, ...]]:
+    """A jury whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
+    if "dropped_command" not in known_effects():
+        return jury, ()
+    found: list[Missed] = []
+    moving = passed_over(jury, nominal, residuals)
+    for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
+        here = [i for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands]
+        lost, after = _lost(jury, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
+        count, of = sum(map(len, lost.values())), sum(_telling(jury.evidence[i], joint, k) for i, k in lost.items())
+        least = _least_closed(jury, {i: len(k) for i, k in lost.items()})
+        if least is None or count > MOST * of:
+            continue
+        if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
+            continue
+        here = [i for i, k in lost.items() if k]
+        was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
+                    for r in (residuals, after))
+        frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
+        if was - now > least * (was - frames) and was - now > 100:
+            fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
+                                  joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
+            found.append(Missed(joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
+            jury, residuals = played_without(jury, {(i, joint): k for i, k in lost.items() if k}), after
+    return jury, tuple(found)
+
+
+def _lost(jury: Jury, nominal: RobotModel, joint: str, known: Mapping[int, tuple[int, ...]], residuals: Mapping[int, Array]
+          ) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
+    """Poses that a joint missed, by take, and what is left of all takes played without them. known: those missed in motion. What
+    comes after a missed pose is read anew, beside a robot that did not get it either."""
+    lost, now = dict(known), dict(residuals)
+    new = {i: k for i, k in lost.items() if k}
+    for _ in range(TURNS):
+        if new:
+            tried = played_without(jury, {(i, joint): lost[i] for i in new})
+            now |= tried.residuals([Question(nominal, tuple(new))])[0]
+        new = {i: more for i in lost if (more := _read(jury.evidence[i], joint, now[i], lost[i]))}
+        if not new:
+            break
+        lost |= {i: tuple(sorted((*lost[i], *more))) for i, more in new.items()}
+    return lost, now
+
+
+def _least_closed(jury: Jury, missed: Mapping[int, int]) -> float | None:
+    """Share of the joint's gap that so many missed poses, by take, must explain; None: not believed. On the ground a joint may be
+    kept from going, once."""
+    held = [n for i, n in missed.items() if jury.evidence[i].take.spec.base == "fixed"]
+    if sum(held):
+        return LEAST_CLOSED
+    return (SURELY if held else LEAST_CLOSED) if sum(missed.values()) > 1 else None
+
+
+def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
+    """Whether a pose that seems missed asks for more than the joint ever went, and the joint stands there: it may be stopped."""
+    e = evidence[i]
+    assert e.take.commands is not None
+    goal = float(e.take.commands.goals[k, e.take.commands.column(joint)])
+    seen = _seen(e, joint)
+    stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
+    way = 1.0 if goal > stood else -1.0
+    end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
+    return way * goal > end and way * stood > end - AT_STOP
+
+
+def _seen(e: TakeEvidence, joint: str) -> Array:
+    """Where a joint was [rad], the zero being the servo's."""
+    return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
+
+
+def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
+    """The last frames before the next command comes; after the last, all from then on."""
+    assert e.take.commands is not None
+    time, end = e.take.recorded.since_start, end_of(e, k)
+    return np.asarray((time > end - 0.06) & ((time <= end) | (k + 1 == len(e.take.commands.times))))
+
+
+def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> tuple[int, ...]:
+    """Commands that a joint missed beside those that are known (gone), by what it did until the next came. After one, none until
+    it stands where it was told to: the model got what it did not."""
+    commands = e.take.commands
+    assert commands is not None
+    column, i = commands.column(joint), e.channels.index(joint)
+    seen = _seen(e, joint)
+    said = seen - residual[:, i] * e.sigma[i]
+    at, missed, alike = 0.0, list[int](), True
+    for k, goal in enumerate(commands.goals[:, column]):
+        way = float(goal - at)
+        frames = _at_the_end_of(e, k) & np.isfinite(seen)
+        if k in gone:
+            continue
+        if abs(way) < LEAST_STEP or not frames.any():
+            at = float(goal)
+            continue
+        went, should = (float(np.median(q[frames]) - at) / way for q in (seen, said))
+        if alike and abs(went) < STAYED and should > WENT:
+            missed.append(k)
+            alike = False
+        else:
+            at = float(goal)
+            alike = alike or abs(went - 1) < STAYED
+    return tuple(missed)
+
+
+def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
+    """How many poses would have moved a joint, as it was seen to do or not."""
+    seen = np.isfinite(_seen(e, joint))
+    return sum(k in gone or bool((_at_the_end_of(e, k) & seen).any()) for k in {*steps(e, joint, gone), *gone})

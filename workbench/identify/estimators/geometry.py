@@ -1,0 +1,180 @@
+"""What the bodies show of a robot's build before any simulation: links that are not as long as drawn, horns that sit turned.
+
+Both show only in where feet meet the ground, and there in much the same way: walks alone hardly say which link it is. Where a
+link lies between two joints that turn, cameras see both axes, and so how far they are apart and, with the base held, which way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import joint_of
+from workbench.effects.registry import known_effects
+from workbench.effects.sdf import SdfRobot
+from workbench.identify.findings import Change, Estimate, Finding
+from workbench.identify.fitting.covariance import Z90
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.parameters import Candidate, Key
+from workbench.identify.problem import TakeEvidence
+from workbench.identify.selection.model_comparison import SUREST
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
+from workbench.recording.mocap.mending import mend
+from workbench.recording.mocap.tracks import seen_joints, tracks_of, turned
+from workbench.robot import EffectSpec, RobotModel
+from workbench.robot.kinematics import Kinematics
+
+Array = NDArray[np.float64]
+LEAST_ALONG = 0.5
+"""Cosine between a link's length and what of it two axes tell."""
+ROUGH, ROUGH_TURN = 1e-4, np.deg2rad(0.25)
+"""What a take's distance between axes [m], and a direction [rad] for what the model says of droop, are off by at the least."""
+SURE = 5.0
+"""Standard deviations from which on a link is not as drawn."""
+LEAST_CHANGE, LEAST_TURNED = 5e-4, np.deg2rad(1.5)
+"""Changes of length [m] and turned horns [rad] below which no gait shows anything: what is told to be nearer is as drawn."""
+SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
+
+
+@dataclass(frozen=True)
+class Told:
+    """A number and its standard deviation, in SI."""
+
+    value: float
+    sigma: float
+
+    def differs(self, least: float) -> bool:
+        """Whether it is neither nothing nor too little to show."""
+        return abs(self.value) > max(SURE * self.sigma, least)
+
+    def is_nothing(self, least: float) -> bool:
+        """Whether it is too little to show, surely."""
+        return abs(self.value) + 2 * self.sigma < least
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A link that is not as long as drawn, or a horn that sits turned: value and standard deviation in the contract's unit."""
+
+    effect: str
+    where: str
+    mean: float
+    sigma: float
+
+    @property
+    def variance(self) -> float:
+        return self.sigma**2
+
+    @property
+    def spec(self) -> EffectSpec:
+        """The effect, for a model."""
+        return EffectSpec(self.effect, (self.where,), {known_effects()[self.effect].parameters[0].name: self.mean})
+
+    def finding(self, fit: Change, validation: Change) -> Finding:
+        """With the 90 % interval of what was measured."""
+        p = known_effects()[self.effect].parameters[0]
+        half = Z90 * self.sigma
+        number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
+        return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
+                       evidence=known_effects()[self.effect].sentence(self.spec) + SEEN)
+
+
+@dataclass(frozen=True)
+class Build:
+    """What the bodies show. measured: what is not as drawn; near: a number from which to begin, by effect and place, where droop
+    may not be what the model says; as_drawn: what need not be asked about."""
+
+    measured: tuple[Measured, ...] = ()
+    near: Mapping[Key, float] = field(default_factory=dict)
+    as_drawn: frozenset[Key] = frozenset()
+
+    def added_to(self, model: RobotModel) -> RobotModel:
+        """The model with what was measured."""
+        return replace(model, effects=(*model.effects, *(m.spec for m in self.measured)))
+
+    def asked(self, pool: Sequence[Candidate]) -> list[Candidate]:
+        """Of a pool, what is still to be asked about."""
+        known = self.as_drawn | {(m.effect, (m.where,)) for m in self.measured}
+        return [replace(c, typical=(self.near[c.key],)) if c.key in self.near else c for c in pool if c.key not in known]
+
+
+def build_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> Build:
+    """What the bodies show of a robot whose model has no lengths or zeros of its own. residuals: of the model, by take."""
+    own = {"link_length", "zero_offset"}
+    if {e.effect for e in model.effects} & own or not own <= set(known_effects()):
+        return Build()
+    between = {i: _spans(e, model) for i, e in enumerate(evidence) if e.take.recording.rigid_bodies}
+    held = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
+    ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
+    measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
+    for effect, least, told in (("link_length", LEAST_CHANGE, _changes(model, [s for there in between.values() for s in there])),
+                                ("zero_offset", LEAST_TURNED, _turns(model, held))):
+        unit = known_effects()[effect].parameters[0].si
+        for where, number in told.items():
+            if number.is_nothing(least):
+                as_drawn.add((effect, (where,)))
+            elif number.differs(least) and effect == "zero_offset" and ill & set(model.kinematics.chain(_carried(model, where))):
+                near[effect, (where,)] = number.value / unit
+            elif number.differs(least):
+                measured.append(Measured(effect, where, number.value / unit, number.sigma / unit))
+    return Build(tuple(measured), near, frozenset(as_drawn))
+
+
+def _carried(model: RobotModel, joint: str) -> str:
+    return model.kinematics.frames[joint].child
+
+
+def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
+    tracks = mend(tracks_of(e.take.recording), model)
+    return spans(tracks, seen_joints(tracks, model, e.take.spec.base)[0])
+
+
+def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, Told]:
+    """By how much links are longer than drawn, by link."""
+    k, sdf = model.kinematics, SdfRobot(model.path)
+    told: dict[str, list[Told]] = {}
+    for s in between:
+        link, drawn = k.frames[s.joint].child, _drawn(k, s)
+        way, distance = sdf.way(k, link), float(np.linalg.norm(drawn))
+        along = float(drawn @ way) / (distance * float(np.linalg.norm(way))) if distance > 0 and way.any() else 0.0
+        if along > LEAST_ALONG:
+            change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, ROUGH))
+            told.setdefault(link, []).append(Told(change / along, sigma / along))
+    return {link: _mean(each) for link, each in told.items()}
+
+
+def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, Told]:
+    """By how much links stand turned about the axes that carry them beyond what droop turns them, by joint."""
+    k = model.kinematics
+    told: dict[str, list[Told]] = {}
+    for e, between in held:
+        m = e.take.measurement
+        rest = np.array([[m.rest_pose.get(j, 0.0) for j in k.joints]])
+        poses, start = k.forward(rest), k.forward(np.zeros((1, len(k.joints))))
+        tilt = quat.matrix(m.rest_rotation) @ poses[model.base][1][0].T
+        for s in between:
+            f = k.frames[s.joint]
+            axis = start[model.base][1][0].T @ start[f.parent][1][0] @ f.axis_of_parent
+            seen, drawn = turned(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _drawn(k, s)
+            if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
+                turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))
+                told.setdefault(s.joint, []).append(Told(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), ROUGH_TURN))))
+    return {joint: _mean(each) for joint, each in told.items()}
+
+
+def _drawn(k: Kinematics, s: Span) -> Array:
+    """What of the way between two joints lies across both axes (3,) [m], in the link's frame, as the model has it."""
+    f, following = k.frames[s.joint], k.frames[s.following]
+    return across(following.X_PF_p - f.p_BM, f.axis_B, following.axis_of_parent)
+
+
+def _mean(told: Sequence[Told]) -> Told:
+    weights = np.array([t.sigma**-2 for t in told])
+    values = np.array([t.value for t in told])
+    mean = float(weights @ values / weights.sum())
+    scatter = float(np.sqrt(weights @ (values - mean) ** 2 / weights.sum()))
+    return Told(mean, float(np.hypot(weights.sum() ** -0.5, scatter / np.sqrt(len(told)))))

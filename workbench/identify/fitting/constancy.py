@@ -1,0 +1,90 @@
+"""Whether fitted numbers stay what they are: physics without a name can look like a known effect whose size changes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.findings import Unexplained
+from workbench.identify.fitting.fits import Fit, Search, Slopes
+from workbench.identify.ledger import in_file_units
+from workbench.identify.parameters import Candidate
+from workbench.identify.problem import TakeEvidence
+from workbench.identify.rollouts import Jury
+from workbench.identify.selection.record import LEAST_GAIN
+
+Array = NDArray[np.float64]
+CHANGE = 0.25
+"""Share of a number that it changes by from a take's first to its last frame, from which on that is told: two engines, or a robot
+and a model, differ by less."""
+SURE = 5.0
+"""Standard errors of that change that it must be."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A number of an effect (its index) that held takes want to change: its values at a take's beginning and end; what a number
+    that stays leaves for that, and what chance does, a standard error: RMS over sigma."""
+
+    effect: Candidate
+    number: int
+    first: float
+    last: float
+    rms: float
+    chance: float
+
+    def left(self, evidence: Sequence[TakeEvidence]) -> Unexplained:
+        """As something that a constant number does not explain."""
+        p, joint = self.effect.parameters[self.number], self.effect.joint
+        e = next((e for e in evidence if joint is None or joint in e.channels), evidence[0])
+        channel = joint if joint in e.channels else e.joints[0]
+        sigma, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
+        return Unexplained(() if joint is None else (joint,), self.rms * sigma, self.chance * sigma, unit,
+                           f"{p.name} of {self.effect} would have to go from {self.first:.3g} to {self.last:.3g} {p.unit} within "
+                           "a take: something that changes looks like it")
+
+
+def drifts(search: Search, fit: Fit) -> list[Drift]:
+    """Numbers that held takes told (walks bend them), and tell differently early and late: a test of constancy against a linear
+    trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`)."""
+    out: list[Drift] = []
+    of_number = [(c, x, k) for c, x in fit.sizes() for k in range(c.size)]
+    for s in fit.slopes:
+        if not set(s.takes) <= set(search.held):
+            continue
+        for n, change, error, rms in _trends(search.jury, fit, s):
+            c, x, k = of_number[n]
+            if c.read_off and c.effect.free_play:
+                continue  # a loose mount rattles by chance, and nothing else is seen across an axis
+            if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
+                way = np.eye(len(x))[k] * change / 2
+                low, high = c.bounds()
+                first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
+                out.append(Drift(c, k, first, last, abs(change) * rms, error * rms))
+    return out
+
+
+def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float, float]]:
+    """Numbers (indices of x) that surely change over a take, by how much, its standard error, and the RMS over sigma that a
+    change of one makes."""
+    r = jury.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
+    clocks = {}
+    for i in s.takes:
+        e = jury.evidence[i]
+        clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
+    clock = jury.vector(clocks, "fit", s.joint)
+    _, which = np.unique(jury.stretches(s.takes, "fit", s.joint), return_inverse=True)
+    for n, slope in zip(s.numbers.tolist(), s.J.T):
+        z = slope * clock
+        z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
+        power = float(z @ z)
+        if power < 1e-9:
+            continue
+        change = -float(z @ r) / power
+        by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
+        error = float(np.linalg.norm(by_stretch)) / power
+        if abs(change) >= SURE * error and change**2 * power >= LEAST_GAIN:
+            yield n, change, error, float(np.sqrt(power / int(np.count_nonzero(r))))

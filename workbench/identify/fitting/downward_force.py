@@ -1,0 +1,45 @@
+"""A pull straight down: cables pull up or aside, loads resist being moved. What weighs and does neither hangs, and may swing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import si_values
+from workbench.identify.findings import Unexplained
+from workbench.identify.fitting.fits import Fit
+from workbench.identify.parameters import Candidate
+from workbench.robot import GRAVITY
+
+Array = NDArray[np.float64]
+ASIDE = np.tan(np.deg2rad(15.0))
+"""Share of a pull's weight that it may pull aside by and still is one straight down."""
+STEP = 1e-3
+"""Of a size, by which a slope is told."""
+
+
+def hangs(c: Candidate, x: Array) -> bool:
+    """Whether an effect pulls the base straight down."""
+    aside_x, aside_y, up = _pull(c, x)
+    return bool(np.hypot(aside_x, aside_y) < -ASIDE * up)
+
+
+def hanging(fit: Fit) -> Iterator[Unexplained]:
+    """Pulls straight down, as something that no effect of the vocabulary is: error is the pull, floor its standard deviation."""
+    for (c, x), own in zip(fit.sizes(), fit.slices()):
+        if hangs(c, x):
+            down = -float(_pull(c, x)[2])
+            slopes = np.array([-_pull(c, x + step)[2] - down for step in STEP * np.eye(len(x))]) / STEP
+            deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
+            yield Unexplained((), down, deviation, "N",
+                              f"the {c.name.replace('_', ' ')} is a pull straight down, with the weight of "
+                              f"{1e3 * down / GRAVITY:.0f} g that does not resist being moved as a load does: something that "
+                              "hangs and swings looks like it")
+
+
+def _pull(c: Candidate, x: Array) -> Array:
+    """The force (3,) [N] on the base, in the world's axes; zero of an effect that has none."""
+    pull = c.effect.tether(si_values(c.effect, c.spec(x)))
+    return np.zeros(3) if pull is None else pull

@@ -1,0 +1,351 @@
+"""Fits of effects by rollouts: one effect at many joints at once, one at the whole robot, several together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.metrics import rms
+from workbench.identify.fitting.covariance import covariance_of
+from workbench.identify.fitting.levenberg_marquardt import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.identify.parameters import Candidate, Key, with_effects
+from workbench.identify.rollouts import FINE, Jury, Question
+from workbench.identify.selection.screening import Part, Race, Signatures, Trial, Trying
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+Sizes = list[tuple[Candidate, Array]]
+"""Effects, each with its sizes."""
+Report = Callable[[str, float | None], None]
+SEEN_ELSEWHERE = ("zero_offset",)
+"""What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
+
+RESETTLING = 3
+"""Steps of a fit of effects that were settled before."""
+AGAINST = 100.0
+"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number."""
+FINER, FINER_STEPS = 0.5, 3
+"""In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
+does is less than what a coarse step makes of it."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step. joint: whose
+    channels alone, None for all."""
+
+    numbers: NDArray[np.int_]
+    takes: tuple[int, ...]
+    J: Array
+    joint: str | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
+
+    cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
+    """
+
+    effects: tuple[Candidate, ...]
+    x: Array
+    covariance: Array
+    cost: dict[str, float]
+    residuals: dict[int, Array] = field(repr=False)
+    slopes: tuple[Slopes, ...] = field(default=(), repr=False)
+
+    def slices(self) -> list[slice]:
+        """Of x, for each effect."""
+        ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def numbers(self, effects: Iterable[int]) -> NDArray[np.int_]:
+        """Indices of x, of some effects."""
+        slices = self.slices()
+        return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
+
+    def sizes(self, x: Array | None = None) -> Sizes:
+        """Each effect with its own sizes; with those of another x."""
+        x = self.x if x is None else x
+        return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
+
+    def sizes_without(self, key: Key) -> Sizes:
+        """Those of all effects but one."""
+        return [s for s in self.sizes() if s[0].key != key]
+
+    def sizes_with(self, key: Key, x: Array) -> Sizes:
+        """Those of all effects, one at other sizes."""
+        return [(c, x if c.key == key else own) for c, own in self.sizes()]
+
+    def sizes_by_key(self) -> dict[Key, Array]:
+        """Of each effect, by what it is and where."""
+        return {c.key: x for c, x in self.sizes()}
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Of x."""
+        ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
+        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    def model(self, nominal: RobotModel) -> RobotModel:
+        """The nominal robot with these effects."""
+        return with_effects(nominal, self.sizes())
+
+
+class Search:
+    """Fits on one session.
+
+    settled: effects that showed with the base held, as held takes tell them: these keep their numbers in all fits that follow,
+    as contact bends what walks tell.
+    """
+
+    def __init__(self, jury: Jury, nominal: RobotModel) -> None:
+        self.jury, self.nominal = jury, nominal
+        self.takes = tuple(range(len(jury.evidence)))
+        self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
+        self.held = tuple(i for i in self.fitted if not jury.walks((i,)))
+        self.settled: Fit | None = None
+        self.signatures: Signatures = {}
+
+    @property
+    def lone(self) -> bool:
+        """Whether the robot has one joint, in which all that it lacks acts."""
+        return len(self.nominal.joints) == 1
+
+    def is_settled(self, c: Candidate) -> bool:
+        """Whether held takes told its numbers."""
+        return self.settled is not None and c.key in {e.key for e in self.settled.effects}
+
+    def told_held(self, c: Candidate) -> bool:
+        """The same, or there are no others."""
+        return self.is_settled(c) or self.held == self.fitted
+
+    def grounded(self, takes: tuple[int, ...]) -> tuple[int, ...]:
+        """Of these takes, those whose base is not held."""
+        return tuple(i for i in takes if i not in self.held)
+
+    def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
+        """Of these takes, those that tell numbers of effects: where some walk these alone, unless an effect is of the whole robot
+        or of the cameras; what held takes show of a joint or a link has been asked before."""
+        grounded = self.grounded(takes)
+        alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
+        return grounded if grounded and alone else takes
+
+    def resettled(self, current: Fit, *more: Candidate) -> Fit:
+        """`current` with those that are settled, and `more`, fitted anew on held takes: for when one went or another came."""
+        there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
+        self.settled = None
+        self.settled = self.retimed(self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there))))
+        told = self.settled.sizes_by_key()
+        return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
+
+    def retimed(self, current: Fit) -> Fit:
+        """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come. As it
+        was where held takes speak against that: then walks lack something else."""
+        timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
+        if not timing or not self.grounded(self.fitted):
+            return current
+        fit = self.refitted(current, self.fitted, RESETTLING, timing)
+        if held_gainsay(self, fit, current):
+            return current
+        numbers = fit.numbers(timing)
+        covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
+        others = [(s, ~np.isin(s.numbers, numbers)) for s in current.slopes]
+        kept = [replace(s, numbers=s.numbers[other], J=s.J[:, other]) for s, other in others if other.any()]
+        return replace(fit, covariance=covariance, slopes=(*kept, *fit.slopes))
+
+    def evaluated(self, effects: Sequence[tuple[Candidate, Array]]) -> Fit:
+        """Effects as they are, on all takes."""
+        return self.side_by_side([self.evaluating(effects)])[0][0]
+
+    def evaluating(self, *lists: Sequence[tuple[Candidate, Array]]) -> Part[list[Fit]]:
+        """Several lists of effects as they are, on all takes, as part of something that goes on beside others."""
+        answers = yield [Question(with_effects(self.nominal, effects), self.takes) for effects in lists]
+        out = []
+        for effects, residuals in zip(lists, answers):
+            x = np.concatenate([np.empty(0), *(x for _, x in effects)])
+            out.append(Fit(tuple(c for c, _ in effects), x, np.full((len(x), len(x)), np.inf), self._cost(residuals), residuals))
+        return out
+
+    def side_by_side(self, parts: Sequence[Part[T]], report: Callable[[float], None] = lambda share: None) -> list[T]:
+        """What several parts return; their rollouts share batches."""
+        done = together(dict(enumerate(parts)), lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
+        return [done[n] for n in range(len(parts))]
+
+    def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
+              report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[Trial]:
+        """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
+        at several joints, each judged by its own joint's channels. takes: on which, by group.
+        ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
+        signatures must foretell of one that is fitted."""
+        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not self.held), []
+        for n, group in enumerate(groups):
+            base = {i: current.residuals[i] for i in takes[n]}
+            asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, self.apart(group[0], takes[n]),
+                                 self.signatures).run())
+        return [trial for trials in self.side_by_side(asking, report) for trial in trials]
+
+    def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
+        """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
+        return self.side_by_side([self.refitting(current, takes, iterations, free)])[0]
+
+    def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None,
+                  step: float = 1.0) -> Part[Fit]:
+        """The same as part of something that goes on beside others. step: in which it is fitted, in search steps."""
+        moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
+        moving = current.numbers(moved)
+        if not len(moving):
+            return self._told_held(current)
+        takes = self.telling([current.effects[i] for i in moved], takes)
+        blocks = self._blocks(current, moved, takes)
+        low, high = current.bounds()
+
+        def sizes(point: Sequence[Array]) -> Array:
+            x = current.x.copy()
+            for numbers, there in zip(blocks.values(), point):
+                x[numbers] = there
+            return x
+
+        def ask(point: Sequence[Array]) -> Question:
+            return Question(with_effects(self.nominal, current.sizes(sizes(point))), takes, step)
+
+        def told(answer: dict[int, Array]) -> list[Array]:
+            return [self.jury.vector(answer, "fit", joint) for joint in blocks]
+
+        # several numbers share what a walk shows: a short move of one drowns
+        near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
+        magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
+        start = [current.x[n] for n in blocks.values()]
+        answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
+        stride, least = (near, magnitudes) if self.jury.walks(takes) else (HELD, None)
+        bounds = [(low[n], high[n]) for n in blocks.values()]
+        fit = fit_blocks(start, told(answer), bounds, iterations, stride, magnitudes=least)
+        solved = yield from through(fit, ask, told)
+        x = sizes([s.x for s in solved])
+        covariance = np.full((len(x), len(x)), np.inf)
+        bent = any(current.effects[i].effect.layer != "timing" for i in moved)
+        for s, (joint, numbers) in zip(solved, blocks.items()):
+            covariance[np.ix_(numbers, numbers)] = covariance_of(self.jury, s, takes, joint, bent)
+        slopes = tuple(Slopes(numbers, takes, s.J, joint) for s, (joint, numbers) in zip(solved, blocks.items()))
+        (there,) = yield from self.evaluating(current.sizes(x))
+        return self._told_held(replace(there, covariance=covariance, slopes=slopes))
+
+    def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
+        """Whether an effect shows in the channels of its own joint alone, on these takes."""
+        return c.joint is not None and c.name not in SEEN_ELSEWHERE and not self.jury.walks(takes)
+
+    def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
+        """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves
+        all blocks."""
+        if not all(self.apart(current.effects[i], takes) for i in moved):
+            return {None: current.numbers(moved)}
+        joints = dict.fromkeys(current.effects[i].joint for i in moved)
+        return {j: current.numbers(i for i in moved if current.effects[i].joint == j) for j in joints}
+
+    def _told_held(self, fit: Fit) -> Fit:
+        """With covariance and slopes of those that are settled."""
+        if self.settled is None:
+            return fit
+        where = {c.key: i for i, c in enumerate(self.settled.effects)}
+        both = [(i, where[c.key]) for i, c in enumerate(fit.effects) if c.key in where]
+        here, there = fit.numbers(i for i, _ in both), self.settled.numbers(k for _, k in both)
+        covariance = _with_block(fit.covariance, here, self.settled.covariance[np.ix_(there, there)])
+        slopes = []
+        for s in self.settled.slopes:
+            known = [(n, s.numbers.tolist().index(k)) for n, k in zip(here, there) if k in s.numbers]
+            if known:
+                slopes.append(replace(s, numbers=np.array([n for n, _ in known]), J=s.J[:, [k for _, k in known]]))
+        others = [s for s in fit.slopes if not np.isin(s.numbers, here).any()]
+        return replace(fit, covariance=covariance, slopes=(*others, *slopes))
+
+    def refined(self, fit: Fit) -> Fit:
+        """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
+        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
+        tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
+        if not fit.slopes or not np.isfinite(fit.covariance).any():
+            return self.finely(fit, self.takes, fit.x)[0]
+        before, fit = fit, self._finer(fit)
+        walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
+        alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
+        told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
+        takes = self.held if told_held and self.held else self.takes
+        points = [fit.x] if alone is None else _around(fit, alone)
+        seen = self.finely(fit, takes, *points, *([] if before is fit else [before.x]))
+        move, start = self._newton(seen[0]), fit.x.copy()
+        low, high = fit.bounds()
+        if alone is not None:
+            move[alone] = 0.0
+            start[alone] = _bottom(seen, alone, (low[alone], high[alone]))
+        for share in (1.0, 0.4) if alone is None else (1.0,):
+            seen += self.finely(fit, takes, np.clip(start + share * move, low, high))
+            if seen[-1].cost["fit"] < seen[0].cost["fit"]:
+                break
+        (best,) = self.finely(fit, self.takes, min(seen, key=lambda f: f.cost["fit"]).x)
+        return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
+
+    def _finer(self, fit: Fit) -> Fit:
+        """The fit with what walks tell fitted once more in finer steps, where that is more than one number."""
+        if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.grounded(self.fitted):
+            return fit
+        return self.side_by_side([self.refitting(fit, self.fitted, FINER_STEPS, step=FINER)])[0]
+
+    def _newton(self, seen: Fit) -> Array:
+        """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
+        move = np.zeros(len(seen.x))
+        for s in seen.slopes:
+            r = self.jury.vector({i: seen.residuals[i] for i in s.takes}, "fit", s.joint)
+            H = s.J.T @ s.J
+            move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
+        return move
+
+    def floors(self, fit: Fit) -> dict[int, Array]:
+        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
+        model = with_effects(self.nominal, fit.sizes())
+        longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
+        return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
+
+    def finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
+        """The fit with other sizes, as FINE steps judge it."""
+        asked = [Question(with_effects(self.nominal, fit.sizes(x)), takes, FINE) for x in points]
+        return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.jury.residuals(asked))]
+
+    def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
+        return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
+
+
+def gained(jury: Jury, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
+    """By how much less chi squared one fit leaves than another, of one use of some takes."""
+    was, now = (jury.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
+    return was - now
+
+
+def held_gainsay(search: Search, fit: Fit, other: Fit) -> bool:
+    """Whether held takes speak against a fit, beside another."""
+    return gained(search.jury, fit, other, search.held, "fit") > AGAINST
+
+
+def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
+    """A covariance with that of some numbers put in; nothing is known of how they go with others."""
+    out = covariance.copy()
+    out[numbers], out[:, numbers] = np.inf, np.inf
+    out[np.ix_(numbers, numbers)] = block
+    return out
+
+
+def _around(fit: Fit, n: int) -> list[Array]:
+    """The fit's sizes, and those with number n far on both sides."""
+    low, high = fit.bounds()
+    x = np.array([fit.x] * 3)
+    x[1:, n] *= 1 + WIDE, 1 / (1 + WIDE)
+    return list(np.clip(x, low, high))
+
+
+def _bottom(seen: Sequence[Fit], n: int, ends: tuple[float, float]) -> float:
+    """Of number n, the bottom of the parabola through three fits, or where the best of them has it."""
+    bottom = lowest([(f.x[[n]], f.cost["fit"]) for f in seen], *(np.array([end]) for end in ends))
+    return float(min(seen, key=lambda f: f.cost["fit"]).x[n] if bottom is None else bottom[0])

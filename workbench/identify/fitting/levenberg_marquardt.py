@@ -1,0 +1,225 @@
+"""Levenberg-Marquardt in lockstep: many small fits whose rollouts share one batch.
+
+A fit is a generator that yields the points it wants evaluated and is sent what they leave. Its numbers fall into blocks that
+do not feel each other (one joint each), so that one rollout moves all blocks at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.parameters import LEAST_SIZE
+
+Array = NDArray[np.float64]
+Point = list[Array]
+"""Sizes, by block."""
+Left = list[Array]
+"""Residual vectors, by block."""
+Asks = Generator[list[Point], list[Left], "list[Solved]"]
+T = TypeVar("T")
+HELD, WALKING, NEAR = 0.15, 0.4, 0.08
+"""Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
+WIDE = 0.35
+"""Share of a number by which it is moved where slopes led nowhere or hardly anywhere, and all that was seen lies closer."""
+TINY = 1e-6
+"""Of a number, below which a move tells nothing of slopes."""
+SETTLED = 3e-3
+"""A fit ends where a step takes less than this share off the sum of squares."""
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One block's end. x: sizes; r: what they leave; J: of r with respect to x, there or a step before; damping: of the next
+    step; missed: whether one from measured slopes led nowhere."""
+
+    x: Array
+    r: Array
+    J: Array
+    damping: float = 1e-3
+    missed: bool = False
+
+    @property
+    def cost(self) -> float:
+        return float(self.r @ self.r)
+
+
+def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
+               since: Sequence[Solved] = (), magnitudes: Array | None = None) -> Asks:
+    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
+    block, one for each number), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
+    Walking answers small changes with noise: there strides are long (WALKING). magnitudes: of a lone block, what they are at
+    least shares of. since: fits that ended at `start`, and go on."""
+    rough = bool(np.any(np.asarray(stride) != HELD))
+    blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
+    for b, s in zip(blocks, since):
+        b.J, b.updated, b.damping, b.missed = s.J, True, s.damping, s.missed
+    for _ in range(iterations):
+        if not any(b.open for b in blocks):
+            break
+        stale = [b for b in blocks if b.open and not b.updated]
+        if stale:
+            for b in stale:
+                b.steps = steps_of(b.x, b.low, b.high, stride, magnitudes)
+            points = [[b.moved(i) if b in stale else b.x for b in blocks] for i in range(max(len(b.x) for b in stale))]
+            for i, answer in enumerate((yield points)):
+                for b, r in zip(blocks, answer):
+                    if b in stale:
+                        b.differ(i, r)
+        trials = [list(pair) for pair in zip(*(b.trials() for b in blocks))]
+        answers = yield trials
+        for k, b in enumerate(blocks):
+            if b.open:
+                b.take([(t[k], a[k]) for t, a in zip(trials, answers)])
+    return [Solved(b.x, b.r, b.J, b.damping, b.missed) for b in blocks]
+
+
+@dataclass(eq=False)
+class _Block:
+    """One block on its way: x, what it leaves and the slopes J there; updated: by Broyden's rule, since they were measured.
+    rough: slopes may be noise. missed: a step from measured slopes led nowhere. steps: by which numbers move for slopes, and
+    differences, what was seen there. known: sizes tried so far and their cost."""
+
+    x: Array
+    r: Array
+    low: Array
+    high: Array
+    rough: bool
+    J: Array = field(init=False)
+    updated: bool = False
+    damping: float = 1e-3
+    missed: bool = False
+    open: bool = field(init=False)
+    known: list[tuple[Array, float]] = field(init=False)
+    steps: Array = field(init=False)
+    differences: list[tuple[Array, Array]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.J = np.zeros((len(self.r), len(self.x)))
+        self.open = len(self.x) > 0
+        self.steps = np.zeros(len(self.x))
+        self.known = [(self.x, float(self.r @ self.r))]
+
+    def moved(self, i: int) -> Array:
+        """Sizes with number i moved for a difference; as they are where there is no such number."""
+        return self.x + np.eye(len(self.x))[i] * self.steps[i] if i < len(self.x) else self.x
+
+    def differ(self, i: int, r: Array) -> None:
+        """Slope i, from what was left where number i had moved."""
+        if i < len(self.x):
+            self.J[:, i] = (r - self.r) / self.steps[i]
+            self.differences.append((self.moved(i), r))
+
+    def trials(self) -> tuple[Array, ...]:
+        """Where to go: a damped step, and on a walk a short one. Where steps led nowhere there, slopes were noise: one number
+        looks far both ways, and then takes the bottom of the parabola through what it saw for the short one."""
+        if not self.rough:
+            return (_step(self.x, self.r, self.J, self.damping, self.low, self.high) if self.open else self.x,)
+        if not self.open:
+            return self.x, self.x
+        if self.missed and self._near_sighted:
+            return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
+        first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
+                         for k, extra in ((1, 0.0), (30, 0.3)))
+        bottom = lowest(self.known, self.low, self.high) if self.missed else None
+        return first, second if bottom is None else bottom
+
+    @property
+    def _near_sighted(self) -> bool:
+        """Whether a walk's slopes may be noise and all that was seen of the one number lies close."""
+        return self.rough and len(self.x) == 1 and bool(np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]))
+
+    def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
+        """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
+        short step."""
+        tried = [*answers, *self.differences]
+        self.differences = []
+        costs = [float(r @ r) for _, r in tried]
+        self.known += [(at, cost) for (at, _), cost in zip(tried, costs)]
+        best, before = int(np.argmin(costs)), float(self.r @ self.r)
+        if not costs[best] < before:
+            self.open, self.missed = self.updated or not self.missed, self.missed or not self.updated
+            self.updated = not self.updated
+            self.damping *= 1e3 if self.updated else 1.0
+            return
+        there, left_there = tried[best]
+        way = there - self.x
+        if way @ way > TINY**2:
+            self.J = self.J + np.outer(left_there - self.r - self.J @ way, way) / (way @ way)
+        settled = before - costs[best] <= SETTLED * before
+        self.updated, self.missed = True, settled and self._near_sighted
+        self.open = self.missed or not settled
+        self.damping = self.damping / 3 if best == 0 else min(self.damping * 10, 1.0)
+        self.x, self.r = there, left_there
+
+
+def steps_of(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None = None) -> Array:
+    """By how much each number is moved for a difference: a share `stride` of it, or of `magnitudes`, as far as it may go."""
+    step = stride * np.maximum(np.abs(x), LEAST_SIZE if magnitudes is None else magnitudes)
+    return np.asarray(np.where(x + step <= high, step, -step))
+
+
+def lowest(seen: Sequence[tuple[Array, float]], low: Array, high: Array) -> Array | None:
+    """Of one number, where the parabola through the three best sizes seen is lowest; None where it is not, or not known."""
+    if len(low) != 1:
+        return None
+    best = sorted({float(at[0]): cost for at, cost in seen}.items(), key=lambda p: p[1])[:3]
+    if len(best) < 3:
+        return None
+    at = np.array([p[0] for p in best])
+    bend, slope, _ = np.polyfit(at, [p[1] for p in best], 2)
+    if not bend > 0:
+        return None
+    return np.clip([np.clip(-slope / (2 * bend), at.min(), at.max())], low, high)
+
+
+def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array) -> Array:
+    """A damped Gauss-Newton step that stays within bounds; numbers at a bound that they would leave wait."""
+    g = J.T @ r
+    free = ~(((x <= low) & (g > 0)) | ((x >= high) & (g < 0)))
+    if not free.any():
+        return x
+    H = J[:, free].T @ J[:, free]
+    move = np.zeros(len(x))
+    move[free] = -np.linalg.lstsq(H + damping * np.diag(np.maximum(np.diag(H), 1e-9)), g[free], rcond=None)[0]
+    return np.asarray(np.clip(x + move, low, high))
+
+
+def through(fit: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any], tell: Callable[[Any], Any]
+            ) -> Generator[list[Any], list[Any], T]:
+    """A generator as part of another: what it wants goes out as `ask` puts it, what comes back goes in as `tell` does."""
+    try:
+        wants = next(fit)
+        while True:
+            answers = yield [ask(w) for w in wants]
+            wants = fit.send([tell(a) for a in answers])
+    except StopIteration as end:
+        return end.value  # type: ignore[no-any-return]
+
+
+def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],
+             report: Callable[[float], None] = lambda share: None) -> dict[T, Any]:
+    """Runs generators side by side: what all of them want next is answered in one call. Returns what each returned."""
+    done: dict[T, Any] = {}
+    wants: dict[T, list[Any]] = {}
+
+    def advance(key: T, sent: list[Any] | None) -> None:
+        try:
+            wants[key] = next(asking[key]) if sent is None else asking[key].send(sent)
+        except StopIteration as end:
+            wants.pop(key, None)
+            done[key] = end.value
+
+    for key in asking:
+        advance(key, None)
+    while wants:
+        report(len(done) / max(1, len(asking)))
+        flat = [(key, want) for key, wanted in wants.items() for want in wanted]
+        answers = iter(answer(flat))
+        for key, wanted in list(wants.items()):
+            advance(key, [next(answers) for _ in wanted])
+    return done

@@ -1,0 +1,105 @@
+"""What signatures of an effect say of it before it is fitted: where it is looked at, and what sizes that tells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, minimize
+
+from workbench.identify.parameters import Candidate
+
+Array = NDArray[np.float64]
+SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
+"""Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
+at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, unless walks are all there is, and those of
+several numbers at the last, beyond what a walk makes of anything small."""
+SHAPED = (0.0, 2.0, -2.0)
+"""Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+
+
+def sizes_of(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
+    """Of the above, for an effect. unheld: whether no take had the base held, where joints show what they lack, however much."""
+    if walking and c.effect.layer == "ground":
+        return SCANNED_GROUND
+    return SCANNED[:1] if walking and not unheld else SCANNED
+
+
+def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
+    """Sizes at which a candidate is looked at: of one number, several, both ways where it lifts feet; of more, each alone, of
+    a walk all around."""
+    if c.read_off:
+        return [np.ones(c.size)]
+    probes = c.around() if walking else c.probes()
+    low, high = c.bounds()
+    if len(probes) > 1 or not c.size:
+        return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
+    lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
+    ways = (1.0, -1.0) if lifts else (1.0,)
+    shapes = SHAPED if c.shapes.any() and not walking else (0.0,)
+    if not walking and math.isinf(c.neutral[0]):
+        sizes = sorted({*sizes, BETWEEN})
+    points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
+    return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
+
+
+def guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
+    """Sizes to start from, and how much of the sum of squares signatures say they take away."""
+    whole = float(r0 @ r0)
+    if not c.size:
+        return np.empty(0), whole - float(seen[0] @ seen[0])
+    low, high = c.bounds()
+    if np.linalg.matrix_rank(np.array(probes)[:, ~c.shapes]) > 1:  # several numbers, not one at several sizes
+        return _bent_guess(r0, np.array(probes), np.array(seen), (low, high), 2 * far)
+    best = (probes[0], -np.inf)
+    size = np.array([float(p[~c.shapes][0]) for p in probes])
+    for shape, way in {(tuple(p[c.shapes]), np.sign(v)) for p, v in zip(probes, size)}:
+        alike = [k for k in np.argsort(np.abs(size)) if np.sign(size[k]) == way and tuple(probes[k][c.shapes]) == shape]
+        x, gain = _between(r0, [(0.0, r0), *((size[k], seen[k]) for k in alike)], far, (low[~c.shapes][0], high[~c.shapes][0]))
+        if gain > best[1]:
+            best = (np.where(c.shapes, probes[alike[0]], x), gain)
+    return best
+
+
+def _between(r0: Array, seen: Sequence[tuple[float, Array]], far: float, bounds: tuple[float, float]) -> tuple[float, float]:
+    """A size, and what it takes away, by lines between those that were seen (with what each left, from none on), and the first
+    and the last of these drawn out: a servo at half its gain lags twice as much, at a fifth five times."""
+    (_, first), last = seen[1], seen[-1]
+    drawn_out = [((-far * seen[1][0], r0 - far * (first - r0)), seen[0]), (last, (far * last[0], r0 + far * (last[1] - r0)))]
+    best = (seen[1][0], -np.inf)
+    for (a, ra), (b, rb) in [*drawn_out, *pairwise(seen)]:
+        D = rb - ra
+        x = a - float(D @ ra) / max(float(D @ D), 1e-9) * (b - a)
+        x = float(np.clip(np.clip(x, min(a, b), max(a, b)), *bounds))
+        left = ra + (x - a) / (b - a) * D
+        gain = float(r0 @ r0 - left @ left)
+        if gain > best[1]:
+            best = (x, gain)
+    return best
+
+
+def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
+    """The same of several numbers: what is seen at points (k, n) told by a line for each number and, as a walk hardly answers in
+    lines, by squares of those that were seen both ways and the product of the first two; sizes where the sum of squares of that,
+    or of a point that was seen, is least."""
+    both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
+
+    def terms(x: Array) -> Array:
+        together = x[..., both[:2]].prod(axis=-1, keepdims=True) if len(both) > 1 else x[..., :0]
+        return np.concatenate([x, x[..., both] ** 2, together], axis=-1)
+
+    answers = np.linalg.lstsq(terms(points), seen - r0, rcond=1e-8)[0]
+    G, g = answers @ answers.T, answers @ r0
+
+    def cost(x: Array) -> float:
+        return float(terms(x) @ G @ terms(x) + 2 * terms(x) @ g)
+
+    reach = far * np.abs(points).max(axis=0)
+    box = Bounds(np.maximum(bounds[0], -reach), np.minimum(bounds[1], reach))
+    ends = [minimize(cost, start, method="L-BFGS-B", bounds=box) for start in (np.zeros(points.shape[1]), *points)]
+    known = [(np.asarray(end.x, dtype=float), -float(end.fun)) for end in ends]
+    known += [(p, float(r0 @ r0 - r @ r)) for p, r in zip(points, seen)]
+    return max(known, key=lambda k: k[1])

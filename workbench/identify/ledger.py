@@ -1,0 +1,136 @@
+"""Where and when takes leave the model, in which phase and which layer, before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import ACROSS, BODY, joint_of
+from workbench.compare.footfalls import foot_phases
+from workbench.effects.base import Layer
+from workbench.identify.findings import GapEntry
+from workbench.identify.problem import SMOOTHED, TakeEvidence, ratios, smoothed
+
+Array = NDArray[np.float64]
+GAP_RATIO, GAP_SMOOTH = 1.3, 2.0
+"""RMS over sigma, of a channel and of its running means, from which on it has a gap. Quiet practice recordings stay below 1.15
+and 1.8."""
+FOLLOWS = 0.5
+"""On the ground, a joint that errs less than this share of the worst one, and not at all where the base was held, errs because
+the worst one does."""
+
+
+def channel_gaps(e: TakeEvidence, residual: Array) -> dict[str, float]:
+    """Channels of a take that are beyond noise, with their RMS over sigma (or what their running means amount to)."""
+    raw, smooth = ratios(e, residual), ratios(e, residual, smooth=True)
+    # the body's frames overlap as it is
+    size = {c: raw[c] if c in BODY else max(raw[c], smooth[c] * GAP_RATIO / GAP_SMOOTH) for c in e.channels}
+    return {c: s for c, s in size.items() if s > GAP_RATIO}
+
+
+def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:
+    """The entries, the largest first.
+
+    A joint is booked in the layer that its residual speaks of: timing where it goes with a lag that grows, or that most joints
+    share; structure where it lies across the servo's axis; ground where it is well with the base held; else actuator. The body is
+    booked where no joint explains it: as inertia where it leans or sinks, as ground where it goes or turns another way.
+    """
+    ill = {i: channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)}
+    held = [i for i, e in enumerate(evidence) if e.take.spec.base == "fixed"]
+    ill_when_held = {joint_of(c) for i in held for c in ill[i]}
+    rows: list[tuple[float, GapEntry]] = []
+    for i, e in enumerate(evidence):
+        joints = {c: s for c, s in ill[i].items() if c not in BODY}
+        worst = max(joints.values(), default=0.0)
+        late = _late(e, residuals[i], [c for c in joints if ACROSS not in c])
+        for c, size in ill[i].items():
+            if c in BODY and worst > size:
+                continue
+            if c not in BODY and held and i not in held and joint_of(c) not in ill_when_held and size < FOLLOWS * worst:
+                continue
+            column = e.channels.index(c)
+            floor, unit = in_file_units(float(e.sigma[column]), c)
+            raw = ratios(e, residuals[i])[c]
+            layer = layer_of(c, c in late, bool(held) and i not in held and joint_of(c) not in ill_when_held)
+            rows.append((size, GapEntry(layer=layer, where=() if c in BODY else (joint_of(c),), take=e.name,
+                                        when=_when(e, residuals[i][:, column]), error=raw * floor, floor=floor, unit=unit,
+                                        phase=_phase(e, residuals[i][:, column], c))))
+    return tuple(entry for _, entry in sorted(rows, key=lambda row: -row[0]))
+
+
+def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
+    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is held."""
+    if channel in BODY:
+        return "inertia" if channel in ("height", "roll", "pitch") else "ground"
+    if ACROSS in channel:
+        return "structure"
+    if late:
+        return "timing"
+    return "ground" if only_on_the_ground else "actuator"
+
+
+def _late(e: TakeEvidence, residual: Array, joints: Sequence[str]) -> set[str]:
+    """Joints whose residual is mostly a lag, where most ill joints are alike in that: sent late, not moved wrongly."""
+    time = e.take.recorded.since_start
+    mostly = set()
+    for c in joints:
+        i = e.channels.index(c)
+        slope = np.gradient(e.recorded[:, i], e.take.recorded.time) / e.sigma[i]
+        good = np.isfinite(residual[:, i]) & np.isfinite(slope)
+        r = residual[good, i]
+        lag = np.column_stack([slope[good], slope[good] * time[good]])
+        size = np.linalg.lstsq(lag, r, rcond=None)[0]
+        if len(r) and float(np.sum((r - lag @ size) ** 2)) < 0.35 * float(r @ r):
+            mostly.add(c)
+    return mostly if len(mostly) > 0.6 * len(joints) else set()
+
+
+def in_file_units(value: float, channel: str) -> tuple[float, str]:
+    """A channel's value [m or rad] in the contract's units."""
+    return (value, "m") if channel in ("forward", "left", "height") else (float(np.rad2deg(value)), "deg")
+
+
+def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
+    """Stretches [s] of the recording's clock in which the residual's running mean is beyond three sigma; the five longest, in
+    order."""
+    t = e.take.recorded.time
+    n = round(SMOOTHED / e.frame_time)
+    mean = smoothed(residual[:, None], n)[:, 0]
+    power = np.convolve(np.nan_to_num(np.square(mean)), np.ones(3 * n) / (3 * n), mode="same")
+    inside = np.concatenate([[False], power > 9.0, [False]])
+    edges = np.flatnonzero(np.diff(inside.astype(int)))
+    stretches = [(float(t[a]), float(t[b - 1])) for a, b in zip(edges[::2], edges[1::2])]
+    return tuple(sorted(sorted(stretches, key=lambda s: s[0] - s[1])[:5]))
+
+
+def _phase(e: TakeEvidence, residual: Array, channel: str) -> str:
+    """Stance or swing of the joint's leg on the ground, moving or holding with the base held: where the error is at least twice
+    as strong; empty where both alike."""
+    if channel in BODY:
+        return ""
+    if e.take.spec.base == "free":
+        foot = _foot_of(e, joint_of(channel))
+        phases = foot_phases(e.take.recorded, e.take.model) if foot else {}
+        if foot not in phases:
+            return ""
+        names, first, known = ("stance", "swing"), phases[foot].stance, phases[foot].known
+    else:
+        commands = e.take.commands
+        if commands is None:
+            return ""
+        steps = np.abs(np.diff(commands.reference(e.take.recorded.since_start), axis=0, prepend=0))
+        names, first, known = ("moving", "holding"), np.asarray(steps.max(axis=1) > 1e-6), np.isfinite(residual)
+    good = np.isfinite(residual) & known
+    power = [float(np.mean(np.square(residual[m & good]))) if (m & good).any() else 0.0 for m in (first, ~first)]
+    return names[0] if power[0] > 2 * power[1] else names[1] if power[1] > 2 * power[0] else ""
+
+
+def _foot_of(e: TakeEvidence, joint: str) -> str:
+    """The one foot that a joint carries, by its knee's joint; empty for joints that carry none or several."""
+    from workbench.compare.footfalls import foot_points
+
+    k = e.take.model.kinematics
+    feet = [f for f in foot_points(e.take.model.path) if joint in k.chain(k.frames[f].child)]
+    return feet[0] if len(feet) == 1 else ""

@@ -1,0 +1,110 @@
+"""A mass that a link carries, as sizes that show linearly: moments, as mass and distance do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect
+from workbench.identify.parameters import Candidate, both_ways
+from workbench.robot.kinematics import Kinematics
+
+Array = NDArray[np.float64]
+LEAST_MASS, MOST_MOMENT = 0.05, 100.0
+"""Of a point mass, in typical masses and moments: what positions are divided by at least, and how far moments go."""
+AWAY = 2.5
+"""Typical distances at which a point mass is probed, along each axis."""
+DISTANCE, DOUBLINGS = 0.08, (-3.0, 2.6)
+"""From its axis [m], at which a mass that swings about it is looked for at first, and how many doublings off it may be."""
+
+
+def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:
+    """A payload of a link, from its centre of mass on; of one that only turns about an axis that is held, from that axis on."""
+    center = np.asarray(k.centers.get(link, np.zeros(3)), dtype=float)
+    mass, position = (p.typical for p in payload.parameters)
+    if not (base_is_held and len(k.chain(link)) == 1):
+        return PointMass.of(payload, (link,), (0.0, *center), (mass, *(center + position)))
+    frame = k.frames[k.chain(link)[0]]
+    axis = frame.axis_B / np.linalg.norm(frame.axis_B)
+    on_axis = frame.p_BM + axis * (axis @ (center - frame.p_BM))
+    swung = SwungMass.of(payload, (link,), (0.0, *on_axis), (mass, *(on_axis + position)))
+    return replace(swung, axis=(axis[0], axis[1], axis[2]))
+
+
+@dataclass(frozen=True)
+class PointMass(Candidate):
+    """A payload. Sizes: its mass and its moments about the link's centre of mass."""
+
+    def values(self, x: Sequence[float] | Array) -> list[float]:
+        x = np.asarray(x, dtype=float)
+        return super().values([x[0], *(x[1:] / max(x[0], LEAST_MASS))])
+
+    def bounds(self) -> tuple[Array, Array]:
+        low, high = super().bounds()
+        low[1:], high[1:] = -MOST_MOMENT, MOST_MOMENT
+        return low, high
+
+    def probes(self) -> list[Array]:
+        return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
+
+    def around(self) -> list[Array]:
+        middle, *probes = self.probes()
+        return [middle, *both_ways(middle, [p - middle for p in probes])]
+
+    @property
+    def makes(self) -> NDArray[np.bool_]:
+        return np.arange(self.size) == 0
+
+
+@dataclass(frozen=True)
+class SwungMass(PointMass):
+    """A payload that swings about a held axis (in the link's frame). Gravity tells its moments about that axis, inertia how far
+    away it is; nothing tells more. Sizes: doublings of that distance, and the two moments."""
+
+    axis: tuple[float, float, float] = (0.0, 1.0, 0.0)
+
+    @property
+    def size(self) -> int:
+        return 3
+
+    @property
+    def shapes(self) -> NDArray[np.bool_]:
+        return np.array([True, False, False])
+
+    @property
+    def of_vector(self) -> NDArray[np.bool_]:
+        return ~self.shapes
+
+    @property
+    def makes(self) -> NDArray[np.bool_]:
+        return ~self.shapes
+
+    def values(self, x: Sequence[float] | Array) -> list[float]:
+        x = np.asarray(x, dtype=float)
+        away = DISTANCE * 2.0 ** float(np.clip(x[0], *DOUBLINGS))
+        unit = self.typical[0] * (self.typical[1] - self.neutral[1])  # of moments [kg m]
+        moment = unit * (x[1:] @ self._across)
+        size = float(np.linalg.norm(moment))
+        ahead = moment / size if size > 0 else self._across[0]
+        mass, position = self.parameters[0], np.array(self.neutral[1:]) + away * ahead
+        return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
+
+    def bounds(self) -> tuple[Array, Array]:
+        return np.array([DOUBLINGS[0], -MOST_MOMENT, -MOST_MOMENT]), np.array([DOUBLINGS[1], MOST_MOMENT, MOST_MOMENT])
+
+    def probes(self) -> list[Array]:
+        return [AWAY * np.eye(3)[k] for k in (1, 2)]
+
+    def around(self) -> list[Array]:
+        return both_ways(np.zeros(3), self.probes())
+
+    @property
+    def _across(self) -> Array:
+        """Two directions (2, 3) across the axis."""
+        axis = np.array(self.axis)
+        one = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        one /= np.linalg.norm(one)
+        return np.array([one, np.cross(axis, one)])

@@ -1,0 +1,269 @@
+"""What the recordings show, channel by channel, with what noise and numerics alone would make of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import ACROSS, BODY, GAIN_SPAN, channel_names, channels_of, joint_of
+from workbench.compare.compare_session import Rollouts
+from workbench.compare.comparison import noise_of
+from workbench.compare.metrics import rms
+from workbench.compare.session_takes import RegisteredTake
+from workbench.effects.base import si_values
+from workbench.effects.registry import known_effects
+from workbench.identify.shooting import unsettled
+from workbench.recording.mocap.yaw import weighted_median
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation.steady import BaseStates
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+BLOCK = 0.4
+"""Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
+USES = ("fit", "choose", "fit", "validate")
+PART, PARTS, JUDGES = 0.1, 3, 1
+"""With the base held, what is neither fitted nor validated is every third part [s] of what does not validate, the second of
+three: a joint forgets within one, and may meet its stop but once."""
+LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
+"""Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
+LATE, SHIFTS = 0.1, 4
+"""By how much every model may shift an estimated start [s], and in how many steps: a robot whose servos got each other's speeds
+sets out so unlike the nominal one that its start was estimated 62 ms early."""
+LOOP = 2e-3
+"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that."""
+SMOOTHED = 0.065
+"""Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
+
+
+@dataclass(frozen=True)
+class TakeEvidence:
+    """One registered take: recorded channels (N, c), their sigma (c,), and which frames serve for what.
+
+    Channels are the take's joints, what lies across their axes where bodies were tracked, then BODY on the ground. sigma:
+    measurement noise, numerical floor and, on the ground, the spread between contact models together. offset (N, c): what
+    the search's step is wrong by on the nominal robot, which is taken to be the same with effects. start_is_free: whether
+    the first command's time was estimated, so that every model may shift it; else by no more than LOOP. contact (N, c): the
+    nominal robot with the other contact model less that with this one. noisy (c,): share of sigma squared that is
+    measurement noise, which alone every model leaves. rough (N, c): times sigma, where steps and contact models part by more
+    than on the whole, as when a robot is about to tip over. steadied: where every model's base is put back to. until: how
+    long after the first command models are asked about it [s]; 0: not at all.
+    """
+
+    take: RegisteredTake
+    channels: tuple[str, ...]
+    recorded: Array
+    sigma: Array
+    offset: Array
+    uses: Mapping[str, Mask]
+    weight: Array
+    start_is_free: bool
+    contact: Array
+    noisy: Array | float = 1.0
+    rough: Array | float = 1.0
+    steadied: BaseStates | None = None
+    until: float = np.inf
+
+    @property
+    def name(self) -> str:
+        return self.take.spec.name
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return self.take.recorded.joints
+
+    @property
+    def frame_time(self) -> float:
+        """Between two frames [s]."""
+        return float(np.median(np.diff(self.take.recorded.time)))
+
+    @property
+    def since(self) -> Array:
+        """Time of each frame after the first command [s]."""
+        return self.take.recorded.since_start
+
+    @property
+    def moving(self) -> Mask:
+        """Frames after the first command."""
+        return np.asarray(self.since >= 0.0)
+
+    def zero(self, joint: str) -> float:
+        """Where a joint's recorded angle is zero, on its servo's scale [rad]."""
+        return float(self.take.measurement.rest_pose.get(joint, 0.0)) if self.take.recorded.zeroed else 0.0
+
+    def columns(self, joint: str | None = None) -> NDArray[np.int_]:
+        """Of one joint's channels; of all."""
+        return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
+
+    def simulated(self, rollout: Take, model: RobotModel) -> Array:
+        """A rollout's channels (N, c) as this take would have shown them."""
+        return channels_of(self.take.observed(rollout, model), self.channels)
+
+    def residual(self, simulated: Array, model: RobotModel, corrected: bool = True) -> Array:
+        """Recorded less simulated, over sigma (N, c); NaN where unseen or before the first command. model: that was simulated;
+        corrected: for the search's step."""
+        simulated = simulated + self.offset if corrected else simulated
+        simulated = self._shifted(self._lying_in_its_play(simulated, model))
+        return (self.recorded - simulated) / self._frame_sigma
+
+    def early(self, residual: Array, until: float) -> Array:
+        """Residuals (N, c) as a rollout that ends `until` [s] after the first command leaves them: later frames are NaN, and say
+        nothing of the start."""
+        if self.since[-1] <= until:
+            return residual
+        seen = np.where(self.since[:, None] <= until, residual, np.nan)
+        return (self.recorded - self._shifted(self.recorded - seen * self._frame_sigma)) / self._frame_sigma
+
+    @property
+    def _frame_sigma(self) -> Array:
+        return np.asarray(self.sigma * self.rough)
+
+    def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
+        """A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
+        that it is put where the frames that are not kept for validation want it, within the play."""
+        if not self.take.recorded.zeroed or self.take.spec.base != "fixed":
+            return simulated
+        out, used = simulated.copy(), ~self.uses["validate"]
+        for spec, effect in ((s, known_effects()[s.effect]) for s in model.effects):
+            if not effect.free_play:
+                continue
+            play = si_values(effect, spec)[effect.free_play]
+            for i in (i for joint in spec.where for i in self.columns(joint)):
+                off = (self.recorded - simulated)[used, i]
+                if np.isfinite(off).any():
+                    out[:, i] += np.clip(np.nanmedian(off), -play, play)
+        return out
+
+    def _shifted(self, simulated: Array) -> Array:
+        """Later by what the median joint asks for: a start that one bad joint cannot move."""
+        time, late, n = self.take.recorded.time, 0.0, len(self.joints)
+        used = ~self.uses["validate"]
+        shifted = simulated
+        for _ in range(SHIFTS):
+            slope = np.gradient(shifted[:, :n], time, axis=0) / self.sigma[:n]
+            r = (self.recorded[:, :n] - shifted[:, :n]) / self.sigma[:n]
+            good = np.isfinite(r) & np.isfinite(slope) & used[:, None]
+            s, r = np.where(good, slope, 0.0), np.where(good, r, 0.0)
+            sharpness = np.sum(s * s, axis=0)
+            told = sharpness > 1.0
+            if not told.any():
+                return shifted
+            by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
+            most = LATE if self.start_is_free else LOOP
+            late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[told])), -most, most))
+            shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
+        return np.where(np.isfinite(simulated), shifted, np.nan)
+
+
+def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts],
+           steadied: Mapping[str, BaseStates | None] | None = None) -> list[TakeEvidence]:
+    """The evidence of registered takes; rollouts: of the nominal model at the search's step, put back to `steadied`, with floors,
+    by take name."""
+    known = noise_of([t.recorded for t in takes])
+    alone = not any(t.spec.use == "validate" for t in takes)
+    return [_evidence(t, rollouts[t.spec.name], known.joints, alone, (steadied or {}).get(t.spec.name)) for t in takes]
+
+
+def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, float], alone: bool, steadied: BaseStates | None
+              ) -> TakeEvidence:
+    names = channel_names(t)
+    joints = t.recorded.joints
+    recorded = channels_of(t.recorded, names)
+    moving = t.recorded.time >= t.measurement.starts_at
+    if steadied is not None:
+        moving &= ~unsettled(steadied, t.recorded.since_start)
+    nominal = channels_of(t.observed(r.nominal), names)
+    finer = [channels_of(t.observed(f), names) for f in r.finer]
+    finest = finer[-1] if finer else nominal
+    floor = _apart(finest, finer[:-1] or [nominal], moving)
+    others = [channels_of(t.observed(o), names) for o in r.other_contact]
+    spread = _apart(nominal, others, moving)
+    noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
+    resting = recorded[t.recorded.resting]
+    noise = np.where(np.isnan(noise), [t.measurement.noise.get(c, np.nan) for c in names], noise)
+    if len(resting) > 5:  # a pose is a mean over rest, so that this is about zero
+        own = rms(resting - np.nanmean(resting, axis=0))
+        noise = np.where(np.isnan(noise), own, noise)
+    across = [i for i, c in enumerate(names) if ACROSS in c]
+    if across:  # one camera system sees all bodies alike
+        noise[across] = np.nanmedian(noise[across])
+    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
+    weight = np.ones(len(names))
+    if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
+        body = [names.index(c) for c in BODY]
+        sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
+        weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
+    sigma = np.maximum(sigma, 1e-6)
+    apart = [*(f - finest for f in (*finer[:-1], nominal)), *(o - nominal for o in others)]
+    rough = _rough(sigma, noise, apart, t) if others else 1.0
+    offset = np.nan_to_num(finest - nominal)
+    contact = np.nan_to_num(others[0] - nominal) if others else np.zeros_like(nominal)
+    return TakeEvidence(
+        t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
+        t.recorded.zeroed and t.spec.starts_at is None, contact, np.nan_to_num(noise) ** 2 / sigma**2, rough, steadied)
+
+
+def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:
+    """Times sigma (c,), by frame (N, c): at least 1, and more where steps and contact models part within a block."""
+    frames = max(1, round(BLOCK / float(np.median(np.diff(t.recorded.time)))))
+    worst = np.max(np.square(np.nan_to_num(np.array(apart))), axis=0)
+    local = _running_sum(worst, frames) / frames
+    return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
+
+
+def part_of(since: Array) -> NDArray[np.int_]:
+    """Which of PARTS a frame of a held take is in, by its time after the first command [s]."""
+    return np.mod(np.floor(since / PART).astype(int), PARTS)
+
+
+def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
+    since = t.recorded.since_start
+    role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
+    if t.spec.base == "fixed":
+        role = np.where(role == "validate", role, np.where(part_of(since) == JUDGES, "choose", "fit"))
+    if t.spec.use == "validate":
+        role[:] = "validate"
+    elif not alone:
+        role = np.where(role == "validate", "fit", role)
+    return {use: moving & (role == use) for use in ("fit", "choose", "validate")}
+
+
+def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
+    if not others:
+        return np.zeros(nominal.shape[1])
+    return np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0)
+
+
+def _running_sum(columns: Array, frames: int) -> Array:
+    """Of each column (N, c), over `frames` around each frame; what lies beyond the ends is nothing."""
+    kernel = np.ones(max(1, frames))
+    return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
+
+
+def smoothed(residual: Array, frames: int) -> Array:
+    """Running means of residuals (N, c) over `frames`, scaled to stay 1 where they are white noise of 1; NaN stays."""
+    known = np.isfinite(residual)
+    total, count = _running_sum(np.where(known, residual, 0.0), frames), _running_sum(known.astype(float), frames)
+    return np.where(known, total / np.sqrt(np.maximum(count, 1.0)), np.nan)
+
+
+def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: bool = False) -> dict[str, float]:
+    """RMS of residual over sigma, by channel; on all frames after the first command, or those of one use. smooth: of running
+    means, which show what is no noise."""
+    if smooth:
+        residual = smoothed(residual, round(SMOOTHED / e.frame_time))
+    rows = residual[e.moving] if use is None else residual[e.uses[use]]
+    count = np.isfinite(rows).sum(axis=0)
+    value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))
+    return {c: float(value[i]) if count[i] else float("nan") for i, c in enumerate(e.channels)}
+
+
+def joint_error(evidence: Sequence[TakeEvidence], joints: Sequence[str], residuals: Mapping[int, Array], use: str) -> float:
+    """RMS error [deg] of some joints over all takes' frames of one use; residuals: over sigma, by take."""
+    parts = [np.square((residuals[i] * e.sigma)[e.uses[use]][:, [e.channels.index(j) for j in joints if j in e.channels]]).ravel()
+             for i, e in enumerate(evidence)]
+    return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))

@@ -1,0 +1,239 @@
+"""Rolls models out on every take, over both cores, and weighs what they leave."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import joint_of
+from workbench.effects.registry import known_effects
+from workbench.identify.ledger import GAP_RATIO, channel_gaps
+from workbench.identify.problem import BLOCK, TakeEvidence
+from workbench.recording.take import Take
+from workbench.robot import EffectSpec, RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.simulation.batch import Job, simulate_batch, simulate_stream
+
+Array = NDArray[np.float64]
+COARSE, FINE = 2.0, 0.25
+"""Steps for a first look, and for last numbers, in search steps."""
+STRETCHES = 10_000
+"""More than a take has."""
+STATION, PUPPY = 17, 15
+"""What a station costs by itself, in joints, and how many a puppy has. Measured: 30 ms for a second of a joint, 33 of three
+joints, 53 of fifteen."""
+REST = 0.1
+"""Rest before the first command in rollouts [s]."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone. until: how long after
+    the first command [s]; frames after that are NaN."""
+
+    model: RobotModel
+    takes: tuple[int, ...]
+    step: float = 1.0
+    until: float = np.inf
+
+
+class Jury:
+    """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
+    answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
+
+    def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
+                 memory: Path | None = None) -> None:
+        self.evidence = tuple(evidence)
+        self.config = config
+        self.n_jobs = n_jobs
+        self.memory = memory
+        self.rollouts = 0
+        self.work = 0.0
+        self._known: dict[str, NDArray[np.float32]] = {}
+
+    def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
+        """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
+        keys: list[dict[int, str]] = []
+        new: dict[str, tuple[Question, int, RobotModel]] = {}
+        for q in questions:
+            felt = {i: self._felt(q.model, i) for i in q.takes}
+            keys.append({i: self._key(model, i, q) for i, model in felt.items()})
+            asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
+            self.work += sum(self._length(i, self._until(i, q)) for _, i, _ in asked.values()) / q.step
+            new |= asked
+        self._known |= {key: np.full_like(self.evidence[i].recorded, np.nan, dtype=np.float32)
+                        for key, (q, i, _) in new.items() if not self._until(i, q)}
+        new = {key: what for key, what in new.items() if not self._recalled(key)}
+        # the longest first, so that no core waits at the end
+        order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
+        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), self._until(i, q))
+                for q, i, model in (new[k] for k in order)]
+        self.rollouts += len(order)
+        for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
+            q, i, _ = new[key]
+            e = self.evidence[i]
+            self._keep(key, np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan))
+        return [{i: self.evidence[i].residual(self._known[key].astype(float), q.model, q.step >= 1) for i, key in by_take.items()}
+                for q, by_take in zip(questions, keys)]
+
+    def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
+        """A jury on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
+        other = Jury(evidence, self.config, self.n_jobs, self.memory)
+        other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
+        return other
+
+    @property
+    def seconds(self) -> float:
+        """A rollout of every take is this much work."""
+        return sum(self._length(i) for i in range(len(self.evidence)))
+
+    def walks(self, takes: Sequence[int]) -> bool:
+        """Whether the base is free in any of these takes."""
+        return any(self.evidence[i].take.spec.base == "free" for i in takes)
+
+    def observed(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
+        """All takes as a model left to itself would show them, in another configuration (a finer step), seen like recordings."""
+        everywhere = range(len(self.evidence))
+        rollouts = simulate_batch([replace(self.job(model, i, config), steadied=None) for i in everywhere], self.n_jobs)
+        return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
+
+    def early(self, residuals: dict[int, Array], until: float) -> dict[int, Array]:
+        """Residuals as a question with this `until` would have them."""
+        return {i: self.evidence[i].early(r, until) for i, r in residuals.items()}
+
+    def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
+        """One rollout; each take's own servo changes apply."""
+        e = self.evidence[take]
+        spec = e.take.spec
+        frames = e.since
+        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
+        duration = float(times[-1]) + 2e-3
+        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
+                   name=spec.name, times=times, start=e.take.start_state(), steadied=e.steadied)
+
+    def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
+        """Residuals of one use as one vector, weighted, gaps as zeros: comparable between models. joint: its channels alone."""
+        parts = [np.empty(0)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
+        return np.concatenate(parts)
+
+    def cost(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """Chi squared: the sum of squares of `vector`."""
+        left = self.vector(residuals, use, joint)
+        return float(left @ left)
+
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
+               share: float | Array = 0.0, everywhere: bool = False) -> float:
+        """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
+        has gone of it since `before`. everywhere: of walks beyond noise, as steps and contact models rarely make them as wrong as
+        they may, and of all channels, as what moves the robot shows a little in each."""
+        cost, expected = self.by_channel(residuals, use)
+        was = cost if before is None else self.by_channel(before, use)[0]
+        may_err = share * np.maximum(was - cost, 0.0)
+        widths = [r.shape[1] for _, r in sorted(residuals.items())]
+        walking = np.repeat([everywhere and self.walks((i,)) for i in sorted(residuals)], widths)
+        noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, n) for i, n in zip(sorted(residuals), widths)])
+        ill = walking | (cost > self._without_gap(residuals, cost, expected))
+        return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
+
+    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
+               without: Collection[str] = ()) -> float:
+        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing.
+        without: joints whose channels do not count."""
+        cost, expected = self.by_channel(before, use, joint)
+        left, _ = self.by_channel(after, use, joint)
+        most = self._without_gap(before, cost, expected, joint)
+        names = [self.evidence[i].channels[k] for i in sorted(before) for k in self.evidence[i].columns(joint)]
+        ill = (cost > most) & ~np.isin([joint_of(c) for c in names], list(without))
+        return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
+
+    def stretches(self, takes: Sequence[int], use: str, joint: str | None = None) -> NDArray[np.int_]:
+        """For each number of `vector`, which stretch of which take it is of."""
+        parts = [np.empty(0, dtype=int)]
+        for i in sorted(takes):
+            e = self.evidence[i]
+            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / BLOCK).astype(int)
+            parts.append(np.repeat(stretch, len(e.columns(joint))))
+        return np.concatenate(parts)
+
+    def expected(self, takes: Sequence[int], use: str) -> float:
+        """The sum of squares of `vector` that noise, numerics and contact models make."""
+        frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
+        return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
+
+    def by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
+        """Chi squared of each take's each channel, and what is expected of it."""
+        cost, expected = [np.empty(0)], [np.empty(0)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            rows = r[e.uses[use]][:, columns]
+            cost.append(np.nansum(np.square(rows), axis=0) * e.weight[columns])
+            expected.append(np.isfinite(rows).sum(axis=0) * e.weight[columns])
+        return np.concatenate(cost), np.concatenate(expected)
+
+    def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
+        """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a held robot no more than
+        expected, where running means alone show one."""
+        most = GAP_RATIO**2 * expected
+        slight = [np.empty(0, dtype=bool)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            gaps = channel_gaps(e, r) if e.take.spec.base == "fixed" else {}
+            slight.append(np.array([e.channels[c] in gaps for c in e.columns(joint)], dtype=bool))
+        return np.where(np.concatenate(slight) & (cost <= most), expected, most)
+
+    def _length(self, take: int, until: float = np.inf) -> float:
+        """Of a rollout [s of a puppy's], a walk counting more as it takes longer, few joints less."""
+        e = self.evidence[take]
+        share = (len(e.joints) + STATION) / (PUPPY + STATION)
+        return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
+
+    def _felt(self, model: RobotModel, take: int) -> RobotModel:
+        """The model as this take can tell it: where the base is held, no floor and no mass of the base is felt."""
+        if self.evidence[take].take.spec.base != "fixed":
+            return model
+        felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
+        return model if len(felt) == len(model.effects) else replace(model, effects=felt)
+
+    def _key(self, felt: RobotModel, take: int, q: Question) -> str:
+        played = self.evidence[take].take.commands
+        goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
+        until = self._until(take, q)
+        return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}" + ("" if np.isinf(until) else f"-until{until:.6g}")
+
+    def _until(self, take: int, q: Question) -> float:
+        """How long a question looks at a take [s]."""
+        return min(q.until, self.evidence[take].until)
+
+    def _recalled(self, key: str) -> bool:
+        """Whether an answer is known, now or from a run before."""
+        if key not in self._known and self.memory is not None and (path := self.memory / f"{key}.npy").exists():
+            self._known[key] = np.load(path)
+        return key in self._known
+
+    def _keep(self, key: str, answer: Array) -> None:
+        simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
+        self._known[key] = simulated
+        if self.memory is not None:
+            part = self.memory / f"{key}.part.npy"
+            np.save(part, simulated)
+            part.replace(self.memory / f"{key}.npy")
+
+
+def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
+    """Of `Jury.stretches`."""
+    return stretches // STRETCHES
+
+
+def _of_the_floor(e: EffectSpec) -> bool:
+    effect = known_effects().get(e.effect)
+    return effect is not None and effect.layer == "ground" and effect.name != "ground_tilt"

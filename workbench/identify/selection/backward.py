@@ -1,0 +1,44 @@
+"""Backward: effects that were taken and that the others left nothing to say go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.identify.fitting.fits import Fit, Search, held_gainsay
+from workbench.identify.selection.acceptance import ALL_CLOSED, LAST_CLOSED, completed
+from workbench.identify.selection.best_subsets import HALF, TOGETHER_STEPS
+from workbench.identify.selection.record import LEAST_GAIN, Round
+
+CLEARLY = 5.0
+"""Times that gain, from which on an effect is missed whatever the others do in its place."""
+
+
+def without_part_answers(search: Search, current: Fit, rounds: Sequence[Round]) -> Fit:
+    """Without effects, from the last one back, that left half of what was there and that no other completed."""
+    for r in reversed(rounds):
+        for t in r.accepted:
+            if completed(search, r, t, current) < LAST_CLOSED:
+                current = search.evaluated(current.sizes_without(t.candidate.key))
+    return current
+
+
+def without_idle(search: Search, current: Fit) -> Fit:
+    """Backward: an effect that the others have made idle goes. The others may have far to go: in a lone joint, where all act
+    alike and a load does by itself what another does with a spring and a zero askew; and where held takes go better without it,
+    as a knee that was not fitted soft enough leaves walks something for play to close."""
+    for i in range(len(current.effects) - 1, -1, -1):
+        if len(current.effects) < 2:
+            break
+        c, settled = current.effects[i], search.is_settled(current.effects[i])
+        least = LEAST_GAIN * max(1, c.size) * (ALL_CLOSED if settled else 1.0)
+        rest = search.evaluated(current.sizes_without(c.key))
+        before = rest.cost["choose"]
+        if search.lone or before - current.cost["choose"] < CLEARLY * least:
+            rest = search.refitted(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
+        if (search.lone and rest.cost["choose"] < HALF * before) or (not settled and held_gainsay(search, current, rest)):
+            rest = search.refitted(rest, search.fitted, TOGETHER_STEPS)
+        if rest.cost["choose"] - current.cost["choose"] < least:
+            current = rest
+            if search.lone:
+                return without_idle(search, current)
+    return current

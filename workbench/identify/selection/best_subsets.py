@@ -1,0 +1,211 @@
+"""Several effects in one joint at once: what their signatures together say, where no single one explains what is missing.
+
+Lines through what each was seen to do alone are cheap to add up, so that all sets are tried: best subsets, not one at a time
+(A. J. Miller, Subset Selection in Regression, 2002). Only the best sets are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import BODY, joint_of
+from workbench.identify.fitting.fits import Fit, Search, Sizes
+from workbench.identify.selection.record import LEAST_GAIN, Round
+from workbench.identify.selection.screening import Part, Trial
+
+Array = NDArray[np.float64]
+NEARLY_ALL = 0.9
+"""Share of a gap from which on less likely effects are not asked for with the base held, as what a hand carries looks like a weak
+shoulder, nor sets of them."""
+HALF = 0.5
+"""Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
+SIZES, FITTED, AS_GOOD = (2, 3), 6, 2.0
+"""Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does, as
+lines foretell roughly."""
+AGAIN = tuple(product((0.75, 1.33), (-0.7, 0.7)))
+"""Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
+MOST_STEPS, TOGETHER_STEPS = 5, 12
+"""Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines foretell them, and
+where others must take one's place. It ends where little changes."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What an effect does to what is fitted in a joint: signatures (m, k), each at the sizes in a row of points (k, n)."""
+
+    trial: Trial
+    signatures: Array
+    points: Array
+
+    def sizes(self, share: Array) -> Array:
+        """With these shares (k,) of the points, as far as they may go."""
+        low, high = self.trial.candidate.bounds()
+        shapes = self.trial.candidate.shapes
+        return np.clip(np.where(shapes, self.points[0], share @ self.points), low, high)
+
+    def shares(self, x: Array) -> Array:
+        """The shares of the points that make these sizes."""
+        makes = ~self.trial.candidate.shapes
+        return np.asarray(np.linalg.lstsq(self.points[:, makes].T, x[makes], rcond=None)[0], dtype=float)
+
+
+def companies(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str) -> list[list[Trial]]:
+    """Sets of effects that, as signatures foretell it, explain a joint far better than fewer do, with sizes to begin from.
+
+    trials: of a race beside `current` on these takes, whose base is held.
+    """
+    known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
+    until = min((looked[2] for _, looked in known), default=np.inf)
+    base = search.jury.early({i: current.residuals[i] for i in takes}, until)
+    rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
+    r0 = search.jury.vector(base, "fit", joint)[rows[joint]]
+    seen = [s for t, (points, did, _) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
+    return _best_sets(seen, r0) if seen else []
+
+
+def _signatures(search: Search, t: Trial, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
+    """Sizes at which a candidate was looked at, what each did, and for how long it was looked at [s]."""
+    for name, (points, seen, until) in search.signatures.items():
+        if name[-1] == takes and t.candidate.key in name[:-1]:
+            b = name.index(t.candidate.key)
+            return points, [s[b] for s in seen], until
+    return None
+
+
+def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, judged: str | None, joint: str
+          ) -> NDArray[np.bool_]:
+    """Of the vector of the channels of `judged` (None: of all), what is of a joint, and was looked at."""
+    inside = {}
+    for i in takes:
+        e = search.jury.evidence[i]
+        inside[i] = np.zeros_like(current.residuals[i])
+        inside[i][np.ix_(e.since <= until, e.columns(joint))] = 1.0
+    return search.jury.vector(inside, "fit", judged) != 0
+
+
+def variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[Seen]:
+    """An effect of several numbers, each seen alone; of one, as it was seen at each size."""
+    c = t.candidate
+    if not c.size or not len(points):
+        return
+    if np.count_nonzero(~c.shapes) > 1:
+        yield Seen(t, np.stack(signatures, axis=1), np.array(points))
+        return
+    for p, v in zip(points, signatures):
+        yield Seen(t, v[:, None], p[None])
+
+
+def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[Trial]]:
+    lines = _Lines(seen, r0)
+    best = lines.whole
+    out: list[list[Trial]] = []
+    for size in (1, *SIZES):
+        sets: dict[frozenset[object], tuple[float, list[Trial]]] = {}
+        for which in combinations(range(len(seen)), size):
+            name = frozenset(seen[k].trial.candidate.key for k in which)
+            if len(name) < size:
+                continue
+            left, x = lines.lowest(which)
+            if (name not in sets or left < sets[name][0]) and all(possible(seen[k], there) for k, there in zip(which, x)):
+                sets[name] = left, [replace(seen[k].trial, x=there, foretold=False) for k, there in zip(which, x)]
+        ranked = sorted(sets.values(), key=lambda s: s[0])
+        if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
+            break
+        if size > 1 and ranked[0][0] < HALF * best:
+            out += [trials for left, trials in ranked[:FITTED] if left < AS_GOOD * ranked[0][0]]
+        best = min(best, ranked[0][0])
+    return out
+
+
+class _Lines:
+    """Signatures added up: what is missing, r0, less what they do in shares of what was seen."""
+
+    def __init__(self, seen: Sequence[Seen], r0: Array) -> None:
+        A = np.concatenate([s.signatures for s in seen], axis=1)
+        self.seen, self.whole = seen, float(r0 @ r0)
+        self.ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
+        self.H, self.g = A.T @ A, A.T @ r0
+        self.H[np.diag_indices_from(self.H)] += 1e-9 * np.diag(self.H) + 1e-9
+
+    def lowest(self, which: Sequence[int]) -> tuple[float, list[Array]]:
+        """The least that some of them leave of the sum of squares, as far as they may go, and at which sizes."""
+        numbers = [np.arange(self.ends[k], self.ends[k + 1]) for k in which]
+        n = np.concatenate(numbers)
+        H, g = self.H[np.ix_(n, n)], self.g[n]
+        parts = np.split(-np.linalg.solve(H, g), np.cumsum([len(own) for own in numbers])[:-1])
+        x = [self.seen[k].sizes(part) for k, part in zip(which, parts)]
+        share = np.concatenate([self.seen[k].shares(there) for k, there in zip(which, x)])
+        return self.whole + float(2 * g @ share + share @ H @ share), x
+
+
+def possible(s: Seen, x: Array) -> bool:
+    """Whether an effect is there at all, at these sizes."""
+    return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
+
+
+def worst_joint(beyond: dict[str, float]) -> str | None:
+    """The joint that errs most; None where none does."""
+    worst = max((c for c in beyond if c not in BODY), key=lambda c: beyond[c], default=None)
+    return None if worst is None else joint_of(worst)
+
+
+def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
+            ) -> list[list[Trial]]:
+    """Sets of effects for the joint that errs most, where the base is held and no single one is most of it."""
+    joint = worst_joint(beyond)
+    if joint is None or search.jury.walks(takes):
+        return []
+    if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
+        return []
+    return companies(search, current, trials, takes, joint)
+
+
+def fitted_beside(search: Search, current: Fit, added: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
+    """All effects fitted together, when some were added."""
+    return (yield from _fitted_from(search, [*current.sizes(), *((t.candidate, t.x) for t in added)], takes, steps))
+
+
+def _fitted_from(search: Search, sizes: Sizes, takes: tuple[int, ...], steps: int) -> Part[Fit]:
+    (start,) = yield from search.evaluating(sizes)
+    return (yield from search.refitting(start, takes, steps))
+
+
+def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
+    """A fit, or a far better end that it comes to from elsewhere: numbers that shape an effect bend what it does, and a fit may
+    end beside the valley. steps: of the last fit."""
+    starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))
+              for c, x in fit.sizes() if c.shapes.any() for share, doublings in AGAIN]
+    if not starts:
+        return fit
+    best = min(search.side_by_side([_fitted_from(search, sizes, takes, MOST_STEPS) for sizes in starts]), key=priced)
+    return search.refitted(best, takes, steps) if priced(best) < HALF * priced(fit) else fit
+
+
+def priced(fit: Fit) -> float:
+    """What a fit leaves on the choosing stretches, and what its numbers have to bring."""
+    return fit.cost["choose"] + LEAST_GAIN * len(fit.x)
+
+
+def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]) -> list[Round]:
+    """A round for each of the effects that are taken together, the first of `sets`, which were fitted; its rivals those with
+    which another set has it replaced."""
+    best, chosen = sets[0]
+    names = {t.candidate.key for t in chosen}
+    sizes = best.sizes_by_key()
+    out = []
+    for t in chosen:
+        rest = search.evaluated(best.sizes_without(t.candidate.key))
+        gain = {use: rest.cost[use] - best.cost[use] for use in ("fit", "choose")}
+        trials = [replace(t, x=sizes[t.candidate.key], gain=gain)]
+        for fit, others in sets[1:]:
+            new = [o for o in others if o.candidate.key not in names]
+            if len(others) == len(chosen) and len(new) == 1 and t.candidate.key not in {o.candidate.key for o in others}:
+                theirs = {use: gain[use] - fit.cost[use] + best.cost[use] for use in gain}
+                trials.append(replace(new[0], x=fit.sizes_by_key()[new[0].candidate.key], gain=theirs, joint=t.joint))
+        out.append(Round(current, tuple(trials), (trials[0],)))
+    return out

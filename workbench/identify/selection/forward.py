@@ -1,0 +1,223 @@
+"""Forward: which effects are taken, judged on stretches that no fit saw.
+
+First what held takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from workbench.compare.channels import BODY, joint_of
+from workbench.identify.estimators.dropped_again import Played, played_anew
+from workbench.identify.fitting.fits import Fit, Report, Search
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.parameters import Candidate
+from workbench.identify.selection.acceptance import (
+    ALL_CLOSED,
+    LAST_CLOSED,
+    LEAST_CLOSED,
+    LEAST_WALKING,
+    least_closed,
+    remaining,
+    too_little_left,
+    worthwhile,
+)
+from workbench.identify.selection.backward import without_idle, without_part_answers
+from workbench.identify.selection.best_subsets import (
+    HALF,
+    MOST_STEPS,
+    NEARLY_ALL,
+    fitted_beside,
+    priced,
+    seated,
+)
+from workbench.identify.selection.fixed_base_check import heard
+from workbench.identify.selection.pair_move import in_two
+from workbench.identify.selection.record import LEAST_GAIN, Chosen, Round, before_rough
+from workbench.identify.selection.reevaluation import weighed_anew
+from workbench.identify.selection.scheduling import FEW, TIERS, TIERS_OF_ALL, asked, standing_out
+from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.single_joint import lone_round, set_right, together
+
+MOST_ROUNDS = 6
+"""With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
+MOST_WORK, MOST_WORK_LONE, MOST_ROLLOUTS = 3200.0, 6400.0, 60.0
+"""Seconds of rollouts, of a lone joint, of which sets are fitted, and rollouts of all takes if that is more, after which nothing
+more is tried: minutes, of half a minute of recording."""
+ENOUGH = 0.6
+"""Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
+before joints are asked, as a joint's effect can look like one of the whole robot's."""
+OWN_GAP = 0.9
+"""The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play closes three quarters."""
+NEARLY_ALL_WALKING = 0.97
+"""NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
+back, which closes up to 0.93; true effects close more."""
+LAST_STEPS = 3
+"""Of a fit of all effects when one was dropped at the end; it ends where little changes."""
+MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
+"""Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
+joint, where the best leaves more than a tenth: there some fit has not come to its end."""
+ALIKE = 0.25
+"""Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
+
+
+def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: Played | None = None
+           ) -> Chosen:
+    """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
+    left out of what is played; read anew by what held takes told, which may change the search's jury."""
+    current = nominal = search.evaluated([])
+    rounds: list[Round] = []
+    work = MOST_WORK_LONE if search.lone else MOST_WORK
+    most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.jury.seconds)
+    if search.held:
+        current = _phase(search, pool, current, search.held, rounds, report, most)
+    if current.effects and played is not None:
+        report("looking anew", None)
+        current, played = played_anew(search, current, rounds, played)
+        nominal = search.evaluated([])
+    if search.held != search.fitted:
+        search.settled = current = search.retimed(current)
+        closed = least_closed(search, nominal, current)
+        current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
+        current, rounds = in_two(search, pool, current, rounds, report)
+    kept = without_part_answers(search, current, rounds)
+    if len(kept.effects):
+        report("fitting together", None)
+        kept = without_idle(search, kept)
+        if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
+            kept = search.resettled(kept)
+        if kept is not current or _may_go_on(search, kept):
+            kept = search.refitted(kept, search.fitted, LAST_STEPS)
+    return Chosen(kept, tuple(rounds), played.missed if played else ())
+
+
+def _may_go_on(search: Search, fit: Fit) -> bool:
+    """Whether a fit may not have come to its end: where walks still show a gap, as fits of several numbers begin in coarse steps,
+    and of a lone joint, where all acts alike and valleys are long."""
+    return search.lone or any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
+
+
+def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
+           most_work: float, closed: float = LEAST_CLOSED) -> Fit:
+    """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
+    usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
+    stopped = False
+    least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
+    for _ in range(MOST_ROUNDS):
+        beyond = remaining(search, current, before_rough(rounds, current), takes)
+        if stopped or not beyond or too_little_left(search, current, takes, rounds):
+            break
+        what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
+        say = partial(report, f"explaining {what} ({len(rounds) + 1})")
+        if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:
+            current, seats = lone_round(search, pool, current, beyond, takes, say)
+            rounds += seats
+            if seats:
+                continue
+        trials: list[Trial] = []
+        likely = pool
+        for tier in range(TIERS_OF_ALL if closed > LEAST_CLOSED else TIERS):
+            stopped = search.jury.work > most_work
+            if stopped:
+                break
+            groups, on = asked(search, likely, current, beyond, takes, tier)
+            ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
+            trials += search.tried(current, groups, on, say, ahead, least)
+            trials.sort(key=lambda t: -t.gain["choose"])
+            # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
+            said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
+                                     or _is_of_all(search, current, trials[0], takes, beyond))
+            if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
+                if not _tips(search, trials[0], takes, tier):
+                    break
+                likely = [c for c in pool if c.name == "com_shift"]
+        worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
+        choices = _accepted(worth)
+        fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
+        after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
+        sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
+        seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
+        read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
+        of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
+        sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
+        if sets and priced(sets[0][0]) < HALF * priced(after):
+            after = sets[0][0]
+            seats = [replace(seats[0], accepted=()), *seated(search, current, sets)]
+        rounds += seats
+        if after is current:
+            break
+        current = after
+        if search.jury.walks(takes):
+            current = heard(search, current, [t.candidate for t in accepted])
+        else:
+            current, rounds[:] = weighed_anew(search, current, rounds, takes)
+    if search.jury.walks(takes):
+        current, rounds[:] = weighed_anew(search, current, rounds, takes)
+    elif search.lone and search.jury.work <= most_work:
+        current, seats = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
+        rounds[:] = seats or rounds
+    return current
+
+
+def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+    """Whether the best so far leaves nothing worth asking in the tiers that follow."""
+    surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
+    if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
+        return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
+    if not surely:
+        return t.closed > ENOUGH
+    return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
+
+
+def _tips(search: Search, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+    """Whether centres of mass of links that are asked last are not to be passed over: they tip a robot on the ground as the best
+    so far does. A load there, with a number more, does so wherever it hangs, which tells nothing."""
+    return search.jury.walks(takes) and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia"
+
+
+def _is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
+    """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
+    common, whatever more one of them lacks."""
+    joints = {joint_of(c) for c in beyond if c not in BODY}
+    if t.candidate.where or len(joints) <= FEW or search.jury.walks(takes):
+        return False
+    return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > NEARLY_ALL
+
+
+def _closed_at(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], joint: str | None) -> float:
+    """Share of what is beyond noise in a joint that an effect judged by all channels takes away."""
+    if not len(t.by_channel):
+        return 0.0
+    here = search.telling([t.candidate], takes)
+    cost, expected = search.jury.by_channel({i: current.residuals[i] for i in here}, "choose")
+    own = np.concatenate([np.isin(e.columns(), e.columns(joint)) for e in (search.jury.evidence[i] for i in here)])
+    return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
+
+
+def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
+    """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
+    robot's the best, but not what leaves half where another closes nearly all. Where a race does not tell who is ahead, each of
+    them to be fitted."""
+    if not worth:
+        return []
+    best = worth[0]
+    if best.joint is None:
+        close = [t for t in worth if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
+        whole = [t for t in close if t.closed > NEARLY_ALL] if best.closed < LAST_CLOSED else []
+        return [[t] for t in (whole or close)[:MOST_RIVALS + 1]]
+    # recordings that end at a stop show it, whatever else keeps a stiff spring ahead of it for now
+    shown = next((t for t in worth if t.candidate.read_off and t.joint == best.joint
+                  and t.gain["choose"] > HALFWAY * best.gain["choose"]), None)
+    best = shown or best
+    elsewhere: list[Trial] = []
+    for t in worth:
+        alike = t.gain["choose"] > ALIKE * best.gain["choose"] or t.closed > NEARLY_ALL
+        if alike and t.joint not in {None, best.joint, *(o.joint for o in elsewhere)}:
+            elsewhere.append(t)
+    rivals = [] if shown else [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
+                               and t.gain["choose"] > HALFWAY * best.gain["choose"]]
+    return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]

@@ -1,0 +1,131 @@
+"""Two causes that look like one: a pull that lifts the robot explains much of what a slope and a slippery floor do together.
+
+What explains most by itself is found first, and then nothing completes it. So it and what came near it are given company,
+foretold by lines around each one's own fit, in which all that walks told gives way: a motor that ends early makes up for much of
+a body that leans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.fitting.fits import Fit, Report, Search, Sizes
+from workbench.identify.fitting.levenberg_marquardt import WALKING, steps_of
+from workbench.identify.fitting.responses import AROUND, SCANNED_GROUND
+from workbench.identify.parameters import Candidate, Key, with_effects
+from workbench.identify.rollouts import COARSE, Question
+from workbench.identify.selection.acceptance import too_little_left, worthwhile
+from workbench.identify.selection.best_subsets import fitted_beside, priced, seated
+from workbench.identify.selection.record import COMPLETE, Round, judged_by_all
+from workbench.identify.selection.scheduling import ONE_PULL
+from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.swap import NOTHING, in_place
+
+Array = NDArray[np.float64]
+NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
+"""Share of the best one's gain from which on another is given company; how many are, how many pairs are fitted, and steps of
+that."""
+
+
+def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], report: Report
+           ) -> tuple[Fit, list[Round]]:
+    """The fit, with two effects in the place of the last that walks told, one of them at least of the ground or of masses, where
+    that left much and these bring enough more, and the rounds with them."""
+    there = current.sizes_by_key()
+    told = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
+    if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.name == "payload":
+        return current, list(rounds)
+    if too_little_left(search, current, search.fitted, rounds):
+        return current, list(rounds)
+    seat, found = told[-1]
+    report(f"trying two causes for {found.candidate}", None)
+    rest = search.evaluated(current.sizes_without(found.candidate.key))
+    free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
+    known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
+    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and judged_by_all(search, t)
+              and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
+    pairs = _foretold(search, rest, list(known.values())[:ONES], free)
+    fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
+    ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
+    if not ranked or not _enough(search, *ranked[0], current, rounds):
+        return current, list(rounds)
+    seats = [_beside_tried(r, seat) for r in seated(search, rest, ranked)]
+    return ranked[0][0], [*(r for r in rounds if r is not seat), *seats]
+
+
+def _beside_tried(taken: Round, seat: Round) -> Round:
+    """A round with what else was tried at first: a pull's twin is to be put in its place."""
+    fitted = {t.candidate.key for t in taken.trials}
+    return replace(taken, trials=(*taken.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
+
+
+def _keeps_company(c: Candidate) -> bool:
+    """What the ground does, and where masses are; not how heavy what is carried is, which walks tell last."""
+    return c.size > 0 and c.effect.layer in ("ground", "inertia") and c.name != "payload"
+
+
+@dataclass(frozen=True)
+class _Around:
+    """What is asked around a fit with one effect: each number that walks tell moved, and each other effect beside it."""
+
+    one: Trial
+    fit: Fit
+    moves: list[tuple[Candidate, Array, Array]]
+    probes: list[tuple[Candidate, list[Array]]]
+
+    @classmethod
+    def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
+        c = one.candidate
+        company = [o for o in others if o.key != c.key and not (o.name in ONE_PULL and c.name in ONE_PULL)]
+        moves = [(e, x, steps_of(x, *e.bounds(), WALKING, e.magnitudes(x))) for e, x in fit.sizes()
+                 if e.size and not search.is_settled(e)]
+        return cls(one, fit, moves, [(o, _probes(o)) for o in company])
+
+    def asked(self) -> Iterator[Sizes]:
+        yield self.fit.sizes()
+        for e, x, move in self.moves:
+            yield from (self.fit.sizes_with(e.key, moved) for moved in x + np.diag(move))
+        for c, points in self.probes:
+            yield from ([*self.fit.sizes(), (c, p)] for p in points)
+
+    def foretold(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[Trial]]]:
+        """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
+        plain = next(answers)
+        slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
+        moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]
+        for c, points in self.probes:
+            did = [next(answers) - plain for _ in points]
+            for cost, chosen in in_place(Trial(c, points[0], NOTHING, None), points, did, left, moving, x, slopes):
+                yield cost, [t for t in chosen if t.candidate.key in (self.one.candidate.key, c.key)]
+
+
+def _probes(c: Candidate) -> list[Array]:
+    """Sizes at which an effect is looked at: the floor's alone at two."""
+    sizes = (AROUND,) if c.size > 1 else SCANNED_GROUND[:1] if c.where else SCANNED_GROUND
+    return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
+
+
+def _foretold(search: Search, rest: Fit, ones: Sequence[Trial], others: Sequence[Candidate]) -> list[list[Trial]]:
+    """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
+    takes = search.telling([t.candidate for t in ones], search.fitted)
+    around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
+    questions = [Question(with_effects(search.nominal, sizes), takes, COARSE) for a in around for sizes in a.asked()]
+    answers = iter([search.jury.vector(answer, "fit") for answer in search.jury.residuals(questions)])
+    best: dict[frozenset[Key], tuple[float, list[Trial]]] = {}
+    for a in around:
+        for cost, pair in a.foretold(search.jury.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
+            name = frozenset(t.candidate.key for t in pair)
+            best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
+    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIRS]]
+
+
+def _enough(search: Search, fit: Fit, pair: Sequence[Trial], current: Fit, rounds: Sequence[Round]) -> bool:
+    """Whether a pair brings as much more than the one as any effect has to."""
+    takes = search.telling([t.candidate for t in pair], search.fitted)
+    was, now = (search.jury.by_channel({i: f.residuals[i] for i in takes}, "choose")[0] for f in (current, fit))
+    more = replace(pair[-1], gain={use: current.cost[use] - fit.cost[use] for use in NOTHING}, by_channel=was - now)
+    return worthwhile(search, more, search.fitted, rounds, current)

@@ -1,0 +1,69 @@
+"""What a search went through, round by round, and what it chose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workbench.identify.estimators.dropped_commands import Missed
+from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.selection.screening import Trial
+
+LEAST_GAIN = 150.0
+"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
+is half its noise: engines, and a robot and its model, differ by as much."""
+
+COMPLETE = 0.97
+"""Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
+
+
+@dataclass(frozen=True)
+class Round:
+    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
+    limit of work, before all that could be asked was."""
+
+    before: Fit
+    trials: tuple[Trial, ...]
+    accepted: tuple[Trial, ...]
+    stopped: bool = False
+
+    def rivals(self, trial: Trial) -> list[Trial]:
+        """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
+        place = trial.joint
+        return [t for t in self.trials if place is None or t.joint in (place, None)]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The effects that stay, fitted together, and how they were found; missed: poses that servos never got."""
+
+    fit: Fit
+    rounds: tuple[Round, ...]
+    missed: tuple[Missed, ...] = ()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the limit of work ended the search."""
+        return any(r.stopped for r in self.rounds)
+
+
+def taken(rounds: Sequence[Round]) -> list[Trial]:
+    """What was taken of physics."""
+    return [t for r in rounds for t in r.accepted if not _exact(t)]
+
+
+def before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
+    """What there was before the first effect whose hundredths engines play differently."""
+    return next((r.before for r in rounds if not all(map(_exact, r.accepted))), current)
+
+
+def _exact(t: Trial) -> bool:
+    """Whether engines do not differ in it: in how cameras saw the robot, or when commands come; other speeds, which no number
+    says, make another motion."""
+    layer = t.candidate.effect.layer
+    return layer == "measurement" or (layer == "timing" and t.candidate.size > 0)
+
+
+def judged_by_all(search: Search, t: Trial) -> bool:
+    """Whether it was fitted by some number, and all channels judged it; not what held takes told."""
+    return not t.foretold and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)

@@ -1,0 +1,277 @@
+"""A race between effects for what is missing: one group's way through it, as a generator that wants rollouts."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.fitting.levenberg_marquardt import HELD, WALKING, Asks, Solved, fit_blocks, through
+from workbench.identify.fitting.responses import guess, scan, sizes_of
+from workbench.identify.parameters import Candidate, with_effects
+from workbench.identify.rollouts import COARSE, Jury, Question, take_of
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+FAR, FAR_WALKING = 5.0, 1.6
+"""Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
+LOOKED, LOOKED_SHARE, LOOKED_SHARE_HELD = 2.5, 0.3, 0.5
+"""How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on the
+ground and with the base held; else longer. Late in walks small differences have grown into others."""
+CALM = 0.5
+"""Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
+them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
+"""
+WORTH, WORTH_WALKING = 0.3, 0.5
+"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
+where that is cheap, and on a walk."""
+DOUBTED = 0.6
+"""Share of the least gain from which on the best are fitted where none is foretold all of it: signatures say too little where
+only a part of a walk was looked at."""
+BEHIND = 0.6
+"""Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
+REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
+"""Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect is
+looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
+MOST_FITTED = 3
+"""Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
+STEPS, STEPS_WALKING = 3, 2
+"""Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
+Part = Generator[list[Question], list[dict[int, Array]], T]
+"""What a part of a race asks, is answered, and returns."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
+    `Jury.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the choosing
+    stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
+    much less of it than of a rival that no fit was made."""
+
+    candidate: Candidate
+    x: Array
+    gain: Mapping[str, float]
+    joint: str | None
+    foretold: bool = False
+    closed: float = 0.0
+    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
+
+
+Asking = Part[list[Trial]]
+Seen = tuple[list[Array], list[list[Array]], float]
+"""Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
+Signatures = dict[tuple[object, ...], Seen]
+"""By group and takes."""
+
+
+@dataclass(frozen=True)
+class Race:
+    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
+    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
+    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
+    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
+    and how long these are looked at."""
+
+    remembered: dict[str | None, float] = field(default_factory=dict)
+    foretold: dict[str | None, float] = field(default_factory=dict)
+    reached: dict[str | None, float] = field(default_factory=dict)
+    wide: dict[bool, list[float]] = field(default_factory=dict)
+    least: float = 0.0
+    unheld: bool = False
+    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
+
+
+class Trying:
+    """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
+
+    A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
+    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. signatures: of earlier
+    races; this one's are added.
+    """
+
+    def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
+                 group: Sequence[Candidate], race: Race, apart: bool, signatures: Signatures) -> None:
+        self.jury, self.group, self.race, self.signatures = jury, group, race, signatures
+        self.with_these = with_effects(nominal, beside)
+        self.joints = [c.joint if apart else None for c in group]
+        self.walking = jury.walks(tuple(base))
+        self.base, self.takes = base, tuple(base)
+        self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
+        self.r0 = self._left(base)
+        self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
+        alone = self.coarse and self.walking  # walks are expensive
+        self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
+        lone = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
+        self.until = self._shown() if self.coarse and not lone else np.inf
+        self.without: dict[int, Array] = {}
+        self._name = (*(c.key for c in group), self.looked_at)
+
+    def run(self) -> Asking:
+        """Trials of all in the group."""
+        past = yield from self._past()
+        starts, gains = past or (yield from self._looked_at())
+        alive = [] if past else (yield from self._worth_fitting(gains))
+        out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
+               for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
+        if not alive:
+            return out
+        sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
+        finely = self.coarse and self.walking  # coarse steps say where to go, not what a walk makes of small differences
+        question = self._question(alive, sizes)
+        (final,) = yield [replace(question, step=1.0) if finely else question]
+        final = final if finely else self._told(final)
+        return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
+
+    def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
+        """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
+        known = self.signatures.get(self._name) if self.walking else None
+        guesses = None if known is None else self._guessed(*known)
+        if guesses is not None:
+            _tell(self.race.remembered, self.joints, guesses[1])
+        yield []  # until all have said what they remember
+        enough = max(REMEMBERED_LEAST * self.race.least, REMEMBERED * _best(self.race.remembered, None))
+        return None if guesses is None or guesses[1][0] >= enough else guesses
+
+    def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
+        """Sizes to start from and what signatures say they gain, from coarse rollouts."""
+        everyone = list(range(len(self.group)))
+        c = self.group[0]
+        probes = scan(c, sizes_of(c, self.walking, self.race.unheld), self.walking)
+        looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
+        plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
+        before = self._left(plain)
+        signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
+        self.signatures[self._name] = probes, signatures, self.until
+        told = self._guessed(probes, signatures, self.until)
+        calm = None if self.coarse or not self.walking else self._calmest(probes, signatures, told[1][0])
+        if calm is None:
+            return told
+        x = yield from self._fitted_on(*calm)
+        (answer,) = yield [self._question([0], [x])]
+        return max(told, ([x], [sum(self.power.values()) - self.jury.cost(answer, "fit")]), key=lambda t: t[1])
+
+    def _fitted_on(self, take: int, x: Array) -> Part[Array]:
+        """Sizes as one take alone wants them."""
+        def ask(point: Sequence[Array]) -> Question:
+            return replace(self._question([0], point), takes=(take,))
+
+        def tell(answer: dict[int, Array]) -> list[Array]:
+            return [self.jury.vector(answer, "fit")]
+
+        (answer,) = yield [ask([x])]
+        (solved,) = yield from through(self._stepping([x], tell(answer), [0], STEPS_WALKING), ask, tell)
+        return solved.x
+
+    def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
+        """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
+        beyond = {i: self.power[i] - self.jury.expected((i,), "fit") for i in self.takes}
+        if gain > CALM * sum(beyond.values()):
+            return None
+        take = take_of(self.jury.stretches(self.takes, "fit"))
+        best: tuple[int, Array] | None = None
+        most = CALM
+        for i in self.takes:
+            here = take == i
+            r0 = self.r0[0][here]
+            x, gain = guess(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
+            share = gain / max(beyond[i], self.race.least, 1.0)
+            if share > most:
+                best, most = (i, x), share
+        return best
+
+    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
+                 ) -> tuple[list[Array], list[float]]:
+        """Sizes to start from and what they gain, on all takes as on what was looked at."""
+        looked_at = self._early(until)
+        r0 = self._left(looked_at)
+        far = FAR_WALKING if self.walking else FAR
+        guesses = [guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
+        share = max(self.jury.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
+        return [g[0] for g in guesses], [g[1] / share for g in guesses]
+
+    def _shown(self) -> float:
+        """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
+        seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
+        share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
+        least = {j: share * self.jury.cost(seen, "fit", j) for j in self.joints}
+        while any(self.jury.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
+            until += LOOKED / 2
+        return until
+
+    def _early(self, until: float) -> dict[int, Array]:
+        """What there is already leaves of the takes that are looked at for so long [s]."""
+        key = self.looked_at, until
+        if key not in self.race.early:
+            self.race.early[key] = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
+        return self.race.early[key]
+
+    def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
+        """Of the group, those that are not told to be far behind a rival."""
+        race = self.race
+        alike = race.wide.setdefault(self.coarse, [])
+        alike.extend(g for j, g in zip(self.joints, gains) if j is None)
+        _tell(race.foretold, self.joints, gains)
+        yield []  # until all have said what they foretell
+        last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
+        worth = WORTH_WALKING if self.walking else WORTH
+        least = race.least * (1.0 if _best(race.foretold, None) > race.least else DOUBTED)
+        return [b for b, (j, g) in enumerate(zip(self.joints, gains))
+                if g > least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
+
+    def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
+        """Sizes after one step, and after all steps where the group is not behind by then."""
+        self.without, answer = yield [self._question([], []), self._question(alive, starts)]
+        first = self._left(self._told(answer))
+
+        def improved(start: list[Array], leaves: list[Array], n: int, since: Sequence[Solved] = ()) -> Part[list[Solved]]:
+            return (yield from through(self._stepping(start, leaves, alive, n, since), lambda p: self._question(alive, p),
+                                       lambda answer: [self._left(self._told(answer))[b] for b in alive]))
+
+        solved = yield from improved(starts, [first[b] for b in alive], 1)
+        gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
+        _tell(self.race.reached, [self.joints[b] for b in alive], gains)
+        yield []  # until all have come as far
+        if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
+            solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
+        return [s.x for s in solved]
+
+    def _stepping(self, start: list[Array], leaves: list[Array], which: Sequence[int], n: int, since: Sequence[Solved] = ()
+                  ) -> Asks:
+        """n steps of a fit of some of the group, at the strides that these takes need."""
+        bounds = [self.group[b].bounds() for b in which]
+        if not self.walking:
+            return fit_blocks(start, leaves, bounds, n, HELD, since)
+        return fit_blocks(start, leaves, bounds, n, WALKING, since, self.group[which[0]].magnitudes(start[0]))
+
+    def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
+        joint = self.joints[b]
+        off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
+        before, after = (self.jury.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
+        return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint),
+                     by_channel=before - after)
+
+    def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
+        """The robot with those of the group at these sizes, beside what there is already."""
+        model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
+        return Question(model, self.takes, COARSE if self.coarse else 1.0)
+
+    def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
+        """What an answer leaves: the difference that coarse steps tell, beside what the search's step leaves."""
+        return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
+
+    def _left(self, answer: dict[int, Array]) -> list[Array]:
+        return [self.jury.vector(answer, "fit", j) for j in self.joints]
+
+
+def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    for j, gain in zip(joints, gains):
+        best[j] = max(best.get(j, 0.0), gain)
+
+
+def _best(best: dict[str | None, float], joint: str | None) -> float:
+    """At a joint; of all, for what concerns all."""
+    return max(best.values()) if joint is None else best[joint]

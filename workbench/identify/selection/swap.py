@@ -1,0 +1,93 @@
+"""Effects that were found together in one joint, one of them replaced: what lines around their fit say of all others.
+
+Lines drawn from a robot that lacks nothing foretell poorly what an effect does beside two more. Around a fit they are short, and
+the others give way: sequential replacement (A. J. Miller, Subset Selection in Regression, 2002).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+from workbench.identify.fitting.fits import Fit, Search, Sizes
+from workbench.identify.fitting.levenberg_marquardt import HELD, steps_of
+from workbench.identify.fitting.responses import SCANNED, scan
+from workbench.identify.parameters import Candidate, with_effects
+from workbench.identify.rollouts import Question
+from workbench.identify.selection.best_subsets import AS_GOOD, Seen, possible, variants
+from workbench.identify.selection.screening import Trial
+
+Array = NDArray[np.float64]
+FITTED = 2
+"""Others that are fitted in each one's place."""
+NOTHING = {"fit": 0.0, "choose": 0.0}
+"""The gain of what lines only foretell."""
+
+
+def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str, alone: Sequence[Candidate],
+              beside: bool = False) -> list[list[Trial]]:
+    """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
+    whoever was asked about the joint, on these takes, whose base is held. beside: those, too, in which it stands for none."""
+    there = fit.sizes_by_key()
+    mine = [c for c in alone if c.key in there]
+    others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
+    if not mine or not others:
+        return []
+    moves = [_moved(c, there[c.key]) for c in mine]
+    probes = [scan(t.candidate, SCANNED, walking=False) for t in others]
+    asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
+    asked += [fit.sizes_without(c.key) for c in mine]
+    asked += [[*fit.sizes(), (t.candidate, p)] for t, points in zip(others, probes) for p in points]
+    answers = search.jury.residuals([Question(with_effects(search.nominal, sizes), takes) for sizes in asked])
+    seen = iter([search.jury.vector(a, "fit", joint) for a in answers])
+    left = search.jury.vector({i: fit.residuals[i] for i in takes}, "fit", joint)
+    slopes = [np.column_stack([(next(seen) - left) / float((x - there[c.key]).sum()) for x in points])
+              for c, points in zip(mine, moves)]
+    rests = [next(seen) for _ in mine]
+    signatures = [[next(seen) - left for _ in points] for points in probes]
+    out: list[list[Trial]] = []
+    for k, rest in enumerate([*rests, left] if beside else rests):
+        staying = [n for n in range(len(mine)) if n != k]
+        x = [there[mine[n].key] for n in staying]
+        sets = [s for t, points, did in zip(others, probes, signatures)
+                for s in in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
+        sets.sort(key=lambda s: s[0])
+        out += [chosen for cost, chosen in sets[:FITTED] if cost < AS_GOOD * sets[0][0]]
+    return out
+
+
+def _moved(c: Candidate, x: Array) -> list[Array]:
+    """Sizes with one number moved at a time."""
+    return list(x + np.diag(steps_of(x, *c.bounds(), HELD)))
+
+
+def in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
+             x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
+    """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
+    was seen; of several, all at once. rest: what is left without the other."""
+    ends = np.cumsum([0, *(len(size) for size in x)])
+    ways: list[tuple[float, list[Trial]]] = []
+    for seen in variants(t, points, did):
+        solved = lsq_linear(np.column_stack([*slopes, seen.signatures]), -rest, _bounds(seen, staying, x))
+        size = seen.sizes(solved.x[ends[-1]:])
+        if possible(seen, size):
+            beside = [Trial(e, start + solved.x[a:b], NOTHING, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
+            ways.append((2.0 * float(solved.cost), [*beside, replace(t, x=size, foretold=False)]))
+    return sorted(ways, key=lambda way: way[0])[:1]
+
+
+def _bounds(seen: Seen, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
+    """Of moves of those that stay, and of shares of the points at which the other was seen."""
+    low = [e.bounds()[0] - size for e, size in zip(staying, x)]
+    high = [e.bounds()[1] - size for e, size in zip(staying, x)]
+    if len(seen.points) == 1:
+        own = ~seen.trial.candidate.shapes
+        ends = np.sort(np.array(seen.trial.candidate.bounds())[:, own][:, 0] / seen.points[0][own][0])
+        return np.concatenate([*low, ends[:1]]), np.concatenate([*high, ends[1:]])
+    free = np.full(len(seen.points), np.inf)
+    return np.concatenate([*low, -free]), np.concatenate([*high, free])

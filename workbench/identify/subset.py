@@ -1,0 +1,116 @@
+"""What of the recordings a search looks at, as it asks for hundreds of rollouts, and which of it judges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.problem import BLOCK, JUDGES, PARTS, USES, TakeEvidence, part_of
+
+Array = NDArray[np.float64]
+LONG, SEARCHED = 60.0, 40.0
+"""Seconds of recording from which on a search looks at a share of it, and how much that is: what an effect must bring is
+measured by recordings of this length, too."""
+PIECE = 3 * len(USES) * BLOCK
+"""What a share grows by [s]."""
+
+STARVED = 0.1
+"""Share of what a channel lacks with the base held below which the frames that judge show too little of it."""
+
+
+def judged_fairly(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+    """Takes of which, with the base held, another third of the frames judges where that which does shows next to nothing of what
+    a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
+    return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e
+            for i, e in enumerate(evidence)]
+
+
+def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
+    ill = [e.channels.index(c) for c in channel_gaps(e, residual)]
+    seen = e.uses["fit"] | e.uses["choose"]
+    beyond = np.maximum(np.nan_to_num(np.square(residual[:, ill]) - 1.0), 0.0)[seen]
+    beyond = beyond[:, beyond.any(axis=0)]
+    if not beyond.size:
+        return e
+    part = part_of(e.since)
+    least = [float(np.min(beyond[part[seen] == k].sum(axis=0) / beyond.sum(axis=0))) for k in range(PARTS)]
+    judges = int(np.argmax(least))
+    if judges == JUDGES or least[JUDGES] >= STARVED:
+        return e
+    uses = {"fit": seen & (part != judges), "choose": seen & (part == judges)}
+    return replace(e, uses={**e.uses, **uses})
+
+
+def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+    """Takes as a search looks at them: not those that only validate; of long sessions, each from its first command until what is
+    missing there was seen, or not at all, so that every channel's gap shows, in as many takes as it has.
+
+    residuals (N, c): of the nominal robot, by take. Of what validates, nothing is used."""
+    ends = [float(e.since[-1]) for e in evidence]
+    fitted = [i for i, e in enumerate(evidence) if e.uses["fit"].any()]
+    if sum(ends[i] for i in fitted) <= LONG:
+        return [e if i in fitted else _until(e, 0.0) for i, e in enumerate(evidence)]
+    power = {i: _power(evidence[i], residuals[i]) for i in fitted}
+    names = list(dict.fromkeys(c for e in evidence for c in e.channels))
+    by_name = {i: _by_name(p, evidence[i].channels, names) for i, p in power.items()}
+    whole = np.sum([p.sum(axis=0) for p in by_name.values()], axis=0)
+    shares = {i: p / np.maximum(whole, 1e-9) for i, p in by_name.items()}
+    until = dict.fromkeys(range(len(evidence)), 0.0)
+    while True:
+        spent = sum(until.values())
+        steps = [(i, t) for i in fitted for t in np.append(np.arange(until[i] + PIECE, ends[i], PIECE), ends[i])
+                 if 0 < t - until[i] <= SEARCHED - spent + 1e-9]
+        if not steps:
+            break
+        shown = {i: _shown(evidence[i], shares[i], until[i]) for i in fitted}
+        best, end = max(steps, key=lambda s: (_shown(evidence[s[0]], shares[s[0]], s[1]) - shown[s[0]]) / (s[1] - until[s[0]]))
+        until[best] = float(end)
+    return [_until(e, until[i]) for i, e in enumerate(evidence)]
+
+
+def _power(e: TakeEvidence, residual: Array) -> Array:
+    """What is beyond noise (N, c), in frames that may be seen."""
+    seen = e.uses["fit"] | e.uses["choose"]
+    beyond = np.nan_to_num(np.square(residual) - 1.0) * seen[:, None] * e.weight
+    # of a channel that is well, chance leaves nothing: little is enough to look at it somewhere
+    return np.maximum(beyond, 0.01 * seen[:, None])
+
+
+def _by_name(values: Array, channels: Sequence[str], names: Sequence[str]) -> Array:
+    """Columns (N, c), one for each of `channels`, as those of all `names`."""
+    out = np.zeros((len(values), len(names)))
+    out[:, [names.index(c) for c in channels]] = values
+    return out
+
+
+def _shown(e: TakeEvidence, shares: Array, until: float) -> float:
+    """What a take is worth if it is looked at until then: the root favours what was not seen yet."""
+    return float(np.sum(np.sqrt(shares[e.since <= until].sum(axis=0))))
+
+
+def _until(e: TakeEvidence, until: float) -> TakeEvidence:
+    early = e.since <= until
+    return replace(e, until=until, uses={use: mask & early for use, mask in e.uses.items()})
+
+
+def share_of(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
+    """What to say of a search that looked at a share of what it might: seconds by take that it looked at; else empty."""
+    if all(np.isinf(e.until) for e in evidence if e.take.spec.use != "validate"):
+        return {}
+    return {"searched": {e.name: round(e.until, 1) for e in evidence if e.until > 0}}
+
+
+def floors_everywhere(evidence: Sequence[TakeEvidence], floors: Mapping[int, Array]) -> dict[int, Array]:
+    """Floors (c,) over sigma by take; of a take that was not looked at, the greatest of its channels' in others of its base."""
+    told = {i: f for i, f in floors.items() if evidence[i].until > 0}
+    out = dict(told)
+    for i in set(floors) - set(told):
+        e = evidence[i]
+        others = [dict(zip(evidence[k].channels, (f * evidence[k].sigma).tolist())) for k, f in told.items()
+                  if evidence[k].take.spec.base == e.take.spec.base]
+        out[i] = np.array([max((o.get(c, 0.0) for o in others), default=0.0) for c in e.channels]) / e.sigma
+    return out

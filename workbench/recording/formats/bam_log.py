@@ -1,0 +1,78 @@
+"""BAM logs (Rhoban/bam): JSON of one servo that carries a pendulum."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.numbers import rate_of
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.files import read_text
+
+Array = NDArray[np.float64]
+_FULL_DUTY = 885.0
+"""PWM register of an XL-330 at full duty; its load register holds the PWM, negatives as unsigned 16 bit."""
+_CHANNELS = {"goal_position": "goal", "position": "position", "speed": "velocity", "temp": "temperature"}
+_REQUIRED = ("timestamp", "position", "goal_position")
+
+
+def read_bam_log(path: str | Path) -> Recording:
+    """Reads a BAM log: rad, rad/s, volts and degrees Celsius as they stand; the load register becomes `duty`.
+
+    Time is the log's own. The joint has no name in the file and is called by its motor; a take calls it by the model's one joint.
+    InputError where it is no JSON, cut, lacks an entry's key or holds what is no number.
+    """
+    source = str(path)
+    try:
+        content = json.loads(read_text(path))
+    except json.JSONDecodeError as e:
+        raise InputError(source, f"line {e.lineno}, column {e.colno}: {e.msg}; expected whole JSON") from None
+    if not isinstance(content, dict) or not isinstance(content.get("entries"), list) or not content["entries"]:
+        raise InputError(source, "expected a JSON object with a list 'entries'")
+    entries: list[Any] = content["entries"]
+    time = _column(source, entries, "timestamp", True)
+    bad = np.flatnonzero(~(np.diff(time) > 0))
+    if len(bad):
+        raise InputError(source, f"entries[{bad[0] + 1}].timestamp: expected increasing times")
+    joint = str(content.get("motor", "servo"))
+    channels = {f"{channel}.{joint}": _column(source, entries, key, key in _REQUIRED) for key, channel in _CHANNELS.items()
+                if key in _REQUIRED or key in entries[0]}
+    problems = []
+    if "load" in entries[0]:
+        load = _column(source, entries, "load", False)
+        load = np.where(load > 32767, load - 65536, load)
+        if np.nanmax(np.abs(load)) <= _FULL_DUTY:
+            channels[f"duty.{joint}"] = load / _FULL_DUTY
+        else:
+            problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, and no duty is told")
+    if "input_volts" in entries[0]:
+        channels["voltage"] = _column(source, entries, "input_volts", False)
+    enabled = np.ones(len(time))
+    if "torque_enable" in entries[0]:
+        enabled = channels[f"enabled.{joint}"] = _column(source, entries, "torque_enable", False)
+    metadata = {k: str(v) for k, v in content.items() if isinstance(v, (str, int, float)) and not isinstance(v, bool)}
+    goals = channels[f"goal.{joint}"]
+    return Recording(source=source, kind="bam_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
+                     units="radians", channels=channels, metadata=metadata, problems=tuple(problems),
+                     commands=commands_of_rows(time, (joint,), goals[:, None], enabled[:, None] != 0))
+
+
+def _column(source: str, entries: list[Any], key: str, required: bool) -> Array:
+    out = np.full(len(entries), np.nan)
+    for i, entry in enumerate(entries):
+        value = entry.get(key) if isinstance(entry, dict) else None
+        if value is None and required:
+            raise InputError(source, f"entries[{i}]: key '{key}' is missing")
+        if value is not None and not isinstance(value, (int, float)):
+            raise InputError(source, f"entries[{i}].{key}: expected a number, got {value!r}")
+        if value is not None:
+            out[i] = value
+    if required and not np.isfinite(out).all():
+        raise InputError(source, f"entries[{int(np.argmin(np.isfinite(out)))}].{key}: expected a finite number")
+    return out

@@ -1,0 +1,103 @@
+"""Joint logs (contract, section 3): CSV of time, goals and what each servo reported; also as commands of a prediction."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.numbers import column, map_file, rate_of, read_columns, strings
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.files import write_whole
+
+Array = NDArray[np.float64]
+_DEGREES = np.pi / 180
+_SCALE = {"goal": _DEGREES, "position": _DEGREES, "velocity": _DEGREES, "duty": 1.0, "current": 1.0, "temperature": 1.0,
+          "enabled": 1.0}
+_TRUE, _FALSE = {"1", "1.0", "true"}, {"0", "0.0", "false"}
+
+
+def looks_like_joint_log(head: bytes) -> bool:
+    """Whether a file that begins with `head` has a header with `time` and goals or positions of joints."""
+    cells = _cells(head.partition(b"\n")[0])
+    return "time" in cells and any(c.startswith(("goal.", "position.")) for c in cells)
+
+
+def _cells(line: bytes) -> list[str]:
+    return [c.strip() for c in next(csv.reader([line.decode("utf-8-sig", "replace").rstrip("\r")]), [])]
+
+
+def read_joint_log(path: str | Path) -> Recording:
+    """Reads a joint log; degrees and deg/s become rad and rad/s, blanks NaN. Its commands are its goals.
+
+    InputError where a column is unknown, time does not increase, a joint has no goal, or a cell is no number. Positions given in
+    the first row alone are a start, and the file then is the commands of a prediction.
+    """
+    source = str(path)
+    content = map_file(path)
+    end = content.find(b"\n")
+    names = _cells(content[:end] if end >= 0 else content[:])
+    _check_names(source, names)
+    text = {i for i, name in enumerate(names) if name.startswith("enabled.")}
+    table = read_columns(source, content, len(content) if end < 0 else end + 1, 1, len(names), text)
+    time = column(table, names.index("time"))
+    bad = ~np.isfinite(time)
+    bad[1:] |= ~(np.diff(time) > 0)
+    if bad.any():
+        n = int(np.argmax(bad))
+        raise InputError(source, f"line {n + 2}: time {time[n]:g} does not follow; expected increasing times")
+    channels = {name: _channel(source, table, i, name) for i, name in enumerate(names) if name != "time"}
+    joints = tuple(n.removeprefix("goal.") for n in names if n.startswith("goal."))
+    goals = np.column_stack([channels[f"goal.{j}"] for j in joints])
+    on = np.ones(len(time))
+    enabled = np.column_stack([channels.get(f"enabled.{j}", on) for j in joints]) != 0
+    initial = np.array([channels.get(f"position.{j}", [np.nan])[0] for j in joints])
+    return Recording(source=source, kind="joint_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
+                     units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial))
+
+
+def _check_names(source: str, names: list[str]) -> None:
+    for i, name in enumerate(names):
+        kind, dot, joint = name.partition(".")
+        if name in names[:i]:
+            raise InputError(source, f"line 1: column '{name}' stands there twice")
+        if name not in ("time", "voltage") and not (dot and joint and kind in _SCALE):
+            raise InputError(source, f"line 1: unknown column '{name}'; expected time, voltage, or one of "
+                                     f"{', '.join(k + '.JOINT' for k in _SCALE)}")
+        if dot and f"goal.{joint}" not in names:
+            raise InputError(source, f"line 1: column '{name}' without 'goal.{joint}'")
+    if "time" not in names or not any(n.startswith("goal.") for n in names):
+        raise InputError(source, "line 1: expected a column 'time' and goals of joints")
+
+
+def _channel(source: str, table: pa.Table, index: int, name: str) -> Array:
+    kind = name.partition(".")[0]
+    if kind != "enabled":
+        return column(table, index) * _SCALE.get(kind, 1.0)
+    out, last = np.empty(table.num_rows), 1.0
+    for n, cell in enumerate(strings(table, index)):
+        word = cell.strip().lower()
+        if word and word not in _TRUE | _FALSE:
+            raise InputError(source, f"line {n + 2}, {name}: expected 1 or 0, got '{cell}'")
+        last = last if not word else float(word in _TRUE)  # a blank repeats the last one
+        out[n] = last
+    return out
+
+
+def write_joint_log(path: str | Path, time: Array, channels: Mapping[str, Array]) -> Path:
+    """Writes a joint log whole or not at all; channels in SI and radians, by the contract's names; NaN becomes a blank."""
+    rows = [np.asarray(time, dtype=float), *(np.asarray(c, dtype=float) / _SCALE.get(n.partition(".")[0], 1.0)
+                                            for n, c in channels.items())]
+    out = io.StringIO()
+    write = csv.writer(out, lineterminator="\n").writerow
+    write(["time", *channels])
+    for row in np.column_stack(rows):
+        write(["" if np.isnan(v) else f"{v:.9g}" for v in row])
+    return write_whole(path, out.getvalue())

@@ -1,0 +1,134 @@
+"""Reader of Motive CSV exports, versions 1.20 to 1.25."""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Collection
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.motive_header import Asset, MotiveHeader, euler_order, metres_per_unit, number, parse_header
+from workbench.recording.formats.numbers import column, map_file, read_columns, stacked
+from workbench.recording.mocap.quaternions import from_euler
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+
+Array = NDArray[np.float64]
+_BODIES = ("Rigid Body", "Bone")
+
+
+def read_motive(path: str | Path) -> Recording:
+    """Reads a Motive CSV (OptiTrack, "Data Export: CSV") in one pass over the file.
+
+    Time is (frame - first frame) / export rate; lengths become metres; quaternions are stored wxyz, as the file has
+    them, sign included; Euler angles (intrinsic, degrees, in the order that the header names) become quaternions; blank cells
+    are NaN. InputError names the line where a file is cut or holds what is no number.
+    """
+    source = str(path)
+    mapped = map_file(path)
+    header = parse_header(source, memoryview(mapped))
+    scale = metres_per_unit(source, header)
+    table = _read_body(source, mapped, header)
+    frames = _frames(source, header, table)
+    problems: list[str] = []
+    rate = _rate(source, header, table, frames, problems)
+    problems += _missing(source, header, mapped, frames)
+    bodies: dict[str, BodyTrack] = {}
+    markers: dict[str, Array] = {}
+    raw = {a.name for a in header.assets if a.kind == "Marker"}
+    for asset in header.assets:
+        if asset.kind in _BODIES and (asset.rotation or asset.position):
+            bodies[_unused(asset.name, bodies)] = _track(source, header, asset, table, scale)
+        elif asset.position:
+            namesake = asset.kind != "Marker" and asset.name in raw  # a solved marker makes way for the raw one
+            name = _unused(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
+            markers[name] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
+    metadata = dict(header.metadata)
+    metadata |= {f"Parent of {child}": parent for child, parent in header.parents.items()}
+    if header.timecode is not None:
+        metadata["First TimeCode"] = str(table.column(str(header.timecode))[0].as_py() or "")
+    if "Length Units" not in metadata:
+        problems.append("the header does not say the length units; metres are assumed")
+    return Recording(source=source, kind="motive", version=header.version, time=(frames - frames[0]) / rate, frames=frames,
+                     rate=rate, units=metadata.get("Length Units", "Meters"), rigid_bodies=bodies, markers=markers,
+                     metadata=metadata, problems=tuple(problems))
+
+
+def _read_body(source: str, content: mmap.mmap, header: MotiveHeader) -> pa.Table:
+    wanted = {0, 1} if header.columns > 1 else {0}
+    for a in header.assets:
+        wanted |= {*a.rotation.values(), *a.position.values()}
+        if a.error is not None:
+            wanted.add(a.error)
+    text = set() if header.timecode is None else {header.timecode}
+    return read_columns(source, content, header.offset, header.lines, header.columns, text, wanted | text)
+
+
+def _in_order(columns: dict[str, int], letters: str) -> list[int]:
+    return [columns[letter] for letter in letters]
+
+
+def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, scale: float) -> BodyTrack:
+    count = table.num_rows
+    if not asset.rotation:
+        quat = np.full((count, 4), np.nan)
+    elif "W" in asset.rotation:
+        quat = stacked(table, _in_order(asset.rotation, "WXYZ")).T
+    else:
+        angles = np.deg2rad(stacked(table, _in_order(asset.rotation, "XYZ")))
+        quat = from_euler(dict(zip("XYZ", angles)), euler_order(source, header))
+    p = stacked(table, _in_order(asset.position, "XYZ")) if asset.position else np.full((3, count), np.nan)
+    if scale != 1:
+        p *= scale
+    error = None if asset.error is None else column(table, asset.error) * scale
+    return BodyTrack(p=p.T, quat=quat, error=error)
+
+
+def _frames(source: str, header: MotiveHeader, table: pa.Table) -> NDArray[np.int64]:
+    frames = column(table, 0)
+    bad = ~np.isfinite(frames)
+    bad[1:] |= ~(np.diff(frames) > 0)
+    if bad.any():
+        n = int(np.argmax(bad))
+        raise InputError(source, f"line {header.lines + 1 + n}: frame {frames[n]:g} does not follow; expected increasing numbers")
+    return frames.astype(np.int64)
+
+
+def _rate(source: str, header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], problems: list[str]) -> float:
+    """Export rate of the header, else capture rate, else from the Time column, which is rounded to a millisecond."""
+    rate = number(source, header, "Export Frame Rate") or number(source, header, "Capture Frame Rate")
+    if rate is not None:
+        return rate
+    time = column(table, 1) if header.columns > 1 else np.zeros(1)
+    if len(time) < 2 or not time[-1] > time[0]:
+        raise InputError(source, "header: no Export Frame Rate, and no times to tell it from")
+    problems.append("the header does not say the frame rate; it is taken from the Time column")
+    return float((frames[-1] - frames[0]) / (time[-1] - time[0]))
+
+
+def _missing(source: str, header: MotiveHeader, mapped: mmap.mmap, frames: NDArray[np.int64]) -> list[str]:
+    problems = []
+    steps = np.diff(frames)
+    holes = np.flatnonzero(steps > 1)
+    if len(holes):
+        lost = int(steps[holes].sum() - len(holes))
+        problems.append(f"frames missing: {lost} in {len(holes)} hole(s), the first after frame {frames[holes[0]]}")
+    announced = number(source, header, "Total Exported Frames")
+    if announced is not None and announced != len(frames):
+        if len(frames) < announced and mapped[-1:] != b"\n":  # a cut inside the last cell leaves a row that looks whole
+            line = header.lines + len(frames)
+            raise InputError(source, f"line {line}: the file is cut, at {len(frames)} of {announced:.0f} frames and no line end")
+        problems.append(f"the header announces {announced:.0f} frames, the file holds {len(frames)}")
+    return problems
+
+
+def _unused(name: str, taken: Collection[str]) -> str:
+    """The name, numbered where two assets share it."""
+    out, n = name, 2
+    while out in taken:
+        out, n = f"{name} {n}", n + 1
+    return out

@@ -1,0 +1,143 @@
+"""SAGE programmes (isaac-sim2real/sage): motions of an arm of position servos, as npz or as the folder of raw CSV files."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+from pyarrow import csv as arrow_csv
+
+from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.numbers import map_file, rate_of
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.files import read_text
+
+Array = NDArray[np.float64]
+JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
+"""Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""
+URDF_JOINTS = dict(zip(JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")))
+"""The same joints by their names in the arm's published URDF."""
+_FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
+_MORE = {"v_meas": "velocity", "tau_abs": "torque_magnitude"}
+
+
+def sage_programmes(path: str | Path) -> tuple[str, ...]:
+    """Names of the programmes in an npz, without reading them; none where it is no such file."""
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
+            return tuple(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError):
+        return ()
+
+
+def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
+    """Reads one programme of an npz with keys `<programme>/<field>` (seconds, radians).
+
+    Without `programme` an npz of several gives all of them one after the other, each on its own clock, which can be inspected but
+    makes no take. Channels goal, position, velocity and torque_magnitude (from the current register, without sign) of each joint.
+    """
+    source = str(path)
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
+            names = list(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
+            wanted = [k for k in content.files if programme is None or k.rpartition("/")[0] == programme]
+            fields = {key: np.asarray(content[key], dtype=float) for key in wanted}
+    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as e:
+        raise InputError(source, f"not a whole npz of number arrays: {e}") from None
+    if programme is not None and programme not in names:
+        raise InputError(source, f"no programme '{programme}'; expected one of {', '.join(names)}")
+    parts = [_npz_programme(source, fields, n) for n in ([programme] if programme is not None else names)]
+    if not parts:
+        raise InputError(source, "expected arrays '<programme>/<field>', found none")
+    return parts[0] if len(parts) == 1 else _all_of(source, names, parts)
+
+
+def _npz_programme(source: str, fields: dict[str, Array], name: str) -> Recording:
+    prefix = f"{name}/" if name else ""
+    for field, dimensions in _FIELDS.items():
+        array = fields.get(prefix + field)
+        if array is None or array.ndim != dimensions:
+            raise InputError(source, f"'{prefix}{field}': expected an array of {dimensions} dimension(s)")
+    width = fields[prefix + "q_meas"].shape[1]
+    joints = JOINTS if width == len(JOINTS) else tuple(f"joint_{i + 1}" for i in range(width))
+    more = {channel: fields[prefix + field] for field, channel in _MORE.items() if prefix + field in fields}
+    return _recording(source, name, joints, fields[prefix + "t_cmd"], fields[prefix + "q_cmd"], fields[prefix + "t_meas"],
+                      {"position": fields[prefix + "q_meas"], **more})
+
+
+def read_sage_raw(path: str | Path) -> Recording:
+    """Reads the folder of a programme, or one of its files: control.csv, state_motor.csv (microseconds, radians) and
+    joint_list.txt."""
+    folder = Path(path) if Path(path).is_dir() else Path(path).parent
+    joints = tuple(line.strip() for line in read_text(folder / "joint_list.txt").splitlines() if line.strip())
+    t_cmd, goals = _vectors(folder / "control.csv", ("positions",), len(joints))
+    t_meas, measured = _vectors(folder / "state_motor.csv", ("positions", "velocities", "torques"), len(joints))
+    channels = {"position": measured["positions"], "velocity": measured["velocities"], "torque_magnitude": measured["torques"]}
+    return _recording(str(path), folder.name, joints, t_cmd, goals["positions"], t_meas, channels)
+
+
+def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, dict[str, Array]]:
+    """Times (N,) [s], and (N, width) of each column whose cells are JSON vectors."""
+    source = str(path)
+    content = map_file(path)
+    try:
+        table = arrow_csv.read_csv(pa.BufferReader(pa.py_buffer(memoryview(content))), convert_options=arrow_csv.ConvertOptions(
+            column_types={"timestamp": pa.float64(), **dict.fromkeys(columns, pa.string())}))
+    except pa.ArrowInvalid as e:
+        raise InputError(source, f"{e}") from None
+    missing = [c for c in ("timestamp", *columns) if c not in table.column_names]
+    if missing:
+        raise InputError(source, f"line 1: column '{missing[0]}' is missing")
+    out = {}
+    for name in columns:
+        cells = table.column(name).to_pylist()
+        try:
+            rows = json.loads("[" + ",".join(cells) + "]")
+            out[name] = np.array(rows, dtype=float).reshape(len(cells), width)
+        except (ValueError, TypeError):
+            n = next(i for i, c in enumerate(cells) if not _is_vector(c, width))
+            got = str(cells[n])[:60]
+            raise InputError(source, f"line {n + 2}, {name}: expected {width} numbers in brackets, got '{got}'") from None
+    return np.asarray(table.column("timestamp").to_numpy(), dtype=float) * 1e-6, out
+
+
+def _is_vector(cell: str | None, width: int) -> bool:
+    try:
+        return len(np.array(json.loads(cell or ""), dtype=float).reshape(-1)) == width
+    except (ValueError, TypeError):
+        return False
+
+
+def _recording(source: str, name: str, joints: tuple[str, ...], t_cmd: Array, goals: Array, time: Array,
+               measured: dict[str, Array]) -> Recording:
+    for what, t in (("command", t_cmd), ("measurement", time)):
+        if len(t) == 0 or not np.all(np.diff(t) > 0):
+            raise InputError(source, f"{name}: {what} times do not increase")
+    for what, values in {"goal": goals, **measured}.items():
+        rows = len(t_cmd) if what == "goal" else len(time)
+        if values.shape != (rows, len(joints)):
+            raise InputError(source, f"{name}: {what} has shape {values.shape}; expected {(rows, len(joints))}")
+    commands = commands_of_rows(t_cmd, joints, goals, np.ones(goals.shape, dtype=bool))
+    latest = np.maximum(np.searchsorted(t_cmd, time, side="right") - 1, 0)
+    channels = {f"goal.{j}": goals[latest, i] for i, j in enumerate(joints)}
+    channels |= {f"{what}.{j}": values[:, i] for what, values in measured.items() for i, j in enumerate(joints)}
+    return Recording(source=source, kind="sage", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
+                     units="radians", channels=channels, commands=commands,
+                     metadata={"programme": name, "first command": repr(float(t_cmd[0]))})
+
+
+def _all_of(source: str, names: list[str], parts: list[Recording]) -> Recording:
+    time = np.concatenate([p.time for p in parts])
+    common = [c for c in parts[0].channels if all(c in p.channels for p in parts)]
+    return Recording(
+        source=source, kind="sage", version="", time=time, frames=np.arange(len(time)),
+        rate=float(np.median([p.rate for p in parts])), units="radians",
+        channels={c: np.concatenate([p.channels[c] for p in parts]) for c in common},
+        metadata={"programmes": ", ".join(names)},
+        problems=(f"holds {len(names)} programmes, each on its own clock; choose one as FILE#PROGRAMME",))
+

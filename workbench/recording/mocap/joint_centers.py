@@ -1,0 +1,99 @@
+"""Where joints turn, as the bodies on both sides show it, and from that how far apart the joints of a link are.
+
+No link length, pivot or zero of the model goes in: a link that is not as long as drawn shows without any simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.tracks import SeenJoint, Tracks
+
+Array = NDArray[np.float64]
+LEAST_TURN = 0.03
+"""RMS angle [rad] by which a joint has to turn for its axis to show."""
+LEAST_FRAMES = 50
+PARALLEL = 0.9
+"""Cosine from which on two axes count as parallel."""
+
+
+@dataclass(frozen=True)
+class Center:
+    """A joint's axis: a point on it from the pivot of the parent's body and from that of the child's, and its direction, all (3,)
+    [m] in that body's frame; covariance (6, 6) of both points, which says nothing along the axis."""
+
+    in_parent: Array
+    in_child: Array
+    axis_in_parent: Array
+    axis_in_child: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Span:
+    """The way from one joint to the next on the body between them: what of it lies across both axes, (3,) [m] in the body's
+    frame, and the standard deviation of its length [m]."""
+
+    joint: str
+    following: str
+    way: Array
+    sigma: float
+
+
+def joint_center(tracks: Tracks, joint: SeenJoint) -> Center | None:
+    """Least squares of a point that both bodies carry round alike, p_P + R_P a = p_C + R_C b in each frame (R. M. Ehrig et al.,
+    A survey of formal methods for determining the centre of rotation of ball joints, J. Biomechanics 39, 2006; about one axis
+    alone it leaves the place along that axis open, where the least squares take what lies nearest to the pivots). None where
+    the parent was not tracked or the joint hardly turned."""
+    if joint.parent is None:
+        return None
+    good = tracks.seen[joint.parent] & tracks.seen[joint.child] & ~tracks.mended
+    n = int(good.sum())
+    if n < LEAST_FRAMES:
+        return None
+    R_P, R_C = quat.matrix(tracks.q[joint.parent, good]), quat.matrix(tracks.q[joint.child, good])
+    R_PC = np.einsum("nji,njk->nik", R_P, R_C)
+    between = np.einsum("nji,nj->ni", R_P, tracks.p[joint.child, good] - tracks.p[joint.parent, good])
+    total = R_PC.sum(axis=0)
+    normal = np.block([[n * np.eye(3), -total], [-total.T, n * np.eye(3)]])
+    right = np.concatenate([between.sum(axis=0), -np.einsum("nji,nj->i", R_PC, between)])
+    powers, ways = np.linalg.eigh(normal)
+    if powers[1] < n * LEAST_TURN**2 / 2:
+        return None
+    seen = ways[:, 1:]
+    point = seen @ ((seen.T @ right) / powers[1:])
+    left = between - point[:3] + R_PC @ point[3:]
+    covariance = float(np.mean(left**2)) * (seen / powers[1:]) @ seen.T
+    axes = [way / np.linalg.norm(way) for way in (ways[:3, 0], ways[3:, 0])]
+    return Center(point[:3], point[3:], axes[0], axes[1], covariance)
+
+
+def spans(tracks: Tracks, joints: Sequence[SeenJoint]) -> list[Span]:
+    """Of each tracked link the ways from the axis that carries it to those that it carries."""
+    centers = {j.name: (j, c) for j in joints if (c := joint_center(tracks, j)) is not None}
+    out = []
+    for carrying, first in centers.values():
+        for following, second in centers.values():
+            if following.parent == carrying.child:
+                way = across(second.in_parent - first.in_child, first.axis_in_child, second.axis_in_parent)
+                distance = float(np.linalg.norm(way))
+                if distance > 0:
+                    both = first.covariance[3:, 3:] + second.covariance[:3, :3]
+                    out.append(Span(carrying.name, following.name, way, float(np.sqrt(way @ both @ way)) / distance))
+    return out
+
+
+def across(way: Array, one: Array, other: Array) -> Array:
+    """What of a way (3,) between two axes, of directions (3,) each, lies across both."""
+    if abs(one @ other) > PARALLEL:
+        axis = one + np.sign(one @ other) * other
+        axis = axis / np.linalg.norm(axis)
+        return np.asarray(way - axis * (axis @ way))
+    normal = np.cross(one, other)
+    normal = normal / np.linalg.norm(normal)
+    return np.asarray(normal * (normal @ way))

@@ -1,0 +1,133 @@
+"""Finds how the robot was looked at: start, yaw, origin and pivots, and nothing else, from rest and first motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+from workbench.recording.log_state import first_command, resolution
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.angles import Angles, joint_angles
+from workbench.recording.mocap.mending import mend
+from workbench.recording.mocap.pivots import base_origin, find_pivots
+from workbench.recording.mocap.start import StartEstimate, find_start, lagged_reference
+from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets, tracks_of
+from workbench.recording.mocap.yaw import YawEstimate, yaw_of
+from workbench.recording.recording import Measurement, Recording
+from workbench.recording.take import Take
+from workbench.recording.take_from import named_by_model
+from workbench.robot import InputError, RobotModel
+
+Array = NDArray[np.float64]
+_SETTLED = 0.02  # [s] before the start that are not counted as rest
+_FEW = 5  # frames of rest that are too few to tell noise from
+
+
+@dataclass(frozen=True)
+class _Rest:
+    pose: Mapping[str, float]
+    rotation: Array
+
+
+def register(recording: Recording, model: RobotModel, commands: Commands | None, predicted: Take | None = None,
+             starts_at: float | None = None, yaw: float | None = None, base: str = "free") -> Measurement:
+    """How a recording looked at the robot.
+
+    predicted: a simulated take of the same commands; if it is not zeroed, the pose and tilt in which it rests are taken as the
+    pose that the recorded zeros mean. Without it the commands through a lag stand in. starts_at [s], yaw [rad]: given
+    instead of found (the yaw of a session: `session_yaw`). base: "free" or "fixed". Clock rate 1 and marker frames are taken as
+    stated. Logs carry
+    their own commands and clock. InputError where a start cannot be found.
+    """
+    if recording.kind != "motive":
+        return _register_log(recording, model, starts_at)
+    check_assets(recording, model)
+    tracks = mend(tracks_of(recording), model)
+    heading = YawEstimate(yaw, float("nan"), {}) if yaw is not None else yaw_of([tracks], model, [commands], base)
+    angles = joint_angles(tracks, model, heading.yaw, base)
+    start = _start(recording, tracks, angles, commands, predicted, starts_at)
+    resting = tracks.time < start.time - _SETTLED
+    rest = _rest_of(predicted)
+    found = find_pivots(tracks, angles, model, heading.yaw, rest.pose, rest.rotation)
+    return Measurement(
+        starts_at=start.time, starts_at_sigma=start.sigma, joint_starts=start.by_joint, yaw=heading.yaw, yaw_sigma=heading.sigma,
+        origin=base_origin(tracks, model, heading.yaw, found.pivots, resting, rest.rotation),
+        pivots=found.pivots, pivot_sigma=found.sigma, pivot_residual=found.residual,
+        rest=_rest_poses(tracks, resting),
+        noise=dict(zip(angles.joints, noise_at_rest(angles.q, resting & ~tracks.mended))),
+        position_noise=_position_noise(tracks, resting), rest_pose=rest.pose, rest_rotation=rest.rotation)
+
+
+def _register_log(recording: Recording, model: RobotModel, starts_at: float | None) -> Measurement:
+    """A log's clock is its own; SAGE's first command may come before or after the first measurement."""
+    recording = named_by_model(recording, model)
+    noise = {}
+    for joint in model.joints:
+        position = recording.channels.get(f"position.{joint}")
+        if position is not None:
+            still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
+            noise[joint] = float(np.fmax(still, resolution(position) / np.sqrt(12)))
+    return Measurement(starts_at=first_command(recording, starts_at), noise=noise)
+
+
+def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Commands | None, predicted: Take | None,
+           starts_at: float | None) -> StartEstimate:
+    if starts_at is not None:
+        return StartEstimate(starts_at, 0.0, {})
+    if predicted is None:
+        if commands is None:
+            raise InputError(recording.source, "start: expected commands or starts_at, to know when the motion begins")
+        predicted = lagged_reference(commands)
+    noise = noise_at_rest(angles.q, np.zeros(len(angles.q), dtype=bool))
+    return find_start(tracks.time, angles.joints, angles.q, noise, predicted.zeroed_at_rest())
+
+
+def noise_at_rest(q: Array, resting: NDArray[np.bool_]) -> Array:
+    """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; where there is too little rest, from third
+    differences of the whole (white noise e has third differences of variance 20 e^2, motion hardly any)."""
+    with np.errstate(invalid="ignore"):
+        differences = np.abs(np.diff(q, n=3, axis=0))
+    out = np.full(q.shape[1], np.nan)
+    for c in range(q.shape[1]):
+        rest = q[resting, c][np.isfinite(q[resting, c])]
+        if len(rest) >= _FEW:
+            out[c] = rest.std(ddof=1)
+        else:
+            d = differences[:, c][np.isfinite(differences[:, c])]
+            out[c] = 1.4826 * np.median(d) / np.sqrt(20) if len(d) else np.nan
+    return out
+
+
+def _position_noise(tracks: Tracks, resting: NDArray[np.bool_]) -> float:
+    if resting.sum() < _FEW:
+        return float("nan")
+    p = tracks.p[:, resting & ~tracks.mended]
+    seen = np.isfinite(p).all(axis=-1).sum(axis=1) >= _FEW
+    return float(np.sqrt(np.mean(np.nanvar(p[seen], axis=1, ddof=1)))) if seen.any() else float("nan")
+
+
+def _rest_poses(tracks: Tracks, resting: NDArray[np.bool_]) -> dict[str, tuple[Array, Array]]:
+    out = {}
+    for i, asset in enumerate(tracks.assets):
+        at = tracks.seen[i] & resting
+        if not at.any():
+            at = tracks.seen[i] & (np.cumsum(tracks.seen[i]) == 1)
+        if at.any():
+            q = quat.mean(tracks.q[i, at])
+            out[asset] = capture_axes(tracks.p[i, at].mean(axis=0)), np.concatenate([q[:1], capture_axes(q[1:])])
+    return out
+
+
+def _rest_of(predicted: Take | None) -> _Rest:
+    """The pose in which a simulated take rests; neutral and level where it does not say."""
+    level = np.array([1.0, 0, 0, 0])
+    if predicted is None or predicted.zeroed or not predicted.resting.any():
+        return _Rest({}, level)
+    q = predicted.q[predicted.resting].mean(axis=0)
+    turn = level if predicted.quat_WB is None else quat.mean(predicted.quat_WB[predicted.resting])
+    return _Rest(dict(zip(predicted.joints, q.tolist())), turn)
+

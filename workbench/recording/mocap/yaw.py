@@ -1,0 +1,155 @@
+"""The robot's heading in the capture's axes, from the axes about which its joints turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.motion.commands import Commands
+from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, relative_rotation, seen_joints, tracks_of, turned
+from workbench.recording.recording import Recording
+from workbench.robot import InputError, RobotModel
+
+Array = NDArray[np.float64]
+_LEAST = np.deg2rad(2.0)  # a joint that turns less says little about its axis
+_CLEAR = 0.3
+
+
+@dataclass(frozen=True)
+class YawEstimate:
+    """yaw [rad], positive to the left, of the model's forward axis in the capture's axes; sigma [rad]; by_joint: what each
+    joint alone would say [rad]."""
+
+    yaw: float
+    sigma: float
+    by_joint: dict[str, float]
+
+
+@dataclass(frozen=True)
+class _Evidence:
+    """Of one joint in one take: horizontal direction (mod pi) in which its rotation vectors lie, less the model's [rad], its
+    variance [rad^2]."""
+
+    joint: str
+    angle: float
+    variance: float
+
+
+def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = (),
+                base: str = "free") -> YawEstimate:
+    """One yaw for all takes of a session, whose capture frame does not move (contract, section 1).
+
+    In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so what tells the
+    yaw is the axes of the relative rotations. Each joint's is the first principal axis of its rotation vectors; the weighted
+    median over joints and takes is robust to a loose mount. Half a turn stays open: where the bodies stand decides,
+    else the sign in which joints follow their commands.
+    """
+    tracks = [_prepared(r, model) for r in recordings if r.kind == "motive"]
+    return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))], base)
+
+
+def _prepared(recording: Recording, model: RobotModel) -> Tracks:
+    check_assets(recording, model)
+    return tracks_of(recording)
+
+
+def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], base: str = "free") -> YawEstimate:
+    """As `session_yaw`, of tracks."""
+    evidence: list[_Evidence] = []
+    for tracks in takes:
+        for joint in seen_joints(tracks, model, base)[0]:
+            evidence += _axis_evidence(tracks, joint)
+    if not evidence:
+        raise InputError(None, "yaw: no tracked joint turns by more than 2 degrees about a level axis; give the yaw")
+    angle = np.array([e.angle for e in evidence])
+    weight = 1 / np.array([e.variance for e in evidence])
+    doubled = np.sum(weight * np.exp(2j * angle))  # directions, not vectors: mod pi
+    start = float(np.angle(doubled) / 2)
+    off = _wrapped(angle - start, np.pi)
+    yaw = start + weighted_median(off, weight)
+    off = _wrapped(angle - yaw, np.pi)
+    spread = 1.4826 * weighted_median(np.abs(off), weight)
+    effective = float(weight.sum() ** 2 / (weight**2).sum())
+    sigma = max(1.25 * spread / np.sqrt(effective), float(weight.sum() ** -0.5))
+    if _faces_backwards(takes, model, commands, yaw, base):
+        yaw += np.pi
+    yaw = float(_wrapped(np.array(yaw), 2 * np.pi))
+    by_joint: dict[str, float] = {}
+    for name in dict.fromkeys(e.joint for e in evidence):
+        mine = [i for i, e in enumerate(evidence) if e.joint == name]
+        by_joint[name] = yaw + float(np.average(off[mine], weights=weight[mine]))
+    return YawEstimate(yaw, float(sigma), by_joint)
+
+
+def _wrapped(angle: Array, period: float) -> Array:
+    return np.asarray(np.mod(angle + period / 2, period) - period / 2)
+
+
+def weighted_median(values: Array, weights: Array) -> float:
+    """Middle of the weight, between the two values that straddle it."""
+    order = np.argsort(values)
+    v, w = values[order], weights[order]
+    share = (np.cumsum(w) - w / 2) / w.sum()
+    return float(np.interp(0.5, share, v))
+
+
+def _axis_evidence(tracks: Tracks, joint: SeenJoint) -> list[_Evidence]:
+    level = float(np.hypot(joint.axis[0], joint.axis[1]))
+    r = quat.rotation_vector(relative_rotation(tracks, joint))
+    r = r[np.isfinite(r).all(axis=1)]
+    if level < 0.5 or len(r) < 10:
+        return []
+    values, vectors = np.linalg.eigh(r.T @ r / len(r))
+    if values[2] < _LEAST**2:
+        return []
+    found = vectors[:, 2]
+    angle = np.arctan2(found[1], found[0]) - np.arctan2(joint.axis[1], joint.axis[0])
+    noise = max(values[1], 1e-8)  # across the axis
+    return [_Evidence(joint.name, float(angle), noise / (values[2] * len(r)) / level**2)]
+
+
+def _faces_backwards(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], yaw: float,
+                     base: str) -> bool:
+    layout = sum(_layout(t, model, yaw) for t in takes) / len(takes)
+    if abs(layout) > _CLEAR:
+        return layout < 0
+    following = sum(_following(t, model, c, yaw, base) for t, c in zip(takes, commands) if c is not None)
+    return (following or layout) < 0
+
+
+def _layout(tracks: Tracks, model: RobotModel, yaw: float) -> float:
+    """Correlation (-1 to 1) of where the bodies stand at first with where the model's links are."""
+    k = model.kinematics
+    poses = k.forward(np.zeros((1, len(k.joints))))
+    found, nominal = [], []
+    for i, asset in enumerate(tracks.assets):
+        at = np.flatnonzero(tracks.seen[i])
+        if len(at) and asset in model.rigid_bodies:
+            link = model.rigid_bodies[asset]
+            p, R = poses[link]
+            nominal.append((p[0] + R[0] @ k.centers.get(link, np.zeros(3)))[:2])
+            found.append(turned(tracks.p[i, at[0]], -yaw)[:2])
+    if len(found) < 3:
+        return 0.0
+    a, b = np.array(found) - np.mean(found, axis=0), np.array(nominal) - np.mean(nominal, axis=0)
+    size = np.linalg.norm(a) * np.linalg.norm(b)
+    return float(np.sum(a * b) / size) if np.linalg.norm(b) > 0.02 else 0.0
+
+
+def _following(tracks: Tracks, model: RobotModel, commands: Commands | None, yaw: float, base: str) -> float:
+    """Sum over joints [rad] of how far they turned to the side to which commands turn them further; needs no start."""
+    assert commands is not None
+    total = 0.0
+    for joint in seen_joints(tracks, model, base)[0]:
+        if joint.name not in commands.joints:
+            continue
+        q = quat.swing_twist(relative_rotation(tracks, joint), turned(joint.axis, yaw))[0]
+        goals = commands.goals[:, commands.column(joint.name)]
+        high, low = float(np.nanmax(q)), float(np.nanmin(q))
+        asked = float(goals.max() + goals.min())
+        total += np.sign(asked) * (high + low) if abs(asked) > _LEAST else 0.0
+    return total

@@ -1,0 +1,61 @@
+"""Figures as files: encoded, or saved."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from workbench.robot.errors import InputError
+from workbench.robot.files import write_whole
+from workbench.view.figures.style import styled
+
+LARGEST_SVG = 200_000
+"""From here on [bytes] curves are kept only where they still take less room than pixels."""
+
+
+@dataclass(frozen=True)
+class EncodedFigure:
+    """A figure's file: its MIME type and content."""
+
+    mime: str
+    content: bytes
+
+
+@styled
+def encode(figure: Figure) -> EncodedFigure:
+    """SVG, or PNG where the SVG would be large and larger. The same figure gives the same bytes."""
+    _settle(figure)
+    svg = EncodedFigure("image/svg+xml", _printed(figure, "svg"))
+    if len(svg.content) <= LARGEST_SVG:
+        return svg
+    png = EncodedFigure("image/png", _printed(figure, "png"))
+    return min(svg, png, key=lambda encoded: len(encoded.content))
+
+
+@styled
+def save_figure(figure: Figure, path: str | Path) -> Path:
+    """Writes .svg, .png or .pdf, whole or not at all; InputError for another ending or where it cannot be written."""
+    path = Path(path)
+    kind = path.suffix.removeprefix(".").lower()
+    if kind not in ("svg", "png", "pdf"):
+        raise InputError(path, "expected a figure's name to end in .svg, .png or .pdf")
+    _settle(figure)
+    return write_whole(path, _printed(figure, kind))
+
+
+def _settle(figure: Figure) -> None:
+    """Lays the figure out once and for all; the layout engine would move things a little at each drawing."""
+    if figure.get_layout_engine() is not None:
+        figure.draw_without_rendering()
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+
+
+def _printed(figure: Figure, kind: str) -> bytes:
+    out = io.BytesIO()
+    metadata = {"svg": {"Date": None}, "png": {"Software": None}, "pdf": {"CreationDate": None}}[kind]
+    figure.savefig(out, format=kind, metadata=metadata)
+    return out.getvalue()

@@ -1,0 +1,41 @@
+"""When each foot stands, as intervals that figures of takes on different clocks can share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.footfalls import FootPhases
+from workbench.recording.take import Take
+from workbench.view.scene.playback import since_start
+
+Array = NDArray[np.float64]
+
+Stance = Mapping[str, Array]
+"""Foot (by its knee's joint) -> (K, 2) times of touchdown and lift-off [s] since the first command."""
+
+
+def stance_of(phases: Mapping[str, FootPhases], take: Take) -> dict[str, Array]:
+    """Stance of every foot, from how `foot_phases` or `force_phases` found it on this take's frames."""
+    clock = since_start(take)
+    return {foot: intervals(clock, phase.stance) for foot, phase in phases.items()}
+
+
+def unseen_of(phases: Mapping[str, FootPhases], take: Take) -> dict[str, Array]:
+    """Intervals in which each foot was not seen."""
+    clock = since_start(take)
+    return {foot: intervals(clock, ~phase.known) for foot, phase in phases.items()}
+
+
+def intervals(time: Array, on: NDArray[np.bool_]) -> Array:
+    """Runs of True in `on` (N,) as (K, 2) times: from the first sample that is on to the first that is not."""
+    edges = np.diff(np.concatenate([[0], np.asarray(on).astype(int), [0]]))
+    begin, end = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return np.column_stack([time[begin], time[end.clip(max=len(time) - 1)]])
+
+
+def leg_foot(joint: str, feet: Mapping[str, Array]) -> str | None:
+    """The foot at the end of the leg that `joint` moves: the one whose name begins with the same two letters."""
+    return next((foot for foot in feet if foot[:2] == joint[:2]), None)

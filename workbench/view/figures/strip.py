@@ -1,0 +1,72 @@
+"""The robot as a stick figure, instant after instant: the replay for paper."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from workbench.recording.take import Take
+from workbench.robot.model import RobotModel
+from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
+from workbench.view.scene.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
+from workbench.view.scene.shapes import robot_shapes
+
+Array = NDArray[np.float64]
+
+
+@styled
+def film_strip(
+    model: RobotModel, simulated: Take, recorded: Take | None = None, *, instants: int = 6,
+    span: tuple[float, float] | None = None,
+) -> Figure:
+    """Side view from the right at `instants` even times over `span` [s since the first command]; the recorded robot is laid
+    over the simulated one where both stood. Far legs are thinner."""
+    takes = [simulated] if recorded is None else [simulated, recorded]
+    first, last = span or common_span(takes, lead=0.0)
+    time = np.concatenate([[first - 0.1], np.linspace(first, last, instants)])  # the first stands for the rest
+    played = play(simulated, model, time)
+    names = names_of(simulated, recorded)
+    films = [(played, SIMULATED, names[0], 1.0)]
+    if recorded is not None:
+        films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
+    shapes = robot_shapes(model)
+    reach = 80 * shapes.height
+    figure = new_figure(12, 2.9)
+    grid = figure.subplots(1, instants, sharey=True)
+    for k, axes in enumerate(np.atleast_1d(grid), start=1):
+        axes.axhline(0, color=COMMAND, linewidth=1.0, zorder=1)
+        middle = played.base_p[k, 0]
+        for film, colour, label, alpha in films:
+            _draw_sticks(axes, model, film, k, shapes.feet, colour, alpha)
+            axes.plot([], [], color=colour, label=label)
+        axes.set_xlim(100 * middle - reach, 100 * middle + reach)
+        axes.set_ylim(-3, 120 * shapes.height + 100 * STAND_CLEARANCE)
+        axes.set_aspect("equal", adjustable="box")
+        axes.set_title(f"{time[k]:.1f} s", fontsize=12)
+        axes.set_xlabel("forward [cm]")
+    np.atleast_1d(grid)[0].set_ylabel("height [cm]")
+    handles, labels = np.atleast_1d(grid)[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=2)
+    return figure
+
+
+def _draw_sticks(
+    axes: Axes, model: RobotModel, film: Playback, k: int, feet: dict[str, tuple[str, Array]], colour: str, alpha: float,
+) -> None:
+    kinematics = model.kinematics
+    segments, widths = [], []
+    for link in kinematics.links:
+        p, R = (x[k] for x in film.in_world(link))
+        joint = kinematics.joint_of(link)
+        ends = []
+        if joint is not None:
+            ends.append(film.in_world(kinematics.frames[joint].parent)[0][k])
+        if joint in feet:
+            ends.append(p + R @ feet[joint][1])
+        for end in ends:
+            segments.append(100 * np.array([p[[0, 2]], end[[0, 2]]]))
+            widths.append(1.4 if joint is not None and joint[1:2] == "l" and len(joint) == 3 else 2.8)
+    axes.add_collection(LineCollection(segments, colors=colour, linewidths=widths, alpha=alpha, capstyle="round", zorder=3))

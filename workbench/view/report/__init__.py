@@ -1,0 +1,1 @@
+"""Pages that hold a whole result."""

@@ -1,0 +1,213 @@
+"""What a diagnosis says, in words and numbers that a person reads at once."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from workbench.compare.channels import ACROSS, BODY, joint_of
+from workbench.effects.base import Layer
+from workbench.effects.registry import effect_named
+from workbench.identify.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
+from workbench.robot import EffectSpec
+
+NAMED = 0.1
+"""A rival this probable is named wherever the finding is."""
+LAYERS: dict[Layer, str] = {
+    "timing": "when commands arrive", "actuator": "what the servos do", "structure": "how links sit on their joints",
+    "inertia": "where the mass is", "ground": "what the floor does", "measurement": "how it was measured"}
+_BODY = {"forward": "how far the body goes", "left": "how far the body drifts to the left", "heading": "the body's heading",
+         "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
+_NAMES = {"com_shift": "centre of mass shift"}
+_EFFECT = re.compile(r"\b([a-z]+(?:_[a-z]+)+|backlash|payload)\(([^()]*)\)")
+_SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
+_LEFT = re.compile(r"(?P<take>[^:]+): (?:across its axis \((?P<across>[^)]+)\), |(?P<body>\w+), )?goes with (?P<what>.+?)"
+                   r"(?: \(correlation (?P<r>[\d.]+)\))?")
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The verdict in one sentence."""
+    likely = [f for f in diagnosis.findings if f.likely]
+    names = listed([_with_rival(f) for f in likely or diagnosis.findings])
+    explain = f"{capital(names)} explain{'s' if len(likely) == 1 else ''}"
+    match diagnosis.verdict:
+        case "no_gap":
+            return "The model explains these recordings as they are: nothing is missing that they could show."
+        case "explained":
+            return f"{explain} all that the model missed."
+        case "partly_explained" if not likely:
+            return f"Nothing that the workbench knows is likely to be what the model missed; nearest comes {names}."
+        case "partly_explained":
+            sure = "" if len(likely) == len(diagnosis.findings) else "sure "
+            return f"{explain} part of what the model missed; the rest has no {sure}name yet."
+        case "unexplained":
+            return "The recordings leave the model, and nothing that the workbench knows explains how."
+
+
+def _with_rival(f: Finding) -> str:
+    rival = rival_of(f)
+    return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
+
+
+def rival_of(finding: Finding) -> Alternative | None:
+    """The alternative that is likely enough to be named wherever the finding is."""
+    return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
+
+
+def this_or(tie: Alternative) -> str:
+    """What a tie's confidence is of: `that it is this or joint compliance at flm`."""
+    return f"that it is this or {title_of(tie.effect, tie.where)}"
+
+
+def title_of(effect: str, where: Sequence[str]) -> str:
+    """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, at which the data cannot tell."""
+    return name_of(effect) + (f" at {listed(where, 'or')}" if where else "")
+
+
+def name_of(effect: str) -> str:
+    """`joint_compliance` -> "joint compliance"."""
+    return _NAMES.get(effect, effect.replace("_", " "))
+
+
+def reason_of(text: str) -> str:
+    """A reason with effects as a person says them: "ground_friction() takes" -> "ground friction takes"."""
+    return _EFFECT.sub(lambda m: title_of(m[1], [w.strip() for w in m[2].split(",") if w.strip()]), text)
+
+
+def sentence_of(finding: Finding) -> str:
+    """What is different about this robot, as the effect itself says it."""
+    numbers = {name: e.value for name, e in finding.parameters.items()}
+    said = effect_named(finding.effect).sentence(EffectSpec(finding.effect, finding.where[:1], numbers))
+    others = listed(finding.where[1:], "or")
+    return said + (f" Or the same at {others}: these recordings do not say." if others else "")
+
+
+def interval(estimate: Estimate) -> str:
+    """The value and its 90 % interval; "at least" or "at most" where one side is open. A vector: its size."""
+    if isinstance(estimate.value, tuple):
+        return quantity(math.hypot(*estimate.value), estimate.unit) + " in all"
+    return _one(estimate.value, float(estimate.low), float(estimate.high), estimate.unit)  # type: ignore[arg-type]
+
+
+def intervals_of(name: str, estimate: Estimate) -> list[list[str]]:
+    """Rows of a table: what it is and its interval, one for each component."""
+    name = name.replace("_", " ")
+    if not isinstance(estimate.value, tuple):
+        return [[name, interval(estimate)]]
+    assert isinstance(estimate.low, tuple)
+    assert isinstance(estimate.high, tuple)
+    largest = max(map(abs, estimate.value))
+    return [[f"{name}, {axis}", _one(v, low, high, estimate.unit, largest)]
+            for axis, v, low, high in zip("xyz", estimate.value, estimate.low, estimate.high)]
+
+
+def _one(value: float, low: float, high: float, unit: str, largest: float | None = None) -> str:
+    """largest: of the values that it is to be read beside, which sets the unit and the decimals; its own if left out."""
+    largest = abs(value) if largest is None else largest
+    unit, scale = _readable(largest, unit)
+    half = (high - low) / 2
+    digits = 2 + math.floor(math.log10(abs(value) / half)) if value and 0 < half < math.inf else 3  # that show an interval
+
+    def number(x: float) -> str:
+        if largest == abs(value):
+            return f"{scale * x:.{min(max(3, digits), 7)}g}"
+        decimals = max(0, 2 - math.floor(math.log10(scale * largest))) if largest > 0 else 2
+        return f"{scale * x:.{decimals}f}"
+
+    bounds = ("not bounded by the data" if math.isinf(low) and math.isinf(high) else f"at least {number(low)}"
+              if math.isinf(high) else f"at most {number(high)}" if math.isinf(low) else f"{number(low)} to {number(high)}")
+    return f"{number(value)}{unit} ({bounds})"
+
+
+def quantity(value: float, unit: str) -> str:
+    """Three digits and a unit that suits its size: "5.46 mm" rather than "0.00546 m"."""
+    name, scale = _readable(abs(value), unit)
+    return f"{scale * value:.3g}{name}"
+
+
+def _readable(size: float, unit: str) -> tuple[str, float]:
+    """The unit with the space before it (nothing for a ratio), and what to multiply by."""
+    if unit in ("", "1"):
+        return "", 1.0
+    name, scale = _SMALL[unit] if unit in _SMALL and size < 0.2 else (unit, 1.0)
+    return f" {name}", scale
+
+
+def change(c: Change) -> str:
+    """An error before and after, in a readable unit."""
+    unit, scale = _readable(max(abs(c.before), abs(c.after)), c.unit)
+    return f"{scale * c.before:.3g} → {scale * c.after:.3g}{unit}"
+
+
+def layers_of(diagnosis: Diagnosis) -> str:
+    """In which layers the residuals lie, and in which their causes, as sentences; empty where there is no gap."""
+    if not diagnosis.gap:
+        return ""
+    count = {layer: sum(g.layer == layer for g in diagnosis.gap) for layer in LAYERS}
+    seen = sorted((layer for layer in LAYERS if count[layer]), key=lambda layer: -count[layer])
+    said = "By the form of the errors alone, before any cause was tried, this looks like " + listed(
+        [f"{LAYERS[layer]} ({layer}, {count[layer]} of {len(diagnosis.gap)} entries)" for layer in seen]) + "."
+    causes: dict[Layer, list[str]] = {}
+    for f in diagnosis.findings:
+        causes.setdefault(effect_named(f.effect).layer, []).append(title_of(f.effect, f.where))
+    if causes:
+        found = [f"{listed(names)}, which is {LAYERS[layer]} ({layer})" for layer, names in causes.items()]
+        said += f" What explains it is {listed(found)}."
+    if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
+        said += " Such a cause is felt at many joints at once."
+    return said
+
+
+def is_error(u: Unexplained) -> bool:
+    """Whether it says how far the fitted model is off, in a recording's unit; else it doubts what was found."""
+    return u.unit in ("deg", "m")
+
+
+def left_row(u: Unexplained) -> list[str]:
+    """What is off, in which take, by how much, over noise, and what it goes with."""
+    found = _LEFT.fullmatch(u.description)
+    over = f"{u.error / u.floor:.1f}×" if u.floor > 0 else "–"
+    if found is None:
+        return [listed(u.where) or "whole robot", "", quantity(u.error, u.unit), over, u.description]
+    across = found["across"]
+    what = (f"{joint_of(across)}, across its axis ({across.partition(ACROSS)[2]})" if across else
+            _BODY.get(found["body"], found["body"]) if found["body"] in BODY else f"joint {listed(u.where)}" if u.where else
+            "whole robot")
+    with_what = found["what"]
+    if with_what == "nothing tried":
+        return [what, found["take"], quantity(u.error, u.unit), over, "with nothing that was looked at" if u.where else
+                "not with time"]
+    r = float(found["r"] or 0)
+    closely = "closely" if r > 0.7 else "partly" if r > 0.5 else "loosely"
+    own = "" if with_what == "time" else "its " if with_what != "size of the angle" else "the "
+    return [what, found["take"], quantity(u.error, u.unit), over, f"{closely} with {own}{with_what} ({r:.2f})"]
+
+
+def next_said(n: NextExperiment) -> str:
+    """What to play, how the robot is held, and what that tells apart."""
+    base = ("with the base held on the stand, feet in the air" if n.base == "fixed" else
+            "with the robot free on the floor")
+    pairs = [f"{name_of(a)} from {name_of(b)}" for a, b in n.separates]
+    odds = [f"{p} (expected odds of the right name: {_odds(x)})" for p, x in zip(pairs, n.log_likelihood_ratios)] or pairs
+    return f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It tells {listed(odds)}; it keeps within the " \
+           "servos' limits."
+
+
+def _odds(ratio: float) -> str:
+    return f"{math.exp(ratio):.0f} to 1" if ratio < math.log(1000) else "more than 1000 to 1"
+
+
+def listed(words: Sequence[str], last: str = "and") -> str:
+    """ "a, b and c". """
+    return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+
+
+def capital(text: str) -> str:
+    """With its first letter large."""
+    return text[:1].upper() + text[1:]
+
+
+def unbroken(text: str) -> str:
+    """Kept on one line."""
+    return text.replace(" ", "\u00a0")

@@ -1,0 +1,155 @@
+"""Where every link of the robot was, frame by frame, in a take that may have gaps and unmeasured joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from workbench.compare.footfalls import foot_points
+from workbench.recording.take import Take
+from workbench.robot.model import RobotModel
+
+Array = NDArray[np.float64]
+
+STAND_CLEARANCE = 0.05
+"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; how high it hung says nothing."""
+
+
+@dataclass(frozen=True)
+class Playback:
+    """Poses of all links in the world W at F frames.
+
+    time: (F,) [s] since the first command. q: (F, n) [rad] in the model's order of joints. base_p (F, 3) [m] and base_R
+    (F, 3, 3): pose of the base link in W. links: {link: (p (F, 3), R (F, 3, 3))} in the base link's frame.
+    """
+
+    time: Array
+    q: Array
+    base_p: Array
+    base_R: Array
+    links: Mapping[str, tuple[Array, Array]]
+
+    def in_world(self, link: str) -> tuple[Array, Array]:
+        """Pose of a link in W: p (F, 3) [m], R (F, 3, 3)."""
+        p, R = self.links[link]
+        return self.base_p + np.einsum("fij,fj->fi", self.base_R, p), self.base_R @ R
+
+
+def since_start(take: Take) -> Array:
+    """Time since the first command (N,) [s]; since the first frame, where nobody knows when the first command came."""
+    return take.since_start if np.isfinite(take.starts_at) else np.asarray(take.time - take.time[0])
+
+
+def names_of(simulated: Take, recorded: Take | None) -> tuple[str, str]:
+    """What a legend calls the two takes: simulated and measured, or, of two simulations, by their own names."""
+    if recorded is None or recorded.source != "simulation":
+        return "simulated", "measured"
+    a, b = simulated.name, recorded.name
+    return (a, b) if a != b else (f"{a} (1)", f"{b} (2)")
+
+
+def common_span(takes: list[Take], lead: float = 0.3) -> tuple[float, float]:
+    """First and last time [s] since the first command that all takes cover, at most `lead` before the first command.
+    Takes that share no time give the first one's span."""
+    spans = [(max(t[0], -lead), t[-1]) for t in map(since_start, takes)]
+    first, last = max(s[0] for s in spans), min(s[1] for s in spans)
+    return (first, last) if last > first else spans[0]
+
+
+def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback] | None = None) -> Playback:
+    """The take at `time` (F,) [s] since the first command.
+
+    Gaps hold the last pose that was seen. `like`: another take of the same motion, and its playback at the same times.
+    Joints that this take lacks follow it, and where that one stood before the first command this one is laid over it.
+    """
+    clock = since_start(take)
+    q = _joints(take, model, time, clock, like)
+    links = model.kinematics.forward(q, model.joints)
+    if model.base != model.kinematics.root:
+        links = _seen_from(links, model.base)
+    p, R = _base(take, time, clock)
+    if p is None or R is None:
+        p, R = _standing(time, like[1] if like else None)
+    elif like is not None:
+        p, R = _laid_over(p, R, like[1], take.zeroed)
+    played = Playback(time, q, p, R, links)
+    return _on_a_stand(played, model) if like is None and (take.base == "fixed" or take.p_WB is None) else played
+
+
+def _joints(take: Take, model: RobotModel, time: Array, clock: Array, like: tuple[Take, Playback] | None) -> Array:
+    q = np.zeros((len(time), len(model.joints))) if like is None else like[1].q.copy()
+    rest = np.zeros(len(model.joints))
+    if like is not None and take.zeroed and not like[0].zeroed:  # zero is the pose in which it stood
+        other = since_start(like[0]) < 0
+        if other.any():
+            for i, joint in enumerate(model.joints):
+                if joint in like[0].joints:
+                    rest[i] = float(np.nanmean(like[0].q[other, like[0].column(joint)]))
+    for i, joint in enumerate(model.joints):
+        if joint in take.joints:
+            measured = take.q[:, take.column(joint)]
+            if np.isfinite(measured).any():
+                q[:, i] = _held(time, clock, measured[:, None])[:, 0] + rest[i]
+    return q
+
+
+def _base(take: Take, time: Array, clock: Array) -> tuple[Array | None, Array | None]:
+    if take.p_WB is None or take.quat_WB is None:
+        return None, None
+    if not (np.isfinite(take.p_WB).all(axis=1).any() and np.isfinite(take.quat_WB).all(axis=1).any()):
+        return None, None
+    quat = _held(time, clock, take.quat_WB)
+    return _held(time, clock, take.p_WB), Rotation.from_quat(quat, scalar_first=True).as_matrix()
+
+
+def _held(time: Array, clock: Array, values: Array) -> Array:
+    """Columns of `values` (N, k) at `time`: linear between neighbours, the last one seen in gaps, the nearest outside."""
+    good = np.isfinite(values).all(axis=1)
+    seen = np.flatnonzero(good)
+    after = np.searchsorted(clock, time, side="right").clip(1, len(clock) - 1)
+    before = after - 1
+    span = clock[after] - clock[before]
+    share = np.clip((time - clock[before]) / np.where(span > 0, span, 1), 0, 1)
+    # the last good sample at or before each end of the interval; ahead of the first good one, that one
+    last = seen[(np.searchsorted(seen, np.stack([before, after]), side="right") - 1).clip(0)]
+    a, b = values[last[0]], values[last[1]]
+    return np.asarray(a + (b - a) * share[:, None], dtype=float)
+
+
+def _standing(time: Array, other: Playback | None) -> tuple[Array, Array]:
+    """A base that nobody followed: where the other take's stood at first, else level."""
+    p, R = (other.base_p[0], other.base_R[0]) if other is not None else (np.zeros(3), np.eye(3))
+    return np.tile(p, (len(time), 1)), np.tile(R, (len(time), 1, 1))
+
+
+def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
+    """Just clear of the floor."""
+    heights = [played.in_world(link)[0][:, 2].min() for link in played.links]
+    for joint, (points, radii) in foot_points(model.path).items():
+        p, R = played.in_world(model.kinematics.frames[joint].child)
+        heights.append((p[:, None, 2] + R[:, 2] @ points.T - radii).min())
+    up = np.array([0.0, 0.0, STAND_CLEARANCE - min(heights)])
+    return replace(played, base_p=played.base_p + up)
+
+
+def _laid_over(p: Array, R: Array, other: Playback, zeroed: bool) -> tuple[Array, Array]:
+    """Turned about the vertical and moved so that both stand in the same place at rest. The attitude of a zeroed take is
+    a rotation away from how it stood, so it is given the other's tilt at rest."""
+    resting = other.time < 0 if (other.time < 0).any() else np.arange(len(other.time)) == 0
+    R_rest, R_other = (Rotation.from_matrix(X[resting]).mean().as_matrix() for X in (R, other.base_R))
+    turn = R_other @ R_rest.T
+    yaw = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
+    Z = Rotation.from_rotvec([0, 0, yaw]).as_matrix()
+    if zeroed:
+        R = R @ (R_rest.T @ Z.T @ R_other)
+    return other.base_p[resting].mean(axis=0) + (p - p[resting].mean(axis=0)) @ Z.T, Z @ R
+
+
+def _seen_from(links: Mapping[str, tuple[Array, Array]], base: str) -> dict[str, tuple[Array, Array]]:
+    p_B, R_B = links[base]
+    R_BR = np.swapaxes(R_B, 1, 2)
+    return {name: (np.einsum("fij,fj->fi", R_BR, p - p_B), R_BR @ R) for name, (p, R) in links.items()}
