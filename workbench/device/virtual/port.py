@@ -9,7 +9,7 @@ from functools import partial
 from dynamixel_sdk import PortHandler
 
 from workbench.device.virtual.bus import ServoBus
-from workbench.device.virtual.clock import MILLISECOND
+from workbench.device.virtual.clock import MILLISECOND, SECOND
 
 
 class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
@@ -48,6 +48,18 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     def closePort(self) -> None:
         """Closes."""
         self.is_open = False
+
+    patience = 3.0
+    """Milliseconds beyond an answer's own bytes until it is late, instead of the SDK's 34."""
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Starts the time-out for an answer of so many bytes."""
+        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
+
+    def pause(self, seconds: float) -> None:
+        """Lets virtual time go by [s]."""
+        if seconds > 0:
+            self.bus.clock.advance(self.bus.clock.now + round(seconds * SECOND))
 
     def clearPort(self) -> None:
         """Forgets what came in."""

@@ -32,6 +32,10 @@ class Protocol(TypingProtocol):
         """The answer's bytes."""
         ...
 
+    def identity(self, model: int, firmware: int) -> bytes:
+        """What a ping is answered with."""
+        ...
+
 
 class Protocol1:
     """FF FF, ID, length, instruction or error, parameters, complement of the sum."""
@@ -61,6 +65,10 @@ class Protocol1:
     def status(self, servo: int, error: int, parameters: bytes) -> bytes:
         """The answer's bytes."""
         return packet(servo, error, parameters)
+
+    def identity(self, model: int, firmware: int) -> bytes:
+        """What a ping is answered with: nothing but that it is there."""
+        return b""
 
 
 def checksum(body: bytes) -> int:

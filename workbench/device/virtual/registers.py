@@ -33,7 +33,9 @@ class VirtualProfile:
     present_temperature, registered, moving, cw_compliance_margin, cw_compliance_slope, punch; what a family lacks is left out.
     bit_rate: value of the baud-rate register to bit/s. answer_times: of ping, read, and write with its time for each byte.
     interrupt: the motor interrupt's period and length, in which nothing is sent. refresh: how seldom speed and load are new.
-    eeprom_time: for each byte written, in which the servo is deaf.
+    eeprom_time: for each byte written, in which the servo is deaf. speed_sign, load_sign: bit of the sign, 0 for two's
+    complement. full_torque: count of torque_limit that limits nothing. goal_enables: whether a goal switches torque on.
+    eeprom_lock: 1 where the register lock closes the EEPROM and can be opened again.
     """
 
     name: str
@@ -48,6 +50,10 @@ class VirtualProfile:
     return_delay_unit: float = 2e-6
     answer_times: tuple[float, float, float, float] = (18e-6, 22e-6, 24e-6, 6e-6)
     interrupt: tuple[float, float] = (1e-3, 130e-6)
+    load_sign: int = 0x400
+    full_torque: int = 1023
+    goal_enables: bool = True
+    eeprom_lock: int = 0
     refresh: float = 0.130
     eeprom_time: float = 6e-3
     protocol: Protocol = field(default_factory=Protocol1)

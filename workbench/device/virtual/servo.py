@@ -24,6 +24,8 @@ from workbench.device.virtual.registers import Register, VirtualProfile
 
 VOLTAGE, ANGLE, HEAT, RANGE, CHECKSUM, OVERLOAD, UNKNOWN = (1 << k for k in range(7))
 """Bits of the status packet's error byte."""
+TRIPPED = 255
+"""What a bus watchdog holds once it has stopped the servo."""
 
 
 class VirtualServo:
@@ -50,6 +52,7 @@ class VirtualServo:
         self._refreshed = -(10 ** 12)
         self._latched = Sense(0.0)
         self._drive: Drive | None = None
+        self._heard = 0
         self.rate = 0
         """Bit/s at which it listens and talks."""
         for register in profile.registers:
@@ -116,6 +119,7 @@ class VirtualServo:
             return
         if packet.servo not in (self.ident, BROADCAST):
             return
+        self._heard = time
         if not packet.intact:
             if packet.servo != BROADCAST:
                 self._answer(time, CHECKSUM, b"", self.profile.answer_times[0], level=2)
@@ -131,7 +135,8 @@ class VirtualServo:
         do(self, packet, time)
 
     def _ping(self, packet: Instruction, time: int) -> None:
-        self._answer(time, 0, b"", self.profile.answer_times[0], level=0)
+        identity = self.profile.protocol.identity(self["model_number"], self["firmware_version"])
+        self._answer(time, 0, identity, self.profile.answer_times[0], level=0)
 
     def _read(self, packet: Instruction, time: int) -> None:
         if packet.servo == BROADCAST:
@@ -211,25 +216,47 @@ class VirtualServo:
         self.rate = self.profile.bit_rate(self["baud_rate"])  # the answer to this comes at the new rate
         for register in touched.values():
             self.written.append((time, register.address, self[register.name]))
-        if "goal_position" in touched and self.has("torque_enable"):
+        if "goal_position" in touched and self.profile.goal_enables:
             self._put(self.profile.by_name["torque_enable"], 1)
         if touched.keys() & _DRIVE:
             self._steer(time)
+        if "bus_watchdog" in touched:
+            self._watch()
         return 0, sum(r.size for r in touched.values() if r.eeprom)
+
+    def _watch(self) -> None:
+        """A watchdog that is set stops the servo where it is, once it has not been spoken to for so long (20 ms a count)."""
+        count = self["bus_watchdog"]
+        if count in (0, TRIPPED):
+            return
+        due = self._heard + round(0.02 * count * SECOND)
+        if self.bus.clock.now < due:
+            self.bus.clock.at(due, self._watch)
+            return
+        self._put(self.profile.by_name["bus_watchdog"], TRIPPED)
+        angle = self.body.sense(self.joint, self.bus.clock.now).angle
+        self._put(self.profile.by_name["goal_position"], self._count(angle))
+        self._steer(self.bus.clock.now)
 
     def _refused(self, touched: dict[str, Register], new: bytearray) -> int:
         for register in touched.values():
             value = int.from_bytes(new[register.address:register.address + register.size], "little")
             if not register.writable or not register.low <= value <= register.high:
                 return RANGE
-            if register.eeprom and self.has("lock") and self["lock"]:
+            if register.eeprom and (self._locked or (not self.profile.goal_enables and self["torque_enable"])):
+                return RANGE
+            if register.name == "goal_position" and self.has("bus_watchdog") and self["bus_watchdog"] == TRIPPED:
                 return RANGE
             if register.name == "goal_position" and not self._wheel and not (
                     self["cw_angle_limit"] <= value <= self["ccw_angle_limit"]):
                 return ANGLE
-            if register.name == "lock" and self["lock"] and not value:
+            if register.name == "lock" and self["lock"] and not value and not self.profile.eeprom_lock:
                 return RANGE  # until the power goes
         return 0
+
+    @property
+    def _locked(self) -> bool:
+        return self.has("lock") and bool(self["lock"])
 
     @property
     def _wheel(self) -> bool:
@@ -268,8 +295,11 @@ class VirtualServo:
             bits |= VOLTAGE
         if self.overload:
             bits |= OVERLOAD
-        if bits & self["alarm_shutdown"] and self["torque_limit"]:
-            self["torque_limit"] = 0
+        if self.has("hardware_error"):
+            self._put(self.profile.by_name["hardware_error"], bits)
+        shut = "torque_limit" if self.profile.goal_enables else "torque_enable"
+        if bits & self["alarm_shutdown"] and self[shut]:
+            self[shut] = 0
         return bits
 
     def _count(self, angle: float) -> int:
@@ -289,12 +319,9 @@ class VirtualServo:
         put(name["present_temperature"], min(round(self.temperature), 255))
         if now - self._refreshed >= self.profile.refresh * SECOND:
             self._refreshed, self._latched = now, sense
-        put(name["present_speed"], self._signed(self._latched.velocity / self.profile.speed_unit))
-        put(name["present_load"], self._signed(1023 * self._latched.duty))
-
-    def _signed(self, value: float) -> int:
-        size = min(round(abs(value)), 1023)
-        return size | (self.profile.speed_sign if value < 0 else 0)
+        speed, load = self._latched.velocity / self.profile.speed_unit, self.profile.full_torque * self._latched.duty
+        put(name["present_speed"], _signed(speed, self.profile.speed_sign, name["present_speed"].size))
+        put(name["present_load"], _signed(load, self.profile.load_sign, name["present_load"].size))
 
     def _steer(self, now: int) -> None:
         on = self.powered and bool(self["torque_enable"])
@@ -302,10 +329,18 @@ class VirtualServo:
             return self[register] if self.has(register) else None
 
         drive = Drive(on, self._angle(self["goal_position"]), self["moving_speed"] * self.profile.speed_unit,
-                      self["torque_limit"] / 1023, law("cw_compliance_margin"), law("cw_compliance_slope"), law("punch"))
+                      self["torque_limit"] / self.profile.full_torque, law("cw_compliance_margin"),
+                      law("cw_compliance_slope"), law("punch"))
         if drive != self._drive:
             self._drive = drive
             self.body.drive(self.joint, now, drive)
+
+
+def _signed(value: float, sign: int, size: int) -> int:
+    """Register content of a number: magnitude and a bit for the sign, or two's complement in so many bytes (sign 0)."""
+    if not sign:
+        return round(value) % (1 << 8 * size)
+    return min(round(abs(value)), 1023) | (sign if value < 0 else 0)
 
 
 _DRIVE = {"torque_enable", "goal_position", "moving_speed", "torque_limit", "cw_compliance_margin", "cw_compliance_slope",
