@@ -33,7 +33,8 @@ EACH_SERVO = ("backlash", "command_delay")
 @dataclass(frozen=True)
 class Ensemble:
     """What is drawn. ranges: by key of RANGES, low and high, in the file's units. mass_share: by which each link's mass may
-    differ. payload: [kg]. zero_sd: [deg]. posterior: of a diagnosed model, whose parameters are drawn too. source: for messages."""
+    differ. payload: [kg]. zero_sd: [deg]. posterior: of a diagnosed model, whose parameters are drawn too. source: for
+    messages."""
 
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     mass_share: float = 0.0

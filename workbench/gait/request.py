@@ -27,8 +27,8 @@ SHARE_FALLEN = 0.1
 @dataclass(frozen=True)
 class Request:
     """One request. way: where to. speed: at least that much [m/s, for a turn rad/s]; None: as much as can be. radius: of an arc
-    to the left [m]. slope: uphill [rad]. aim: what is made best once all limits and the speed are kept. built_knees: only knees as
-    the robot has them in neutral (all back). limits: to keep."""
+    to the left [m]. slope: uphill [rad]. aim: what is made best once all limits and the speed are kept. built_knees: only
+    knees as the robot has them in neutral (all back). limits: to keep."""
 
     way: Way = "forward"
     speed: float | None = None
