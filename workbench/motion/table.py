@@ -50,16 +50,19 @@ class PoseTable:
         return len(self.dwells_ms)
 
     @staticmethod
-    def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion") -> PoseTable:
+    def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion",
+                    moving_speeds: Array | None = None) -> PoseTable:
         """The thesis's equations 3.1 to 3.4: rows of angles (K, n) [rad] at times (K,) [s] become K - 1 poses.
 
         Goals are rounded to counts of 300/1023 deg about 512, speeds to counts of 114/1023 rpm, dwells to milliseconds.
-        The first row gives no pose of its own, only the speed of the first pose.
+        The first row gives no pose of its own, only the speed of the first pose. moving_speeds: (K, n) [rad/s] in place of the
+        travel over the dwell.
         """
         degrees = np.degrees(angles)
         elapsed = np.diff(times)
         with np.errstate(divide="raise", invalid="raise"):
-            rpm = np.abs(np.diff(degrees, axis=0) / elapsed[:, None]) / 6
+            asked = np.diff(degrees, axis=0) / elapsed[:, None] if moving_speeds is None else np.degrees(moving_speeds[1:])
+            rpm = np.abs(asked) / 6
         return PoseTable(
             joints,
             goals=CENTRE + _nearest(degrees[1:] * LARGEST / 300),
@@ -71,6 +74,10 @@ class PoseTable:
     def angles(self) -> Array:
         """Goals as angles (P, n) [rad], zero = servo centre."""
         return np.asarray((self.goals - CENTRE) * COUNT, dtype=float)
+
+    def moving_speeds(self) -> Array:
+        """Moving speeds (P, n) [rad/s] that equation 3.3 turns into these counts."""
+        return np.asarray(np.radians(self.speeds * 114 / LARGEST * 6), dtype=float)
 
     def commands(self, cycles: int = 1) -> Commands:
         """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
