@@ -15,7 +15,7 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export", "bench")
+VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export", "record", "bench")
 
 
 class OneLineParser(argparse.ArgumentParser):

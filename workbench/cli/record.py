@@ -1,0 +1,53 @@
+"""`workbench record HOST`: a take from Motive, over the network."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from workbench.cli.options import add_out, seconds
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "record",
+        help="record a take from Motive (NatNet 2.7 to 4.x)",
+        description="Records the rigid bodies that Motive streams into a take (Motive CSV), with the times of mid-exposure, "
+        "until Ctrl-C or --seconds, and writes beside it NAME.capture.json: frames lost, late, doubled and broken, and the "
+        "server's clock. While it runs NAME.natnet holds what has come; after a crash --finish makes the take from it.")
+    parser.add_argument("host", metavar="HOST", nargs="?", help="name or address of the computer that runs Motive")
+    parser.add_argument("--name", default="take", help="of the take, here and in Motive (default: take)")
+    parser.add_argument("--seconds", type=seconds, metavar="S", help="how long (default: until Ctrl-C)")
+    parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
+    parser.add_argument("--port", type=int, default=1510, metavar="N", help="Motive's command port (default: 1510)")
+    parser.add_argument("--no-motive", action="store_true", help="do not have Motive record the take, too, on its own disk")
+    parser.add_argument("--finish", metavar="JOURNAL", help="make the take from a NAME.natnet that was cut short")
+    add_out(parser, default="runs/record")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Records and says what came."""
+    from workbench.cli.progress import Progress
+    from workbench.device.capture import Recorder, UdpLink, finish, record_take
+    from workbench.device.stop import stop_on_signals
+    from workbench.robot import InputError
+
+    if (args.host is None) == (args.finish is None):
+        raise InputError(None, "expected either HOST or --finish JOURNAL")
+    with Progress("record") as progress:
+        if args.finish is not None:
+            journal = Path(args.finish)
+            capture = finish(journal, args.out / f"{journal.stem}.csv", ended="the recording was cut short")
+        else:
+            recorder = Recorder(UdpLink(args.host, args.interface, args.port))
+            with stop_on_signals() as stop:
+                capture = record_take(recorder, args.out / f"{args.name}.csv", stop, args.seconds, not args.no_motive, progress)
+    for problem in capture.problems:
+        print(f"workbench record: warning: {problem}", file=sys.stderr)
+    counts = capture.counts
+    print(f"wrote {capture.take}: {counts.received} frames at {capture.rate:g} Hz, {counts.lost} lost, {counts.late} late, "
+          f"{counts.doubled} doubled, {counts.broken} broken")
+    return 0

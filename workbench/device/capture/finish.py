@@ -1,0 +1,207 @@
+"""From the journal to the take: a Motive CSV that every reader of takes reads, and what the network did to it."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.device.capture.journal import Entry, read_journal
+from workbench.device.capture.ledger import Counts, Ledger
+from workbench.device.capture.packets import (
+    BrokenPacketError,
+    Frame,
+    Message,
+    ServerInfo,
+    kind_of,
+    parse_frame,
+    parse_names,
+    stated_number,
+)
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.motive_write import write_motive
+from workbench.robot import InputError
+from workbench.robot.files import write_whole
+
+Array = NDArray[np.float64]
+KEPT = 20
+"""Broken packets whose bytes are kept, for whoever wants to know why."""
+DRIFT_AFTER = 10.0
+"""Seconds of echoes from which the clock's drift is told: 0.1 ms over them are 10 ppm, less than what two crystals differ by."""
+SAME = 50e-6
+"""Drift over a whole take [s] below which the nominal rate is taken for the measured one."""
+
+
+@dataclass(frozen=True)
+class ServerClock:
+    """The server's clock less this machine's monotonic one: offset [s] at the first frame, known within +-`within` [s] (half the
+    shortest round trip); drift [s/s]. NaN where the server answers no echo (before NatNet 3.0)."""
+
+    offset: float
+    within: float
+    drift: float
+
+    def host_time(self, server_time: float, first: float) -> float:
+        """A time of the server's clock on this machine's, where `first` is the server's at the first frame."""
+        return server_time - self.offset - self.drift * (server_time - first)
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A finished recording. rate: of mid-exposures on the server's clock [Hz]. first_time: mid-exposure of the first frame there
+    [s]; first_host: the same on this machine's monotonic clock. worst_time: largest error of frame/rate as a time [s]."""
+
+    take: Path
+    counts: Counts
+    rate: float
+    first_time: float
+    first_host: float
+    worst_time: float
+    clock: ServerClock
+    gaps: Mapping[str, float]
+    problems: tuple[str, ...]
+
+
+def finish(journal: str | Path, take: str | Path, ended: str = "", motive_recording: str | None = None) -> Capture:
+    """Writes the take (CSV) and beside it NAME.capture.json, whole or not at all; frames that did not come, and bodies that were
+    not seen, are blank cells. ended: why it ended early. InputError where the journal holds no frame."""
+    journal, take = Path(journal), Path(take)
+    content = _Content(journal)
+    ledger, frames = content.ledger, content.frames
+    if len(frames) < 2:
+        raise InputError(journal, f"{len(frames)} whole frames; expected two or more")
+    counts = ledger.counts()
+    numbers = np.array(sorted(frames))
+    times = np.array([frames[n].time for n in numbers.tolist()])
+    rate, worst = _rate(numbers, times)
+    bodies = _tracks(frames, content.names, counts)
+    first = float(times[0])
+    clock = _clock(content.clocks, first)
+    first_host = clock.host_time(first, first) if math.isfinite(clock.offset) else first + content.soonest
+    gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
+    problems = _problems(counts, gaps, worst, clock, content, ended)
+    began = datetime.datetime.fromisoformat(content.head["utc"]) + datetime.timedelta(seconds=first_host - content.head_arrival)
+    write_motive(take, bodies, rate, take_name=take.stem, first_frame=0, metadata={
+        "Capture Start Time": began.astimezone().strftime("%Y-%m-%d %I.%M.%S.%f")[:-3] + began.astimezone().strftime(" %p")})
+    capture = Capture(take, counts, rate, first, first_host, worst, clock, gaps, problems)
+    write_whole(take.with_suffix(".capture.json"), json.dumps(
+        _report(capture, content, began, motive_recording), indent=1, allow_nan=False) + "\n")
+    return capture
+
+
+class _Content:
+    """What a journal holds."""
+
+    def __init__(self, path: Path) -> None:
+        self.ledger, self.frames, self.clocks = Ledger(), {}, []  # type: tuple[Ledger, dict[int, Frame], list[dict[str, float]]]
+        self.names: dict[int, str] = {}
+        self.broken: list[bytes] = []
+        self.head: dict[str, Any] = {}
+        self.head_arrival = math.nan
+        self.soonest = math.inf
+        for entry in read_journal(path):
+            if entry.kind == b"H":
+                self._take_head(entry)
+            elif entry.kind == b"C":
+                self.clocks.append(entry.json())
+            elif not self.head:
+                raise InputError(path, "a packet before the head; expected a file that `workbench record` left behind")
+            else:
+                self._take_packet(entry)
+        if not self.head:
+            raise InputError(path, "holds no frame yet")
+
+    def _take_head(self, entry: Entry) -> None:
+        self.head, self.head_arrival = entry.json(), entry.arrival
+        h = self.head
+        self.info = ServerInfo(h["application"], h["application_version"], (h["version"][0], h["version"][1]),
+                               h["clock_frequency"] or math.nan, h["data_port"], h["group"])
+        self.names = {int(k): n for k, n in h["names"].items()}
+
+    def _take_packet(self, entry: Entry) -> None:
+        try:
+            if kind_of(entry.content) == Message.MODELDEF:
+                self.names |= parse_names(entry.content, self.info.version)
+                return
+            frame = parse_frame(entry.content, self.info)
+        except BrokenPacketError:
+            self.ledger.broken(stated_number(entry.content))
+            self.broken.append(entry.content)
+            return
+        if self.ledger.frame(frame.number) in ("new", "late"):
+            self.frames[frame.number] = frame
+            self.soonest = min(self.soonest, entry.arrival - frame.time)
+
+
+def _rate(numbers: NDArray[np.int64], times: Array) -> tuple[float, float]:
+    """Rate of the frames on the server's clock [Hz], and by how much a frame's time misses number/rate at most [s]."""
+    n, t = numbers - numbers[0], times - times[0]
+    slope = float(np.polyfit(n, t, 1)[0])
+    if not slope > 0:
+        raise InputError(None, "the server's time stamps do not increase")
+    nominal = round(1 / slope)
+    rate = float(nominal) if nominal and abs(n[-1] * (slope - 1 / nominal)) < SAME else float(1 / slope)
+    return rate, float(np.max(np.abs(t - n / rate)))
+
+
+def _tracks(frames: Mapping[int, Frame], names: Mapping[int, str], counts: Counts) -> dict[str, BodyTrack]:
+    span = counts.last - counts.first + 1
+    ids = sorted({body.id for frame in frames.values() for body in frame.bodies})
+    p, quat, error = np.full((len(ids), span, 3), np.nan), np.full((len(ids), span, 4), np.nan), np.full((len(ids), span), np.nan)
+    row = {number: i for i, number in enumerate(ids)}
+    for number, frame in frames.items():
+        k = number - counts.first
+        for body in frame.bodies:
+            if body.tracked:
+                i = row[body.id]
+                x, y, z, w = body.quat
+                p[i, k], quat[i, k], error[i, k] = body.p, (w, x, y, z), body.error
+    return {names.get(number, f"body_{number}"): BodyTrack(p[i], quat[i], error[i]) for number, i in row.items()}
+
+
+def _clock(measured: list[dict[str, float]], first: float) -> ServerClock:
+    """From the echoes: the quarter with the shortest round trips; a drift where they span `DRIFT_AFTER`."""
+    if not measured:
+        return ServerClock(math.nan, math.nan, 0.0)
+    trip = np.array([m["received"] - m["sent"] for m in measured])
+    server = np.array([m["server"] for m in measured])
+    offset = server - np.array([(m["received"] + m["sent"]) / 2 for m in measured])
+    best = trip <= np.quantile(trip, 0.25) + 1e-6
+    drift, at = 0.0, float(np.mean(offset[best]))
+    if best.sum() > 2 and np.ptp(server[best]) > DRIFT_AFTER:
+        drift, at = (float(x) for x in np.polyfit(server[best] - first, offset[best], 1))
+    return ServerClock(at, float(trip[best].min() / 2), drift)
+
+
+def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: ServerClock, content: _Content, ended: str
+              ) -> tuple[str, ...]:
+    out = [ended] if ended else []
+    if counts.lost or counts.broken:
+        out.append(f"{counts.lost} frames lost on the network and {counts.broken} broken, of {counts.last - counts.first + 1}")
+    if worst > 1e-3:
+        out.append(f"the frames are not evenly spaced: up to {1000 * worst:.1f} ms off their rate")
+    if not math.isfinite(clock.offset):
+        out.append("the server answers no echo (NatNet before 3.0): its clock is set by the soonest arrival of a frame")
+    unseen = [name for name, share in gaps.items() if share == 1]
+    if unseen:
+        out.append(f"never seen: {', '.join(unseen)}")
+    return tuple(out)
+
+
+def _report(c: Capture, content: _Content, began: datetime.datetime, motive_recording: str | None) -> dict[str, Any]:
+    known = math.isfinite(c.clock.offset)
+    return {
+        "format": 1, "take": c.take.name,
+        "server": {k: content.head[k] for k in ("application", "application_version", "version", "link")},
+        "frames": asdict(c.counts), "rate": c.rate, "worst_time": c.worst_time, "gaps": dict(c.gaps),
+        "first_frame": {"server_time": c.first_time, "host_monotonic": c.first_host, "utc": began.isoformat()},
+        "clock": asdict(c.clock) if known else None, "motive_recording": motive_recording, "problems": list(c.problems),
+        "broken_packets": [data.hex() for data in content.broken[:KEPT]],
+    }

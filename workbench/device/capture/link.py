@@ -1,0 +1,175 @@
+"""Ways to a Motive server: UDP sockets in real time, or an emulated server in the same process and in virtual time."""
+
+from __future__ import annotations
+
+import select
+import socket
+import struct
+import sys
+import time
+from contextlib import suppress
+from typing import Protocol
+
+from workbench.device.capture.packets import ServerInfo
+from workbench.device.capture.virtual_motive import VirtualMotive
+from workbench.robot import InputError
+
+BUFFER = 4 << 20
+"""Receive buffer asked of the system [bytes]: some seconds of frames, for a disk that is slow to sync."""
+
+
+class Link(Protocol):
+    """Commands out, packets in, and the clock that stamps them [s]."""
+
+    @property
+    def description(self) -> str:
+        """The server and the interface, for messages."""
+
+    def now(self) -> float:
+        """This machine's monotonic clock."""
+
+    def send(self, data: bytes) -> None:
+        """A packet to the server's command port."""
+
+    def subscribe(self, info: ServerInfo) -> None:
+        """Opens what the frames come on, once the server has said what that is."""
+
+    def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        """The next packet and when it came; None after `timeout` [s]."""
+
+    def close(self) -> None:
+        """Lets go of the network."""
+
+
+class UdpLink:
+    """Sockets to a Motive server. interface: address of the network interface that the frames come in by; left out, that of the
+    route to the server. InputError where there is no such server or interface."""
+
+    def __init__(self, server: str, interface: str | None = None, command_port: int = 1510) -> None:
+        try:
+            self._server = (socket.gethostbyname(server), command_port)
+        except OSError as e:
+            raise InputError(None, f"server '{server}': not a known host ({e.strerror})") from None
+        self.chosen = interface is None
+        self.interface = interface or _route_to(self._server)
+        self._command = _udp()
+        try:
+            self._command.bind((self.interface, 0))
+        except OSError:
+            self._command.close()
+            raise InputError(None, f"interface '{self.interface}': not an address of this machine; expected one of "
+                                   f"{', '.join(addresses())}") from None
+        self._data: socket.socket | None = None
+
+    @property
+    def description(self) -> str:
+        how = "chosen by the route to it" if self.chosen else "as asked"
+        return f"server {self._server[0]} through interface {self.interface} ({how}; this machine has {', '.join(addresses())})"
+
+    def now(self) -> float:
+        return time.monotonic()
+
+    def send(self, data: bytes) -> None:
+        try:
+            self._command.sendto(data, self._server)
+        except OSError as e:
+            raise InputError(None, f"{self.description}: cannot be reached ({e.strerror})") from None
+
+    def subscribe(self, info: ServerInfo) -> None:
+        """Joins the multicast group; a server that sends to each client alone sends to the socket of the commands."""
+        if info.group is None:
+            return
+        self._data = _udp()
+        try:
+            self._data.bind((info.group if sys.platform != "win32" else "", info.data_port))
+            member = struct.pack("4s4s", socket.inet_aton(info.group), socket.inet_aton(self.interface))
+            self._data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
+        except OSError as e:
+            raise InputError(None, f"multicast group {info.group}, port {info.data_port}: cannot be joined ({e.strerror}); "
+                                   f"{self.description}") from None
+
+    def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        sockets = [s for s in (self._data, self._command) if s is not None]
+        ready, _, _ = select.select(sockets, [], [], timeout)
+        for s in ready:
+            try:
+                return time.monotonic(), s.recv(65536)
+            except OSError:  # an ICMP answer to an earlier command: nobody listens there
+                continue
+        return None
+
+    def close(self) -> None:
+        for s in (self._command, self._data):
+            if s is not None:
+                s.close()
+
+
+class VirtualLink:
+    """An emulated server in this process; waiting costs virtual time only. delay: of each packet, either way [s]."""
+
+    def __init__(self, server: VirtualMotive, delay: float = 0.2e-3) -> None:
+        self._server, self._delay, self._now = server, delay, server.started
+        self._waiting: list[tuple[float, bytes]] = []
+
+    @property
+    def description(self) -> str:
+        return "emulated server"
+
+    def now(self) -> float:
+        return self._now
+
+    def send(self, data: bytes) -> None:
+        self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
+
+    def subscribe(self, info: ServerInfo) -> None:
+        pass
+
+    def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        end = self._now + timeout
+        self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
+        self._waiting.sort(key=lambda item: item[0])
+        if not self._waiting or self._waiting[0][0] > end:
+            self._now = end
+            return None
+        arrival, data = self._waiting.pop(0)
+        self._now = max(self._now, arrival)
+        return self._now, data
+
+    def close(self) -> None:
+        pass
+
+
+def addresses() -> list[str]:
+    """IPv4 addresses of this machine's interfaces, loopback last."""
+    found = set()
+    if sys.platform == "linux":
+        import fcntl
+
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+            for _, name in socket.if_nameindex():
+                try:
+                    answer = fcntl.ioctl(s.fileno(), 0x8915, struct.pack("256s", name.encode()[:15]))  # SIOCGIFADDR
+                except OSError:
+                    continue
+                found.add(socket.inet_ntoa(answer[20:24]))
+    else:
+        with suppress(OSError):
+            found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    return [*sorted(found - {"127.0.0.1"}), "127.0.0.1"]
+
+
+def _udp() -> socket.socket:
+    s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+    return s
+
+
+def _route_to(server: tuple[str, int]) -> str:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        try:
+            s.connect(server)
+        except OSError as e:
+            raise InputError(None, f"server {server[0]}: no route to it ({e.strerror}); this machine has "
+                                   f"{', '.join(addresses())}") from None
+        return str(s.getsockname()[0])

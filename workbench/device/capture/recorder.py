@@ -1,0 +1,245 @@
+"""Listens to a Motive server and keeps every packet."""
+
+from __future__ import annotations
+
+import datetime
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from workbench.device.capture.journal import Journal
+from workbench.device.capture.ledger import Counts, Ledger
+from workbench.device.capture.link import Link
+from workbench.device.capture.packets import (
+    HIRES,
+    OLDEST,
+    BrokenPacketError,
+    Message,
+    ServerInfo,
+    kind_of,
+    packet,
+    parse_frame,
+    parse_names,
+    parse_server_info,
+    stated_number,
+)
+from workbench.robot import InputError
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """Times of the conversation with the server [s]."""
+
+    answer: float = 1.0
+    """Until a question is asked again; a local network answers in milliseconds."""
+    questions: int = 3
+    """How often it is asked: packets get lost."""
+    first_frame: float = 3.0
+    """Until a server that sends no frame is an error: at the slowest rate of a camera (30 Hz) that is 90 frames."""
+    silence: float = 5.0
+    """Until a stream that stopped ends the recording."""
+    echo_every: float = 0.5
+    """Between measurements of the server's clock; the best of a few is kept."""
+    keep_alive_every: float = 1.0
+    """Between signs of life, without which a server that sends to each client alone stops after some seconds."""
+
+
+class Recorder:
+    """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come."""
+
+    def __init__(self, link: Link, options: RecordOptions | None = None) -> None:
+        self.link, self.options = link, options or RecordOptions()
+        self.info: ServerInfo | None = None
+        self.names: dict[int, str] = {}
+        self.tracked = 0
+        self.problem = ""
+        self._ledger = Ledger()
+        self._last_frame = -math.inf
+        self._echoed = self._alive = -math.inf
+        self._restarts = 0
+        self._asked: float | None = None
+
+    @property
+    def counts(self) -> Counts:
+        """What has come so far."""
+        return self._ledger.counts()
+
+    def connect(self) -> ServerInfo:
+        """Finds the server and the names of its assets; InputError in one line where it does not answer, or is too old."""
+        data = self._ask(Message.CONNECT, b"Ping\0", Message.SERVER_INFO)
+        if data is None:
+            raise self._error(f"no answer from Motive in {self._patience:g} s; is streaming on in Motive (Settings, Streaming), "
+                              "on that interface, and does a firewall let UDP 1510 and 1511 pass?")
+        try:
+            self.info = info = parse_server_info(data)
+        except BrokenPacketError as e:
+            raise self._error(f"answers, but not as a NatNet server ({e})") from None
+        if not (OLDEST <= info.version < (5, 0)):
+            version = "{}.{}".format(*info.version)
+            raise self._error(f"{info.application} {info.application_version} streams NatNet {version}; expected 2.7 to 4.x")
+        if info.version >= HIRES and not info.clock_frequency > 0:
+            raise self._error(f"{info.application} does not say how fast its clock ticks")
+        self.link.subscribe(info)
+        self._describe()
+        return info
+
+    def request_recording(self, name: str) -> str:
+        """Asks Motive to record the take itself, under this name; "" where it does, else what it answered."""
+        for command in (f"SetRecordTakeName,{name}", "StartRecording"):
+            refusal = self._command(command)
+            if refusal:
+                return f"'{command}': {refusal}"
+        return ""
+
+    def stop_recording(self) -> str:
+        """Ends Motive's own recording."""
+        return self._command("StopRecording")
+
+    def listen(self, journal: Journal, until: Callable[[], bool], progress: Callable[[str, float | None], None] | None = None,
+               seconds: float | None = None) -> Counts:
+        """Records until `until()`, or so many seconds after the first frame; InputError where no frame comes at all.
+
+        A stream that stops, or starts anew with other numbers, ends it, and `problem` says so.
+        """
+        assert self.info is not None, "connect first"
+        self._head(journal)
+        began, first = self.link.now(), math.inf
+        while not until() and not self.problem:
+            received = self.link.receive(0.05)
+            now = self.link.now()
+            if received is not None:
+                self._take(journal, *received)
+            if math.isinf(first) and self.counts_received:
+                first = now
+            if seconds is not None and now - first >= seconds:
+                break
+            self._stay_in_touch(now)
+            self._check_silence(now - began, now - self._last_frame)
+            if progress is not None:
+                progress(self._said(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
+        return self.counts
+
+    @property
+    def counts_received(self) -> bool:
+        """Whether any frame has come."""
+        return self._ledger.last >= 0
+
+    @property
+    def _patience(self) -> float:
+        return self.options.answer * self.options.questions
+
+    def _head(self, journal: Journal) -> None:
+        assert self.info is not None
+        i = self.info
+        journal.note(b"H", self.link.now(), {
+            "application": i.application, "application_version": i.application_version, "version": list(i.version),
+            "clock_frequency": i.clock_frequency if i.version >= HIRES else None, "data_port": i.data_port, "group": i.group,
+            "link": self.link.description, "names": {str(k): n for k, n in self.names.items()},
+            "utc": datetime.datetime.now(datetime.UTC).isoformat()})
+
+    def _said(self) -> str:
+        c = self.counts
+        bodies = f"{self.tracked} of {len(self.names)} bodies"
+        return f"recording, {c.received} frames, {c.lost} lost, {c.broken} broken, {bodies}"
+
+    def _take(self, journal: Journal, arrival: float, data: bytes) -> None:
+        """One packet, whatever it holds: nothing that comes over the network may end the recording."""
+        assert self.info is not None
+        try:
+            kind = kind_of(data)
+            if kind == Message.FRAME:
+                self._frame(journal, arrival, data)
+            elif kind == Message.MODELDEF:
+                self.names |= parse_names(data, self.info.version)
+                self._asked = None
+                journal.packet(arrival, data)
+            elif kind == Message.ECHO_RESPONSE and len(data) >= 20:
+                sent, ticks = struct.unpack_from("<QQ", data, 4)
+                journal.note(b"C", arrival, {"sent": sent / 1e9, "received": arrival,
+                                             "server": ticks / self.info.clock_frequency})
+        except BrokenPacketError:
+            self._ledger.broken(stated_number(data))
+            self._last_frame = arrival
+            journal.packet(arrival, data)
+
+    def _frame(self, journal: Journal, arrival: float, data: bytes) -> None:
+        assert self.info is not None
+        frame = parse_frame(data, self.info)
+        how = self._ledger.frame(frame.number)
+        if how == "far":
+            self._restarts += 1
+            if self._restarts > 10:
+                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was started anew or "
+                                "plays back; what came before is kept")
+            return
+        self._restarts = 0
+        self._last_frame = arrival
+        self.tracked = sum(body.tracked for body in frame.bodies)
+        journal.packet(arrival, data)
+        unknown = any(body.id not in self.names for body in frame.bodies)
+        if (frame.models_changed or unknown) and (self._asked is None or arrival - self._asked > self.options.answer):
+            self._asked = arrival
+            self.link.send(packet(Message.REQUEST_MODELDEF))
+
+    def _stay_in_touch(self, now: float) -> None:
+        assert self.info is not None
+        if self.info.version >= HIRES and now - self._echoed >= self.options.echo_every:
+            self._echoed = now
+            self.link.send(packet(Message.ECHO_REQUEST, struct.pack("<Q", round(now * 1e9))))
+        alone = self.info.group is None or self.info.version < HIRES  # the latter do not say
+        if alone and now - self._alive >= self.options.keep_alive_every:
+            self._alive = now
+            self.link.send(packet(Message.KEEP_ALIVE))
+
+    def _check_silence(self, since_begin: float, since_frame: float) -> None:
+        if not self.counts_received and since_begin > self.options.first_frame:
+            broken = self.counts.broken
+            assert self.info is not None
+            way = f"multicast group {self.info.group}" if self.info.group else "unicast"
+            what = f"{broken} packets came and none could be read" if broken else "no frame came"
+            raise self._error(f"{what} in {since_begin:.1f} s by {way}; is Motive live, and streaming on that interface? Choose "
+                              "another with --interface")
+        if self.counts_received and since_frame > self.options.silence:
+            self.problem = f"the stream stopped: no frame for {since_frame:.1f} s"
+
+    def _describe(self) -> None:
+        data = self._ask(Message.REQUEST_MODELDEF, b"", Message.MODELDEF)
+        if data is None:
+            raise self._error("Motive answers, but does not describe its assets; is 'Rigid Bodies' on in its streaming settings?")
+        assert self.info is not None
+        try:
+            self.names = parse_names(data, self.info.version)
+        except BrokenPacketError as e:
+            raise self._error(str(e)) from None
+
+    def _error(self, problem: str) -> InputError:
+        return InputError(None, f"{self.link.description}: {problem}")
+
+    def _command(self, text: str) -> str:
+        data = self._ask(Message.REQUEST, text.encode() + b"\0", Message.RESPONSE)
+        if data is None:
+            return "no answer"
+        if len(data) == 8:
+            (code,) = struct.unpack_from("<i", data, 4)
+            return "" if code == 0 else f"refused with code {code}"
+        return ""
+
+    def _ask(self, question: Message, payload: bytes, answer: Message) -> bytes | None:
+        """The answer to a question, asked again where none comes; frames in between are nobody's yet."""
+        for _ in range(self.options.questions):
+            self.link.send(packet(question, payload))
+            end = self.link.now() + self.options.answer
+            while self.link.now() < end:
+                received = self.link.receive(0.05)
+                if received is None:
+                    continue
+                try:
+                    kind = kind_of(received[1])
+                except BrokenPacketError:
+                    continue
+                if kind == answer:
+                    return received[1]
+                if kind == Message.UNRECOGNIZED_REQUEST:
+                    return packet(answer, struct.pack("<i", 1))
+        return None

@@ -1,0 +1,88 @@
+"""dynamixel-sdk in virtual time: a port whose clock and wire are ours. Waiting costs no wall time."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from functools import partial
+
+from dynamixel_sdk import PortHandler
+
+from workbench.device.virtual.bus import ServoBus
+from workbench.device.virtual.clock import MILLISECOND
+
+
+class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
+    """An adapter such as the U2D2 on a virtual bus; `echo` hears itself, as adapters without direction control do.
+
+    unplugged: as if pulled out: what the operating system then raises is raised.
+    """
+
+    def __init__(self, bus: ServoBus, rate: int = 1_000_000, echo: bool = False) -> None:
+        super().__init__("virtual")
+        self.bus, self.echo = bus, echo
+        self.unplugged = False
+        self._rx: deque[int] = deque()
+        self._sending_until = 0
+        bus.join(self)
+        self.setupPort(rate)
+        self.baudrate = rate
+
+    def hear(self, times: Sequence[int], values: bytes, garbled: Sequence[bool], rate: int) -> None:
+        """Bytes from the bus; at a wrong rate they come out as noise."""
+        wrong = abs(rate - self.baudrate) > 0.03 * self.baudrate
+        self._rx.extend(value ^ 0xA5 if wrong else value for value in values)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Any rate will do."""
+        self.baudrate = cflag_baud
+        self.tx_time_per_byte = 10_000 / cflag_baud
+        self.is_open = True
+        return True
+
+    def openPort(self) -> bool:
+        """Opens; False where it is unplugged."""
+        self.is_open = not self.unplugged
+        return self.is_open
+
+    def closePort(self) -> None:
+        """Closes."""
+        self.is_open = False
+
+    def clearPort(self) -> None:
+        """Forgets what came in."""
+        self._alive()
+        self._rx.clear()
+
+    def writePort(self, packet: Sequence[int]) -> int:
+        """Sends now, or when what was written before is out."""
+        self._alive()
+        start = max(self.bus.clock.now, self._sending_until)
+        self._sending_until = self.bus.talk(self, bytes(packet), self.baudrate, start)
+        if self.echo:
+            self.bus.clock.at(self._sending_until, partial(self._rx.extend, bytes(packet)))
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:
+        """What is there; where nothing is, virtual time goes on to the next event, at most a millisecond."""
+        self._alive()
+        if not self._rx:
+            clock = self.bus.clock
+            nearest = clock.next_event
+            latest = clock.now + MILLISECOND
+            clock.advance(latest if nearest is None else min(max(nearest, clock.now + 1), latest))
+        return bytes(self._rx.popleft() for _ in range(min(length, len(self._rx))))
+
+    def getBytesAvailable(self) -> int:
+        """How many bytes wait."""
+        return len(self._rx)
+
+    def getCurrentTime(self) -> float:
+        """Virtual milliseconds."""
+        return self.bus.clock.now / MILLISECOND
+
+    def _alive(self) -> None:
+        if self.unplugged:
+            import termios
+
+            raise termios.error(5, "Input/output error")  # what pyserial lets through, on Linux
