@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,10 @@ from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
 from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel
 from workbench.robot.files import read_text, write_whole
+from workbench.robot.numerals import number_of
+
+MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
+"""Beyond an hour, or ten turns, a table is in another unit."""
 
 SPEED = "speed."
 """What a joint's name has before it in the column of its moving speeds."""
@@ -82,7 +85,8 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
         joints = sorted(known or JOINTS)
         if len(first) != len(joints) + 1:
             raise InputError(
-                path, f"line {n}: without a header, expected time and {len(joints)} joints, found {len(first)} cells")
+                path, f"line {n}: without a header, expected time and {len(joints)} joints, found {len(first)} cells "
+                      "(of a Motive export or a log without its header, export it anew with it)")
         return ["time", *joints], lines
     if "time" not in first:
         raise InputError(path, f"line {n}: expected a header with a column 'time', found {', '.join(first[:4])}")
@@ -95,15 +99,14 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
 
 
 def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return number_of(cell) is not None
 
 
 def _number(path: str | Path, line: int, name: str, cell: str) -> float:
-    value = float(cell) if _is_number(cell) else math.nan
-    if not math.isfinite(value):
-        raise InputError(path, f"line {line}, column {name}: expected a finite number, found '{cell}'")
+    value = number_of(cell)
+    most, unit = (MOST_SECONDS, "s") if name == "time" else (MOST_DEGREES, "deg")
+    if value is None:
+        raise InputError(path, f"line {line}, column {name}: expected a finite number, found '{cell[:40]}'")
+    if abs(value) > most:
+        raise InputError(path, f"line {line}, column {name}: expected at most {most:g} {unit}, found '{cell[:40]}'")
     return value

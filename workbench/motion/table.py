@@ -17,6 +17,8 @@ CENTRE = 512
 """Goal position of the neutral pose (AX-12A: 0 to 1023 over 300 degrees)."""
 LARGEST = 1023
 """Largest goal position and moving speed that the servo's registers take in joint mode."""
+MOST_CYCLES = 10_000
+"""Of one run: hours of walking."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class PoseTable:
         """
         degrees = np.degrees(angles)
         elapsed = np.diff(times)
-        with np.errstate(divide="raise", invalid="raise"):
+        with np.errstate(divide="raise", invalid="raise", over="ignore"):
             asked = np.diff(degrees, axis=0) / elapsed[:, None] if moving_speeds is None else np.degrees(moving_speeds[1:])
             rpm = np.abs(asked) / 6
         return PoseTable(
@@ -81,8 +83,8 @@ class PoseTable:
 
     def commands(self, cycles: int = 1) -> Commands:
         """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
-        if cycles < 1:
-            raise InputError(self.source, f"cycles: expected 1 or more, got {cycles}")
+        if not 1 <= cycles <= MOST_CYCLES:
+            raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         ends = np.cumsum(np.tile(self.dwells_ms, cycles)) / 1000
         goals = np.tile(self.angles(), (cycles, 1))
         return Commands(
@@ -99,4 +101,5 @@ class PoseTable:
 def _nearest(x: Array, lost: float = 1e-9) -> Counts:
     """Nearest integers, halves away from zero as MATLAB rounds, with halves that were lost, by at most so much, to the change of
     units."""
-    return np.asarray(np.sign(x) * np.floor(np.abs(x) + 0.5 + lost), dtype=np.int64)
+    size = np.minimum(np.abs(x), 1e15)  # what is larger is refused as it is, and fits the type
+    return np.asarray(np.sign(x) * np.floor(size + 0.5 + lost), dtype=np.int64)
