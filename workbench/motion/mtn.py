@@ -209,7 +209,8 @@ def _page(number: int, fields: _Fields, ids: int) -> MtnPage:
         if np.any((step[:ids] < 0) | (step[:ids] > 1023)):
             raise InputError(fields.path, f"line {n}: step: expected positions from 0 to 1023")
         if not (step[ids] >= 0 and step[ids + 1] > 0 and step[ids:].max() <= _LONGEST):
-            raise InputError(fields.path, f"line {n}: step: expected a pause of 0 s or more, a time above 0 s, at most {_LONGEST:g} s")
+            wanted = f"a pause of 0 s or more, a time above 0 s, at most {_LONGEST:g} s"
+            raise InputError(fields.path, f"line {n}: step: expected {wanted}")
         if np.any(step[:ids] != np.round(step[:ids])):
             raise InputError(fields.path, f"line {n}: step: expected positions in whole counts")
     if not 0.01 <= play[3] <= 100:

@@ -14,7 +14,6 @@ import yaml
 from workbench.robot.errors import InputError
 from workbench.robot.files import read_text
 
-
 MOST_BYTES = 1 << 20
 """Largest YAML file that is read [bytes]; a fitted model of a hundred parameters has 0.2 MB."""
 MOST_VALUES = 100_000
