@@ -71,8 +71,8 @@ class Certificate:
             lines.append(f"warning: beyond {advice}: it heats")
         if self.other_engine:
             e = self.other_engine
-            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading {e['heading apart deg/m']:+.1f} deg/m "
-                         "apart")
+            apart = f"heading {e['heading apart deg/m']:+.1f} deg/m apart"
+            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}")
         return "\n".join(lines)
 
 

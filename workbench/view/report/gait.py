@@ -153,10 +153,11 @@ def _draws_section(certificate: Certificate) -> Section:
 def _way_section(certificate: Certificate) -> Section:
     rows = [[name, *(f"{value:.2f}" for value in part.values())] for name, part in certificate.ways.items()
             if isinstance(part, dict) and name != "at rest"]
+    said = ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
+            "The robot is jerked more than by the gait itself.")
     return Section("In and out", [
         Text("`start.csv` leads from neutral through the gait's stance and one cycle of half its size into the gait, `stop.csv` "
-             "back to neutral. " + ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
-                               "The robot is jerked more than by the gait itself.")),
+             "back to neutral. " + said),
         Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows)])
 
 
