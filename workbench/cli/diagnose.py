@@ -31,25 +31,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, predicts and writes."""
+    from workbench.api.sessions import DiagnoseOptions, diagnose
     from workbench.cli.memory import rollout_memory
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.compare.prediction import predict_session
     from workbench.compare.session import load_session
-    from workbench.identify.diagnosis import diagnose_session
-    from workbench.motion import save_motion
-    from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
-        told = diagnose_session(session, progress, args.jobs, memory, args.thorough)
-        paths = write_diagnosis(told.diagnosis, told.stories, folder, str(args.session), progress)
-        if told.motion is not None and told.diagnosis.next_experiment is not None:
-            paths.append(folder / told.diagnosis.next_experiment.motion)
-            save_motion(told.motion, paths[-1])
-        if session.predict:
-            (folder / "predict").mkdir()
-            predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
+        told = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
+        paths = told.save(folder, progress, args.jobs)
     for name, reason in told.diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
     if told.diagnosis.stopped:
@@ -57,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"verdict: {told.diagnosis.verdict}")
     for finding in told.diagnosis.findings:
         print(f"  {_line(finding)}")
-    print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
+    print(f"wrote {args.out}: {', '.join(path.name for path in paths if path.parent == folder)}")
     return 0
 
 

@@ -16,8 +16,8 @@ def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy
     """--model: which robot; PUPPY where nothing is said. default: what that stands for."""
     parser.add_argument(
         "--model", metavar="FILE", default=PUPPY,
-        help="robot: a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos and ground are taken "
-        f"(default: {default})")
+        help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos "
+        f"and ground are taken (default: {default})")
 
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -37,25 +37,9 @@ def _folder(text: str) -> Path:
 
 def load_model(name: str) -> RobotModel:
     """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
-    from workbench.compare.session import load_session
-    from workbench.effects.apply import resolved
-    from workbench.robot import InputError, RobotModel, puppy_model
-    from workbench.robot.model_file import load_model as read_model_file
-    from workbench.robot.yaml_file import read_yaml
+    from workbench.api.robots import load_model as named
 
-    if name == PUPPY:
-        return puppy_model()
-    if Path(name).suffix.lower() in (".yaml", ".yml"):
-        content = read_yaml(name)
-        if isinstance(content, dict) and not {"takes", "predict"}.isdisjoint(content):
-            return load_session(name).model
-        model = read_model_file(name)
-        try:
-            list(resolved(model))
-        except InputError as e:
-            raise InputError(name, f"effects: {e.problem}") from None
-        return model
-    return RobotModel(name)
+    return named(name)
 
 
 def positive(text: str) -> int:

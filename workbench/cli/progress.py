@@ -7,8 +7,18 @@ import threading
 import time
 from typing import TextIO
 
+from workbench.cli.log import LOGGER
+
 QUIET = 1.5
 """Runs shorter than this say nothing [s], so that their errors stand alone."""
+LEFT_AFTER = 5.0
+"""A step has to have run that long [s] before the time that it still needs is told from its share done."""
+_mode = {"silent": False}
+
+
+def progress_mode(quiet: bool, verbose: bool) -> None:
+    """Whether runs stay silent: with --quiet, and with --verbose, where the log speaks instead."""
+    _mode["silent"] = quiet or verbose
 
 
 class Progress:
@@ -27,7 +37,8 @@ class Progress:
         self._last = -float("inf")
         self._now: tuple[str, float | None] = "", None
         self._shown = ""
-        self._speaks = quiet <= 0
+        self._stage = "", self._started
+        self._speaks = quiet <= 0 and not _mode["silent"]
         self._lock = threading.Lock()
         self._timer = threading.Timer(quiet, self._speak)
         self._timer.daemon = True
@@ -46,6 +57,9 @@ class Progress:
 
     def __call__(self, what: str, done: float | None = None) -> None:
         with self._lock:
+            if what != self._stage[0]:
+                self._stage = what, time.monotonic()
+                LOGGER.debug("%s", what)
             self._now = what, done
             if self._speaks:
                 self._show()
@@ -53,8 +67,8 @@ class Progress:
     def _speak(self) -> None:
         """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
         with self._lock:
-            self._speaks = True
-            if self._now[0]:
+            self._speaks = not _mode["silent"]
+            if self._speaks and self._now[0]:
                 self._show()
 
     def _show(self) -> None:
@@ -64,6 +78,13 @@ class Progress:
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"
-        line = f"workbench {self._verb}: {what}{share} ({now - self._started:.0f} s)"
+        line = f"workbench {self._verb}: {what}{share} ({now - self._started:.0f} s{self._left(done, now)})"
         self._stream.write(f"\r\x1b[2K{line[:110]}" if self._tty else f"{line}\n")
         self._stream.flush()
+
+    def _left(self, done: float | None, now: float) -> str:
+        """How long this step still takes, if it goes on as it did."""
+        spent = now - self._stage[1]
+        if done is None or not 0 < done < 1 or spent < LEFT_AFTER:
+            return ""
+        return f", {spent * (1 - done) / done:.0f} s left of this step"
