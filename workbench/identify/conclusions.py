@@ -18,7 +18,8 @@ from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import LOOP, TakeEvidence, joint_error, ratios
 from workbench.identify.selection.model_comparison import Rival, Standing
 from workbench.identify.selection.record import Round
-from workbench.robot import EffectSpec
+from workbench.identify.ties import Tie
+from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
@@ -27,6 +28,8 @@ LEAST_RELATIVE = 0.005
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
 LEAST_OF = {"command_delay": LOOP / np.sqrt(3.0)}
 """The same in the contract's unit: every model may set out by LOOP sooner or later, so that no delay is known better [s]."""
+WORTH_AN_EXPERIMENT = 0.05
+"""Probability from which on the likeliest rival of a finding is worth an experiment."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
@@ -176,6 +179,12 @@ def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
     best = max(found, key=lambda k: found[k]) if found else ""
     told = best and found[best] > 0.3
     return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
+
+
+def ties(nominal: RobotModel, fit: Fit, standings: Sequence[Standing]) -> tuple[Tie, ...]:
+    """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
+    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in standings
+                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > WORTH_AN_EXPERIMENT)
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.findings import Change, Estimate, Finding
+from workbench.identify.findings import SUREST, Change, Estimate, Finding
 from workbench.identify.fitting.covariance import Z90
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.selection.model_comparison import SUREST
 from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
 from workbench.recording.mocap.mending import mend

@@ -9,13 +9,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.findings import SUREST
 from workbench.identify.fitting.covariance import TEMPER_WALKING
 from workbench.identify.fitting.fits import Fit, Report, Search, gained
+from workbench.identify.fitting.responses import Part
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.selection.acceptance import completed
 from workbench.identify.selection.forward import CLOSE, MOST_RIVALS
 from workbench.identify.selection.record import Chosen, Round
-from workbench.identify.selection.screening import Part, Trial
+from workbench.identify.selection.screening import Trial
 
 Array = NDArray[np.float64]
 Seats = dict[Key, tuple[Round, Trial]]
@@ -46,8 +48,6 @@ STEPS = 4
 TWIN = 1.0 / 3.0
 """The least odds of a finding's twin that walks tell, where it came near enough to be put in its place, and of a name that held
 takes find better but for the price of its numbers."""
-SUREST = 0.98
-"""What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
 """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the last.
 True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in part."""
