@@ -247,7 +247,7 @@ def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
 
 def test_twins_name_each_other():
     known = known_effects()
-    assert all(known[e.twin].twin == e.name for e in known.values() if e.twin)
+    assert all(e.name in known[other].equivalent_to for e in known.values() for other in e.equivalent_to)
 
 
 def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):

@@ -23,9 +23,6 @@ T = TypeVar("T")
 Sizes = list[tuple[Candidate, Array]]
 """Effects, each with its sizes."""
 Report = Callable[[str, float | None], None]
-SEEN_ELSEWHERE = ("zero_offset",)
-"""What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
-
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
 AGAINST = 100.0
@@ -235,7 +232,7 @@ class Search:
 
     def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
         """Whether an effect shows in the channels of its own joint alone, on these takes."""
-        return c.joint is not None and c.name not in SEEN_ELSEWHERE and not self.jury.walks(takes)
+        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.jury.walks(takes)
 
     def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
         """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves

@@ -141,7 +141,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 if not _tips(search, trials[0], takes, tier):
                     break
-                likely = [c for c in pool if c.name == "com_shift"]
+                likely = [c for c in pool if c.effect.moves_center]
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
