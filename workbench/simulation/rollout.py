@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -109,15 +110,47 @@ class Simulation:
         setter = None if steadied is None else BaseSetter(
             steadied, self.plant, self.diagram.scene_graph(), self._base, self._plant_context)
         sampled, forces = self._advance(commands, lead, lead + duration, setter)
+        t, _ = self._logs.read("state")
+        contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
+        return self._written_down(lead, name, commands, sent, setter, contact)
+
+    def stand(self) -> None:
+        """Stands still in neutral at time 0, for a caller who moves it step by step: `command`, then `advance`."""
+        self._rest_in_neutral(None)
+        self._set_first_command(np.inf)
+        self.simulator.Initialize()
+
+    def command(self, goal: Array, speed: Array, enabled: Array) -> None:
+        """From now on: goals (n,) [rad], moving speeds (n,) [rad/s] and torque enable (n,), in self.joints' order."""
+        self._command(goal, speed, enabled)
+
+    def first_command(self) -> None:
+        """What grows from a take's first command on does so from now on."""
+        self._set_first_command(self.context.get_time())
+
+    def advance(self, time: float) -> tuple[Array, Array, Array]:
+        """On to a time [s] of the station's clock: angles and velocities (n,) of the servos' side there, and duty."""
+        if time > self.context.get_time():
+            self.simulator.AdvanceTo(time)
+        x = self.plant.GetPositionsAndVelocities(self._plant_context)[None]
+        q, v = self._logs.joints(x)
+        return q[0] - self._zero, v[0], self.diagram.GetOutputPort("duty").Eval(self.context)
+
+    def so_far(self, starts_at: float, name: str = "simulation") -> Take:
+        """The take since `stand`, time 0 at `starts_at` [s] of the station's clock."""
+        return self._written_down(starts_at, name, None, None)
+
+    def _written_down(self, lead: float, name: str, commands: Commands | None, sent: Commands | None,
+                      setter: BaseSetter | None = None, contact: Mapping[str, Array] | None = None) -> Take:
+        """The logs as a take; commands: as they were played, sent: as they were sent."""
         t, state = self._logs.read("state")
         time = t - lead
         q, v = self._logs.joints(state)
         p_WB, quat_WB = self._logs.base_path(state)
         if setter is not None:
             p_WB, quat_WB = setter.in_one_piece(t, p_WB, quat_WB)
-        contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
         take = Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
-                    p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
+                    p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact or {},
                     commands=sent)
         return self._as_built(take, state)
 
