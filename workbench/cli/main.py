@@ -15,7 +15,8 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export", "record", "bench")
+VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export",
+         "servos", "play", "record", "bench")
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -62,6 +63,11 @@ class Bus:
         """Lets time go by."""
         self._guarded(lambda: self.port.pause(seconds))
 
+    def close(self) -> None:
+        """Gives the port back; one that is gone is none."""
+        with suppress(*GONE):
+            self.port.closePort()
+
     # One servo
 
     def read(self, servo: int, *names: str) -> dict[str, int]:
@@ -92,7 +98,7 @@ class Bus:
             if check and self.read(servo, name)[name] != value:
                 found = self.read(servo, name)[name]
                 raise BusError(f"reads {found} after {value} was written", servo, self.joints.get(servo), name)
-        if switch is not None:
+        if switch is not None and "id" not in values:
             self._write(servo, switch.register, switch.closed)
 
     def exists(self, servo: int) -> int | None:
