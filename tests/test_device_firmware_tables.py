@@ -73,7 +73,7 @@ def test_c_header_compiles_without_warnings_and_says_the_same(tmp_path: Path) ->
     ("timeDiff.txt", "4,\n140,\n", "3,\n", "timeDiff.txt: 3 poses, but 4 in pos.txt"),
     ("timeDiff.txt", "140,", "140,2,", "timeDiff.txt: pose 1: expected 1 numbers, found 2"),
     ("speed.txt", "159,128,", "159,", "speed.txt: pose 1: expected 15 numbers, found 14"),
-    ("speed.txt", "159,128,", "159,x,", "speed.txt: expected integers"),
+    ("speed.txt", "159,128,", "159,x,", "speed.txt: line 3: expected whole numbers"),
     ("pos.txt", "412,482,", "412,1482,", "pose 1, joint blm: goal position 1482 is outside 0 to 1023"),
 ])
 def test_damaged_tables_are_refused(name: str, old: str, new: str, message: str, tmp_path: Path) -> None:

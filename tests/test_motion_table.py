@@ -133,3 +133,31 @@ def test_files_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b"]
     with pytest.raises(InputError, match="cannot be written"):
         write_together(tmp_path / "a", {"c": "new"})
+
+
+def test_moving_speeds_of_their_own_survive_the_file(tmp_path):
+    rng = np.random.default_rng(0)
+    table = PoseTable(("b", "a"), rng.integers(0, 1024, (6, 2)), rng.integers(0, 1024, (6, 2)), rng.integers(1, 400, 6))
+    path = save_motion(Motion.from_table(table), tmp_path / "own.csv")
+    back = load_motion(path).as_table()
+    assert path.read_text().splitlines()[0] == "time,b,a,speed.b,speed.a"
+    for field in ("goals", "speeds", "dwells_ms"):
+        np.testing.assert_array_equal(getattr(back, field), getattr(table, field))
+
+
+@pytest.mark.parametrize(("header", "said"), [
+    ("time,a,b,speed.a", "column 'speed.b': expected speed.JOINT of all joints or of none"),
+    ("time,a,speed.a,speed.c", "column 'speed.c'"),
+])
+def test_moving_speeds_are_of_all_joints_or_of_none(tmp_path, header, said):
+    path = tmp_path / "m.csv"
+    path.write_text(f"{header}\n0,0,0,0\n1,1,1,1\n")
+    with pytest.raises(InputError, match=said):
+        load_motion(path)
+
+
+def test_a_moving_speed_is_not_negative(tmp_path):
+    path = tmp_path / "m.csv"
+    path.write_text("time,a,speed.a\n0,0,0\n1,1,-5\n")
+    with pytest.raises(InputError, match="row 2, joint a: expected a moving speed of 0 or more"):
+        load_motion(path)

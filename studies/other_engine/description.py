@@ -183,13 +183,13 @@ def _shapes(plant: MultibodyPlant, inspector: SceneGraphInspector, body: RigidBo
             kind, half = "box", np.asarray(shape.size(), dtype=float) / 2
         else:
             continue
-        friction: Any = properties.GetPropertyOrDefault("material", "coulomb_friction", None)
+        rubbed = properties.HasProperty("material", "coulomb_friction")
         stiffness: Any = properties.GetPropertyOrDefault("material", "point_contact_stiffness", math.nan)
         dissipation: Any = properties.GetPropertyOrDefault("material", "hunt_crossley_dissipation", math.nan)
         X_LG = inspector.GetPoseInFrame(geometry)
         out.append(ContactShape(
             kind, np.asarray(X_LG.translation()), np.asarray(X_LG.rotation().matrix()), half,
-            friction=math.nan if friction is None else friction.dynamic_friction(),
+            friction=properties.GetProperty("material", "coulomb_friction").dynamic_friction() if rubbed else math.nan,
             stiffness=float(stiffness),
             dissipation=float(dissipation),
         ))

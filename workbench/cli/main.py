@@ -15,8 +15,10 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export",
-         "servos", "play", "record", "bench")
+VERBS = (
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
+    "record", "bench",
+)
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -16,11 +16,13 @@ from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, InputError, RobotModel
 from workbench.robot.files import read_text, write_together
+from workbench.robot.numerals import whole_of
 
 Counts = NDArray[np.int64]
 
 GOALS, SPEEDS, DWELLS, HEADER = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h"
 ORDER = "# joints:"
+_MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the table
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,14 @@ def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], Counts
     if not lines or not lines[0].startswith(ORDER):
         raise InputError(path, f"line 1: expected '{ORDER} …', the order of joints")
     joints = tuple(lines[0].removeprefix(ORDER).split())
-    try:
-        rows = [[int(cell) for cell in re.split(r"[,\s]+", line.strip(", "))] for line in lines[1:]]
-    except ValueError as e:
-        raise InputError(path, f"expected integers: {e}") from None
+    rows: list[list[int]] = []
+    for n, line in enumerate(lines[1:], start=2):
+        rows.append([])
+        for cell in re.split(r"[,\s]+", line.strip(", ")):
+            value = whole_of(cell)
+            if value is None or value > _MOST:
+                raise InputError(path, f"line {n}: expected whole numbers up to {_MOST}, found '{cell[:40]}'")
+            rows[-1].append(value)
     if not rows or rows[0] != [len(rows) - 1]:
         raise InputError(path, f"line 2: expected the number of poses, and {max(len(rows) - 1, 0)} follow")
     for k, row in enumerate(rows[1:], start=1):

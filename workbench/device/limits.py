@@ -14,6 +14,7 @@ from scipy.ndimage import minimum_filter1d
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
 from workbench.robot import COUNT, SPEED_UNIT, InputError, RobotModel, ServoConstants
+from workbench.robot.ranges import joint_ranges
 
 Array = NDArray[np.float64]
 
@@ -71,14 +72,15 @@ def refuse_broken_limits(table: PoseTable, model: RobotModel, force: bool, simul
 
 
 def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
-    """Goals beyond the model's joint limits; half a count is granted, as a limit itself may round to that."""
-    angles = table.angles()
+    """Goals beyond the joints' ranges; half a count is granted, as a limit itself may round to that."""
+    angles, ranges = table.angles(), joint_ranges(model)
     for i, joint in enumerate(table.joints):
-        frame = model.kinematics.frames[joint]
-        for bound, side in ((frame.lower, -1), (frame.upper, 1)):
+        own = ranges[joint]
+        for bound, side in ((own.lower, -1), (own.upper, 1)):
             for k in np.flatnonzero(side * (angles[:, i] - bound) > COUNT / 2):
                 value, limit = math.degrees(angles[k, i]), math.degrees(bound)
-                text = f"goal {table.goals[k, i]} is {value:.1f} deg, beyond the joint's limit of {limit:.1f} deg"
+                text = (f"goal {table.goals[k, i]} is {value:.1f} deg, beyond the joint's limit of {limit:.1f} deg "
+                        f"({own.source})")
                 yield Violation("position", joint, value, limit, "deg", text, pose=int(k) + 1)
 
 

@@ -99,7 +99,7 @@ class SdfRobot:
 
     def add_point_mass(self, link: str, mass: float, position: Array) -> None:
         """A point of `mass` [kg] fixed at `position` (3,) in the link's frame."""
-        inertial = self._inertial(link)
+        inertial = self.inertial(link)
         m, center, inertia = read_inertia(inertial)
         both = (m * center + mass * np.asarray(position)) / (m + mass)
         inertia = inertia + _parallel(m, center - both) + _parallel(mass, position - both)
@@ -107,7 +107,7 @@ class SdfRobot:
 
     def shift_center(self, link: str, offset: Array) -> None:
         """The link's centre of mass, with the inertia about it, moved by `offset` (3,) in the link's frame."""
-        inertial = self._inertial(link)
+        inertial = self.inertial(link)
         m, center, inertia = read_inertia(inertial)
         write_inertia(inertial, m, center + offset, inertia)
 
@@ -217,7 +217,7 @@ class SdfRobot:
     def _link(self, name: str) -> Element:
         return self._named("link", name)
 
-    def _inertial(self, link: str) -> Element:
+    def inertial(self, link: str) -> Element:
         inertial = self._link(link).find("inertial")
         if inertial is None:
             raise InputError(self.path, f"link '{link}' has no <inertial>, to which mass could be added")

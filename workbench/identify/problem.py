@@ -235,7 +235,7 @@ def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
 def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
     if not others:
         return np.zeros(nominal.shape[1])
-    return np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0)
+    return np.asarray(np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0), dtype=float)
 
 
 def _running_sum(columns: Array, frames: int) -> Array:

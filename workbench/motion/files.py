@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
 from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel
 from workbench.robot.files import read_text, write_whole
+from workbench.robot.numerals import number_of
+
+MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
+"""Beyond an hour, or ten turns, a table is in another unit."""
+
+SPEED = "speed."
+"""What a joint's name has before it in the column of its moving speeds."""
 
 
 def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     """Reads a pose table (CSV, degrees), or a page of a ROBOTIS motion file as `FILE.mtn#page`.
 
     Columns are found by the header's names; without a header they are `time` and the model's joints in alphabetical
-    order (without a model, the puppy's). InputError names line and column of what is wrong, or a joint `model` lacks.
+    order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of all joints or of none, are moving speeds in place of
+    the travel over the dwell. InputError names line and column of what is wrong, or a joint `model` lacks.
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
@@ -28,9 +36,18 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
 
 def save_motion(motion: Motion, path: str | Path) -> Path:
     """Writes the pose table that `load_motion` reads (degrees, ten digits), whole or not at all."""
-    rows = np.column_stack([motion.times, np.degrees(motion.angles)])
-    lines = [",".join(["time", *motion.joints])] + [",".join(f"{x + 0.0:.10g}" for x in row) for row in rows]
-    return write_whole(path, "\n".join(lines) + "\n")
+    return write_whole(path, motion_text(motion))
+
+
+def motion_text(motion: Motion, about: str = "") -> str:
+    """The text that `save_motion` writes, under a comment line that says `about`, if anything."""
+    header, columns = ["time", *motion.joints], [motion.times[:, None], np.degrees(motion.angles)]
+    if motion.speeds is not None:
+        header += [SPEED + j for j in motion.joints]
+        columns.append(np.degrees(motion.speeds))
+    lines = [f"# {about}"] if about else []
+    lines += [",".join(header)] + [",".join(f"{x + 0.0:.10g}" for x in row) for row in np.hstack(columns)]
+    return "\n".join(lines) + "\n"
 
 
 Line = tuple[int, list[str]]
@@ -47,9 +64,17 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
         if len(cells) != len(names):
             raise InputError(path, f"line {n}: expected {len(names)} cells, found {len(cells)}")
         table[k] = [_number(path, n, name, cell) for name, cell in zip(names, cells)]
-    at = names.index("time")
-    joints = tuple(name for name in names if name != "time")
-    return Motion(Path(path).stem, table[:, at], joints, np.radians(np.delete(table, at, axis=1)), str(path))
+    joints = tuple(name for name in names if name != "time" and not name.startswith(SPEED))
+    ramped = [name for name in names if name.startswith(SPEED)]
+    for name in (*(SPEED + j for j in joints if ramped), *ramped):
+        if name not in names or name.removeprefix(SPEED) not in joints:
+            raise InputError(path, f"line {lines[0][0]}: column '{name}': expected {SPEED}JOINT of all joints or of none")
+
+    def columns(wanted: Sequence[str]) -> NDArray[np.float64]:
+        return np.radians(table[:, [names.index(name) for name in wanted]])
+
+    return Motion(Path(path).stem, table[:, names.index("time")], joints, columns(joints), str(path),
+                  columns([SPEED + j for j in joints]) if ramped else None)
 
 
 def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> tuple[list[str], list[Line]]:
@@ -60,28 +85,28 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
         joints = sorted(known or JOINTS)
         if len(first) != len(joints) + 1:
             raise InputError(
-                path, f"line {n}: without a header, expected time and {len(joints)} joints, found {len(first)} cells")
+                path, f"line {n}: without a header, expected time and {len(joints)} joints, found {len(first)} cells "
+                      "(of a Motive export or a log without its header, export it anew with it)")
         return ["time", *joints], lines
     if "time" not in first:
         raise InputError(path, f"line {n}: expected a header with a column 'time', found {', '.join(first[:4])}")
     for name in first:
         if first.count(name) > 1:
             raise InputError(path, f"line {n}: column '{name}' stands there twice")
-        if name != "time" and known is not None and name not in known:
+        if name != "time" and known is not None and name.removeprefix(SPEED) not in known:
             raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}")
     return first, lines[1:]
 
 
 def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return True
+    return number_of(cell) is not None
 
 
 def _number(path: str | Path, line: int, name: str, cell: str) -> float:
-    value = float(cell) if _is_number(cell) else math.nan
-    if not math.isfinite(value):
-        raise InputError(path, f"line {line}, column {name}: expected a finite number, found '{cell}'")
+    value = number_of(cell)
+    most, unit = (MOST_SECONDS, "s") if name == "time" else (MOST_DEGREES, "deg")
+    if value is None:
+        raise InputError(path, f"line {line}, column {name}: expected a finite number, found '{cell[:40]}'")
+    if abs(value) > most:
+        raise InputError(path, f"line {line}, column {name}: expected at most {most:g} {unit}, found '{cell[:40]}'")
     return value

@@ -1,12 +1,14 @@
 """ROBOTIS motion files (.mtn, RoboPlus Motion 1.x): pages of poses by bus ID.
 
-Layout as measured on published files: `key=value` lines, UTF-8 with or without byte order mark, LF or CRLF, always 255
-or 127 pages, sometimes two stray characters after the last page.
+Layout as measured on published files: `key=value` lines, LF or CRLF, names in UTF-8 (with or without byte order mark) or in the
+author's code page, always 255 or 127 pages, mostly two arbitrary bytes after the last page. Version 1.00 knows no motor types:
+all have 1024 counts. On a computer of a comma country, numbers have decimal commas.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +17,8 @@ from numpy.typing import NDArray
 
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT, InputError
-from workbench.robot.files import read_text
+from workbench.robot.files import MOST_TEXT, regular_file
+from workbench.robot.numerals import number_of
 
 Array = NDArray[np.float64]
 
@@ -105,13 +108,20 @@ class MtnFile:
         return Motion(name, np.array(times), joints, np.array(rows), f"{self.source}#{name}")
 
 
+_LONGEST = 600.0
+"""Pause or time of a step [s]; the tool writes 2.04 s at most."""
+_TAIL = 8
+"""Bytes that the tool may leave after the last page, of which two are seen; more is a page that was cut off."""
+_CODE_PAGES = ("utf-8-sig", "cp949", "cp1252", "latin-1")
+
+
 def load_mtn(path: str | Path) -> MtnFile:
     """Reads a ROBOTIS motion file; InputError names the line and what was expected there."""
-    lines = [(n, line.strip()) for n, line in enumerate(read_text(path).splitlines(), start=1)]
+    lines = [(n, line.strip()) for n, line in enumerate(_text(path).splitlines(), start=1)]
     ends = [k for k, (_, line) in enumerate(lines) if line == "page_end"]
     starts = [k for k, (_, line) in enumerate(lines) if line == "page_begin"]
     edges = sorted([*starts, *ends])
-    if edges[::2] != starts or edges[1::2] != ends:
+    if len(starts) != len(ends) or edges[::2] != starts or edges[1::2] != ends:
         raise InputError(
             path, f"{len(starts)} page_begin and {len(ends)} page_end; expected them in pairs (is the file cut off?)")
     if not starts:
@@ -120,10 +130,31 @@ def load_mtn(path: str | Path) -> MtnFile:
     if header.one("type") != "motion":
         raise InputError(path, f"type={header.one('type')}; expected type=motion")
     enable = header.integers("enable")
-    # Whatever stands after the last page is junk that ROBOTIS's tool leaves there.
+    version = header.one("version").replace(",", ".")
+    typed = "motor_type" in header.values or version != "1.00"
+    motors = header.integers("motor_type", len(enable)) if typed else np.zeros(len(enable), dtype=np.int64)
     pages = tuple(_page(number, _Fields(path, lines[s + 1:e]), len(enable))
                   for number, (s, e) in enumerate(zip(starts, ends), start=1))
-    return MtnFile(str(path), header.one("version"), enable != 0, header.integers("motor_type", len(enable)), pages)
+    return MtnFile(str(path), version, enable != 0, motors, pages)
+
+
+def _text(path: str | Path) -> str:
+    """What stands up to the last page's end, in the first code page that holds all of it."""
+    try:
+        content = regular_file(path, MOST_TEXT).read_bytes()
+    except OSError as e:
+        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    last = content.rfind(b"page_end")
+    end = len(content) if last < 0 else last + len(b"page_end")
+    tail = content[end:].strip()
+    if len(tail) > _TAIL or (len(tail) > 2 and b"page_begin".startswith(tail)):
+        line = content.count(b"\n", 0, end) + 2
+        raise InputError(path, f"line {line}: {len(content) - end} bytes without a page_end; expected the file to end here, "
+                               "or whole pages (is the file cut off?)")
+    for name in _CODE_PAGES:
+        with suppress(UnicodeDecodeError):
+            return content[:end].decode(name)
+    raise AssertionError("latin-1 holds any bytes")
 
 
 class _Fields:
@@ -147,15 +178,21 @@ class _Fields:
         return self.parse(*self._entry(key), key, count)
 
     def integers(self, key: str, count: int | None = None) -> NDArray[np.int64]:
-        return np.asarray(self.numbers(key, count), dtype=np.int64)
+        line, value = self._entry(key)
+        numbers = self.parse(line, value, key, count)
+        if np.any(numbers != np.round(numbers)):
+            raise InputError(self.path, f"line {line}: {key}: expected whole numbers, found '{value[:30]}'")
+        return np.asarray(numbers, dtype=np.int64)
 
     def parse(self, line: int, value: str, key: str, count: int | None) -> Array:
-        try:
-            numbers = np.array([float(word) for word in value.split()])
-        except ValueError:
-            raise InputError(self.path, f"line {line}: {key}: expected numbers, found '{value[:30]}'") from None
+        words = [number_of(word.replace(",", ".")) for word in value.split()]
+        if None in words:
+            raise InputError(self.path, f"line {line}: {key}: expected numbers, found '{value[:30]}'")
+        numbers = np.array(words, dtype=float)
         if (count is not None and len(numbers) != count) or not np.isfinite(numbers).all():
             raise InputError(self.path, f"line {line}: {key}: expected {count} finite numbers, found {len(numbers)}")
+        if np.any(np.abs(numbers) > 1e9):
+            raise InputError(self.path, f"line {line}: {key}: expected numbers below 1e9, found '{value[:30]}'")
         return numbers
 
     def _entry(self, key: str) -> tuple[int, str]:
@@ -171,10 +208,13 @@ def _page(number: int, fields: _Fields, ids: int) -> MtnPage:
     for n, step in steps:
         if np.any((step[:ids] < 0) | (step[:ids] > 1023)):
             raise InputError(fields.path, f"line {n}: step: expected positions from 0 to 1023")
-        if not (step[ids] >= 0 and step[ids + 1] > 0):
-            raise InputError(fields.path, f"line {n}: step: expected a pause of 0 s or more, a time above 0 s")
-    if not play[3] > 0:
-        raise InputError(fields.path, f"line {fields.first}: play_param: speed rate {play[3]:g}; expected above 0")
+        if not (step[ids] >= 0 and step[ids + 1] > 0 and step[ids:].max() <= _LONGEST):
+            wanted = f"a pause of 0 s or more, a time above 0 s, at most {_LONGEST:g} s"
+            raise InputError(fields.path, f"line {n}: step: expected {wanted}")
+        if np.any(step[:ids] != np.round(step[:ids])):
+            raise InputError(fields.path, f"line {n}: step: expected positions in whole counts")
+    if not 0.01 <= play[3] <= 100:
+        raise InputError(fields.path, f"line {fields.first}: play_param: speed rate {play[3]:g}; expected 0.01 to 100")
     table = np.array([step for _, step in steps]).reshape(len(steps), ids + 2)
     return MtnPage(
         number=number, name=fields.one("name"), next=int(play[0]), exit=int(play[1]), repeat=int(play[2]),

@@ -17,6 +17,8 @@ CENTRE = 512
 """Goal position of the neutral pose (AX-12A: 0 to 1023 over 300 degrees)."""
 LARGEST = 1023
 """Largest goal position and moving speed that the servo's registers take in joint mode."""
+MOST_CYCLES = 10_000
+"""Of one run: hours of walking."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,16 +52,19 @@ class PoseTable:
         return len(self.dwells_ms)
 
     @staticmethod
-    def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion") -> PoseTable:
+    def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion",
+                    moving_speeds: Array | None = None) -> PoseTable:
         """The thesis's equations 3.1 to 3.4: rows of angles (K, n) [rad] at times (K,) [s] become K - 1 poses.
 
         Goals are rounded to counts of 300/1023 deg about 512, speeds to counts of 114/1023 rpm, dwells to milliseconds.
-        The first row gives no pose of its own, only the speed of the first pose.
+        The first row gives no pose of its own, only the speed of the first pose. moving_speeds: (K, n) [rad/s] in place of the
+        travel over the dwell.
         """
         degrees = np.degrees(angles)
         elapsed = np.diff(times)
-        with np.errstate(divide="raise", invalid="raise"):
-            rpm = np.abs(np.diff(degrees, axis=0) / elapsed[:, None]) / 6
+        with np.errstate(divide="raise", invalid="raise", over="ignore"):
+            asked = np.diff(degrees, axis=0) / elapsed[:, None] if moving_speeds is None else np.degrees(moving_speeds[1:])
+            rpm = np.abs(asked) / 6
         return PoseTable(
             joints,
             goals=CENTRE + _nearest(degrees[1:] * LARGEST / 300),
@@ -72,10 +77,14 @@ class PoseTable:
         """Goals as angles (P, n) [rad], zero = servo centre."""
         return np.asarray((self.goals - CENTRE) * COUNT, dtype=float)
 
+    def moving_speeds(self) -> Array:
+        """Moving speeds (P, n) [rad/s] that equation 3.3 turns into these counts."""
+        return np.asarray(np.radians(self.speeds * 114 / LARGEST * 6), dtype=float)
+
     def commands(self, cycles: int = 1) -> Commands:
         """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
-        if cycles < 1:
-            raise InputError(self.source, f"cycles: expected 1 or more, got {cycles}")
+        if not 1 <= cycles <= MOST_CYCLES:
+            raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         ends = np.cumsum(np.tile(self.dwells_ms, cycles)) / 1000
         goals = np.tile(self.angles(), (cycles, 1))
         return Commands(
@@ -92,4 +101,5 @@ class PoseTable:
 def _nearest(x: Array, lost: float = 1e-9) -> Counts:
     """Nearest integers, halves away from zero as MATLAB rounds, with halves that were lost, by at most so much, to the change of
     units."""
-    return np.asarray(np.sign(x) * np.floor(np.abs(x) + 0.5 + lost), dtype=np.int64)
+    size = np.minimum(np.abs(x), 1e15)  # what is larger is refused as it is, and fits the type
+    return np.asarray(np.sign(x) * np.floor(size + 0.5 + lost), dtype=np.int64)

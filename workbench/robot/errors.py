@@ -10,8 +10,8 @@ class InputError(ValueError):
     2."""
 
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
-        self.source = None if source is None else str(source)
-        self.problem = " ".join(str(problem).split())
+        self.source = None if source is None else "".join(c if c.isprintable() else repr(c)[1:-1] for c in str(source))
+        self.problem = " ".join("".join(c if c.isprintable() or c.isspace() else repr(c)[1:-1] for c in str(problem)).split())
         super().__init__(f"{self.source}: {self.problem}" if self.source else self.problem)
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str | None, str]]:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import os
+import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from workbench.robot.errors import InputError
 
 P = ParamSpec("P")
 T = TypeVar("T")
+MOST_TEXT = 256 << 20
+"""Largest file that is read as text at once [bytes]; a walk of a minute is 1 MB."""
+MOST_JSON = 32 << 20
+"""Likewise of JSON, which takes some ten times its size in memory; a log of 20 s is 0.2 MB."""
 
 
 def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], T]], Callable[Concatenate[Path, P], T]]:
@@ -26,8 +32,8 @@ def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], 
         @wraps(read)
         def cached(path: Path, *args: P.args, **kwargs: P.kwargs) -> T:
             content = None
-            with suppress(OSError):  # `read` says what is wrong
-                content = path.read_bytes()
+            with suppress(OSError, InputError):  # `read` says what is wrong
+                content = regular_file(path, MOST_TEXT).read_bytes()
             return known(path, content, *args, **kwargs)  # type: ignore[arg-type]  # as every lru_cache, of what can be hashed
 
         return cached
@@ -35,14 +41,49 @@ def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], 
     return decorate
 
 
-def read_text(path: str | Path) -> str:
-    """The text of a UTF-8 file, with or without byte order mark; InputError where it cannot be read."""
+def regular_file(path: str | Path, most: int | None = None) -> Path:
+    """The path, where a file lies of at most `most` bytes; InputError for what never ends or waits (devices, pipes), for a folder
+    and for what is not there."""
+    path = Path(path)
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        found = path.stat()
+    except (OSError, ValueError) as e:  # ValueError: a zero in the name
+        raise InputError(path, f"cannot be read ({getattr(e, 'strerror', None) or e})") from None
+    if not stat.S_ISREG(found.st_mode):
+        kind = "a folder" if stat.S_ISDIR(found.st_mode) else "a pipe, a device or a socket"
+        raise InputError(path, f"cannot be read (is {kind}; expected a file)")
+    if most is not None and found.st_size > most:
+        raise InputError(path, f"has {found.st_size / 2**20:.0f} MB; expected at most {most / 2**20:g} MB of this kind")
+    return path
+
+
+def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
+    """The text of a UTF-8 file of at most `most` bytes, with or without byte order mark; InputError where it cannot be read."""
+    try:
+        return regular_file(path, most).read_text(encoding="utf-8-sig")
     except OSError as e:
         raise InputError(path, f"cannot be read ({e.strerror})") from None
     except UnicodeDecodeError as e:
         raise InputError(path, f"byte {e.start}: not a text file in UTF-8") from None
+
+
+def read_json(path: str | Path) -> Any:
+    """The content of a JSON file; InputError names line and column, or says that it nests too deep or holds a giant number."""
+    text = read_text(path, MOST_JSON)
+    try:
+        return json.loads(text, parse_int=_bounded_int)
+    except json.JSONDecodeError as e:
+        raise InputError(path, f"line {e.lineno}, column {e.colno}: {e.msg}; expected whole JSON") from None
+    except RecursionError:
+        raise InputError(path, "nested too deep; expected JSON of a few levels") from None
+    except OverflowError as e:
+        raise InputError(path, str(e)) from None
+
+
+def _bounded_int(digits: str) -> int:
+    if len(digits) > 18:
+        raise OverflowError(f"a whole number of {len(digits)} digits; expected at most 18")
+    return int(digits)
 
 
 def write_whole(path: str | Path, content: str | bytes) -> Path:

@@ -46,10 +46,17 @@ class ServoConstants:
             raise ValueError("proportional_gain excludes compliance_slope, compliance_margin and punch")
         for f in fields(self):
             v = getattr(self, f.name)
-            if f.name == "model" or v is None:
+            if f.name == "model":
+                if not isinstance(v, str):
+                    raise ValueError("model: expected the servo's name as text")
+                continue
+            if v is None and f.name in _LAW:
                 continue
             if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v):
                 raise ValueError(f"{f.name}: expected a number, got {v!r}")
+            most, unit = _BOUNDS.get(f.name, (math.inf, ""))
+            if v > most:
+                raise ValueError(f"{f.name}: expected at most {most:g} {unit}, got {v:g}")
             if v < 0 or (v == 0 and f.name in _POSITIVE):
                 raise ValueError(f"{f.name}: expected a {'positive' if f.name in _POSITIVE else 'non-negative'} number, got {v}")
 
@@ -95,6 +102,28 @@ class ServoConstants:
         return replace(self, **changes)
 
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What no hobby servo has, though nothing forbids it: mostly a unit that is not the key's."""
+        out = []
+        for name, (likely, unit, other) in _LIKELY.items():
+            v = getattr(self, name)
+            if v is not None and v > likely:
+                out.append(f"{name}: {v:g} {unit} is more than any hobby servo has ({likely:g} {unit}); is it in {other}?")
+        return tuple(out)
+
+
+_LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
+_BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
+           "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
+           "reflected_inertia": (10.0, "kg m^2"), "compliance_slope": (1023.0, "counts"),
+           "compliance_margin": (1023.0, "counts"), "punch": (1023.0, "of 1023"),
+           "proportional_gain": (1e4, "duty per radian")}
+"""Ten times beyond what any servo of a small robot has; what is larger is another unit or a slip."""
+_LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
+           "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
+           "coulomb_friction": (2.0, "N m", "kg cm"), "reflected_inertia": (0.2, "kg m^2", "another unit")}
+"""XH540 (11.7 N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V)."""
 _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
 
 
@@ -115,9 +144,11 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
     missing = sorted(_REQUIRED - set(content))
     if missing:
         raise InputError(path, f"{at}key '{missing[0]}' is missing")
-    law = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
+    empty = [key for key in content if content[key] is None]
+    if empty:
+        raise InputError(path, f"{at}{empty[0]}: is empty; expected a value, or no such key")
     try:
-        return ServoConstants(**(dict.fromkeys(law) | dict(content)))
+        return ServoConstants(**(dict.fromkeys(_LAW) | dict(content)))
     except ValueError as e:
         raise InputError(path, f"{at}{e}") from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,29 +14,72 @@ import yaml
 from workbench.robot.errors import InputError
 from workbench.robot.files import read_text
 
+MOST_BYTES = 1 << 20
+"""Largest YAML file that is read [bytes]; a fitted model of a hundred parameters has 0.2 MB."""
+MOST_VALUES = 100_000
+"""Values in one file with every alias written out: a few hundred bytes of aliases of aliases stand for billions."""
+MOST_DEPTH = 50
+"""Levels of nesting; the deepest file of the workbench has six."""
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""The same either way, ten times faster in C."""
 
-class _CoreLoader(yaml.SafeLoader):
+
+class _CoreLoader(_Loader):  # type: ignore[misc]
     """YAML 1.2's core schema. PyYAML's 1.1 reads 1e5 and 1.0e5 as text, 1:30 as 90 and a joint named `on` as true."""
 
     def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise yaml.MarkedYAMLError(problem="expected a name as key", problem_mark=key.start_mark)
             if key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f"key '{key.value}' stands twice", problem_mark=key.start_mark)
+                raise yaml.MarkedYAMLError(problem=f"key '{_short(key.value)}' stands twice", problem_mark=key.start_mark)
             seen.add(key.value)
-        return super().construct_mapping(node, deep=deep)
+        return dict(super().construct_mapping(node, deep=deep))
 
 
+_CORE = "tag:yaml.org,2002:"
+_PATTERNS = {
+    "null": (r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    "bool": (r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    "int": (r"[-+]?[0-9]{1,18}", list("-+0123456789")),
+    "float": (r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+              list("-+.0123456789")),
+}
 _CoreLoader.yaml_implicit_resolvers = {}
-for _tag, _pattern, _first in (
-    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
-    ("bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
-    ("int", r"[-+]?[0-9]+", list("-+0123456789")),
-    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-     list("-+.0123456789")),
-):
-    _CoreLoader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", re.compile(f"(?:{_pattern})$"), _first)
-_CoreLoader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(node.value))
+for _tag, (_pattern, _first) in _PATTERNS.items():
+    _CoreLoader.add_implicit_resolver(_CORE + _tag, re.compile(f"(?:{_pattern})$"), _first)
+_CoreLoader.add_constructor(f"{_CORE}int", lambda loader, node: int(node.value))
+
+
+def _checked(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> int:
+    """How many values a node stands for, its aliases written out; MarkedYAMLError where that, or its depth, is too large, where
+    it holds itself, or a value is not what its tag says."""
+    sizes = {} if sizes is None else sizes
+    if id(node) in sizes:
+        if sizes[id(node)] < 0:
+            raise yaml.MarkedYAMLError(problem="an alias stands inside what it names", problem_mark=node.start_mark)
+        return sizes[id(node)]
+    if depth > MOST_DEPTH:
+        raise yaml.MarkedYAMLError(problem=f"nested deeper than {MOST_DEPTH} levels", problem_mark=node.start_mark)
+    sizes[id(node)] = -1
+    tag = node.tag.removeprefix(_CORE)
+    if isinstance(node, yaml.ScalarNode):
+        total = 1
+        if tag != "str" and (tag not in _PATTERNS or not re.fullmatch(_PATTERNS[tag][0], node.value)):
+            raise yaml.MarkedYAMLError(problem=f"'{_short(node.value)}' is no {tag}", problem_mark=node.start_mark)
+        if re.fullmatch("[-+]?[0-9]{19,}", node.value):
+            raise yaml.MarkedYAMLError(problem=f"a whole number of {len(node.value)} digits; expected at most 18",
+                                       problem_mark=node.start_mark)
+    else:
+        if tag != ("map" if isinstance(node, yaml.MappingNode) else "seq"):
+            raise yaml.MarkedYAMLError(problem=f"a tag '{_short(node.tag)}'; expected plain values", problem_mark=node.start_mark)
+        children = [c for pair in node.value for c in pair] if isinstance(node, yaml.MappingNode) else node.value
+        total = 1 + sum(_checked(child, depth + 1, sizes) for child in children)
+    if total > MOST_VALUES:
+        raise yaml.MarkedYAMLError(problem=f"more than {MOST_VALUES} values, aliases written out", problem_mark=node.start_mark)
+    sizes[id(node)] = total
+    return total
 
 
 class _Dumper(yaml.SafeDumper):
@@ -56,12 +100,22 @@ def yaml_text(content: Mapping[str, Any]) -> str:
 
 
 def read_yaml(path: str | Path) -> Any:
-    """Content of a YAML file (1.2 core schema, no key twice); InputError if it cannot be read."""
-    text = read_text(path)
+    """Content of a YAML file (1.2 core schema, no key twice, no tags, sizes bounded); InputError if it cannot be read."""
+    text = read_text(path, MOST_BYTES)
     try:
-        return yaml.load(text, Loader=_CoreLoader)
-    except (yaml.YAMLError, TypeError, RecursionError) as e:  # TypeError: a list as key
-        raise InputError(path, f"not valid YAML: {e}") from None
+        loader = _CoreLoader(text)
+        try:
+            node = loader.get_single_node()
+            if node is None:
+                return None
+            _checked(node)
+            return loader.construct_document(node)
+        finally:
+            loader.dispose()
+    except RecursionError:
+        raise InputError(path, f"not valid YAML: nested deeper than {MOST_DEPTH} levels") from None
+    except yaml.YAMLError as e:
+        raise InputError(path, f"not valid YAML: {str(e).replace(_UNNAMED, '')}") from None
 
 
 class Fields:
@@ -86,8 +140,10 @@ class Fields:
         return f"{self.place}.{key}" if self.place else key
 
     def raw(self, key: str) -> Any:
-        """The value as YAML gave it; None where the key is absent or empty."""
+        """The value as YAML gave it; None where the key is absent. InputError where it is left empty."""
         self._known.append(key)
+        if key in self._left and self._left[key] is None:
+            raise self.error(key, "is empty; expected a value, or no such key")
         return self._left.pop(key, None)
 
     def text(self, key: str, default: str | None = None, choices: tuple[str, ...] = ()) -> str | None:
@@ -101,24 +157,23 @@ class Fields:
             raise self.error(key, f"expected {' or '.join(choices) or 'text'}, got {_show(value)}")
         return value
 
-    def number(self, key: str, least: float = -math.inf, finite: bool = True) -> float | None:
-        """A number, at least `least`."""
+    def number(self, key: str, least: float = -math.inf, most: float = math.inf, finite: bool = True) -> float | None:
+        """A number from `least` to `most`."""
         value = self.raw(key)
         if value is None:
             return None
-        good = isinstance(value, (int, float)) and not isinstance(value, bool) and value >= least
+        good = isinstance(value, (int, float)) and not isinstance(value, bool) and least <= value <= most
         if not good or (finite and math.isinf(value)):
-            bound = "" if math.isinf(least) else f" of at least {least:g}"
-            raise self.error(key, f"expected a number{bound}, got {_show(value)}")
+            raise self.error(key, f"expected a number{_bounds(least, most)}, got {_show(value)}")
         return float(value)
 
-    def whole(self, key: str, default: int | None = None, least: int = 0) -> int | None:
-        """A whole number, at least `least`."""
+    def whole(self, key: str, default: int | None = None, least: int = 0, most: float = math.inf) -> int | None:
+        """A whole number from `least` to `most`."""
         value = self.raw(key)
         if value is None:
             return default
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise self.error(key, f"expected a whole number of at least {least}, got {_show(value)}")
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise self.error(key, f"expected a whole number{_bounds(least, most)}, got {_show(value)}")
         return value
 
     def file(self, key: str) -> Path | None:
@@ -169,6 +224,19 @@ class Fields:
             raise self.error(str(next(iter(self._left))), f"unknown key; expected one of {', '.join(self._known)}")
 
 
+def _bounds(least: float, most: float) -> str:
+    low = "" if math.isinf(least) else f" of at least {least:g}"
+    return low if math.isinf(most) else f"{low or ' of'}{' and' if low else ''} at most {most:g}"
+
+
 def _show(value: Any) -> str:
-    text = "nothing" if value is None else repr(value)
+    return "nothing" if value is None else _short(_SHORT.repr(value))
+
+
+def _short(text: str) -> str:
     return text if len(text) < 60 else f"{text[:57]}..."
+
+
+_UNNAMED = ' in "<unicode string>"'
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60

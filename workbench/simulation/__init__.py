@@ -3,7 +3,11 @@
 from workbench.servo import AddServos
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Simulation, Start
+from workbench.simulation.rollout import BaseState, Simulation, Start
 from workbench.simulation.station import MakePuppyStation
+from workbench.simulation.stepped import SteppedRun
 
-__all__ = ["AddServos", "Job", "MakePuppyStation", "Simulation", "SimulationConfig", "Start", "simulate_batch"]
+__all__ = [
+    "AddServos", "BaseState", "Job", "MakePuppyStation", "Simulation", "SimulationConfig", "Start", "SteppedRun",
+    "simulate_batch",
+]

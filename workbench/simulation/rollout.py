@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
+from scipy.spatial.transform import Rotation
 
 from workbench.effects.apply import physics_of, played
 from workbench.motion.commands import Commands
@@ -30,17 +31,33 @@ from workbench.simulation.reference import linear_trajectory, reference_columns
 from workbench.simulation.steady import BaseSetter, BaseStates
 from workbench.simulation.structure import Structure
 
+if TYPE_CHECKING:
+    from workbench.simulation.stepped import SteppedRun
+
 Array = NDArray[np.float64]
 
 
-class Start(NamedTuple):
-    """State of the joints at the first command: angles q and velocities v (n,) [rad, rad/s] in the model's order of joints.
+class BaseState(NamedTuple):
+    """A floating base in the world: p_WB (3,) [m], quat_WB (4,) wxyz, angular velocity w_WB (3,) [rad/s] and velocity of its
+    origin v_WB (3,) [m/s], all in W."""
 
-    logged: the servos' own, as their sensors tell them (a log's), else the links'."""
+    p_WB: Array
+    quat_WB: Array
+    w_WB: Array
+    v_WB: Array
+
+
+class Start(NamedTuple):
+    """State of the robot at the first command: angles q and velocities v (n,) [rad, rad/s] in the model's order of joints.
+
+    logged: the servos' own, as their sensors tell them (a log's), else the links'. base: where a free base is and how it moves.
+    reference: (n,) [rad] where the servos' ramps are; None: at their first goals."""
 
     q: Array
     v: Array
     logged: bool = False
+    base: BaseState | None = None
+    reference: Array | None = None
 
 
 class Simulation:
@@ -67,6 +84,7 @@ class Simulation:
         self._base = self.plant.GetBodyByName(model.base)
         self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
         self._rest: tuple[bytes | None, Context] | None = None
+        self._runs, self._resumes = 0, False
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -82,7 +100,7 @@ class Simulation:
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
         this one (base "path"). start: angles and velocities (n,) [rad, rad/s] in self.joints' order at the first command, in
-        place of rest in neutral (base "fixed" or "path"): the links', or the servos' own by Start; there is no lead then.
+        place of rest in neutral: the links', or the servos' own by Start, which a free base gives its pose too; no lead then.
         elapsed [s]: how long the robot has played before these commands, for effects that grow with it. steadied: where a free
         base is put back to as it goes. Returns a Take with time 0 at the first command.
         """
@@ -109,54 +127,76 @@ class Simulation:
         self._follow(commands, trajectory, lead, duration)
         setter = None if steadied is None else BaseSetter(
             steadied, self.plant, self.diagram.scene_graph(), self._base, self._plant_context)
-        sampled, forces = self._advance(commands, lead, lead + duration, setter)
-        t, _ = self._logs.read("state")
-        contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
-        return self._written_down(lead, name, commands, sent, setter, contact)
-
-    def stand(self) -> None:
-        """Stands still in neutral at time 0, for a caller who moves it step by step: `command`, then `advance`."""
-        self._rest_in_neutral(None)
-        self._set_first_command(np.inf)
         self.simulator.Initialize()
+        sampled, forces = self._advance(commands, lead, 0.0, lead + duration, setter)
+        return self._take(name, lead, sent, commands, sampled, forces, setter)
 
-    def command(self, goal: Array, speed: Array, enabled: Array) -> None:
-        """From now on: goals (n,) [rad], moving speeds (n,) [rad/s] and torque enable (n,), in self.joints' order."""
-        self._command(goal, speed, enabled)
+    def stepped(self, start: Start | None = None) -> SteppedRun:
+        """A run that takes its next commands while it goes: from rest in neutral, or from `start`. One at a time: a new run of
+        this simulation ends it."""
+        from workbench.simulation.stepped import SteppedRun
 
-    def first_command(self) -> None:
-        """What grows from a take's first command on does so from now on."""
-        self._set_first_command(self.context.get_time())
+        return SteppedRun(self, start)
 
-    def advance(self, time: float) -> tuple[Array, Array, Array]:
-        """On to a time [s] of the station's clock: angles and velocities (n,) of the servos' side there, and duty."""
-        if time > self.context.get_time():
-            self.simulator.AdvanceTo(time)
-        x = self.plant.GetPositionsAndVelocities(self._plant_context)[None]
-        q, v = self._logs.joints(x)
-        return q[0] - self._zero, v[0], self.diagram.GetOutputPort("duty").Eval(self.context)
-
-    def so_far(self, starts_at: float, name: str = "simulation") -> Take:
-        """The take since `stand`, time 0 at `starts_at` [s] of the station's clock."""
-        return self._written_down(starts_at, name, None, None)
-
-    def _written_down(self, lead: float, name: str, commands: Commands | None, sent: Commands | None,
-                      setter: BaseSetter | None = None, contact: Mapping[str, Array] | None = None) -> Take:
-        """The logs as a take; commands: as they were played, sent: as they were sent."""
+    def _take(self, name: str, lead: float, sent: Commands | None, commands: Commands | None, sampled: Array,
+              forces: dict[str, Array], setter: BaseSetter | None = None) -> Take:
+        """What the logs hold. lead: when the first command came [s]; sent: what the take says of commands, `commands` what
+        reached the servos."""
         t, state = self._logs.read("state")
         time = t - lead
         q, v = self._logs.joints(state)
         p_WB, quat_WB = self._logs.base_path(state)
         if setter is not None:
             p_WB, quat_WB = setter.in_one_piece(t, p_WB, quat_WB)
+        contact = {f: np.column_stack([np.interp(t, sampled, c) for c in xyz.T]) for f, xyz in forces.items() if len(sampled)}
         take = Take(name=name, source="simulation", time=time, joints=self.joints, q=q, starts_at=0.0, base=self.config.base, v=v,
-                    p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact or {},
+                    p_WB=p_WB, quat_WB=quat_WB, torque=self._logs.torque(time, q, v, commands), contact=contact,
                     commands=sent)
         return self._as_built(take, state)
 
     def play_back(self, take: Take) -> Take:
         """The thesis's animation: the model posed at each frame of a take; see `workbench.simulation.playback`."""
         return play_back(self.diagram, self.context, self.model, self.config.base, take)
+
+    def begin_stepped(self, start: Start | None) -> int:
+        """For SteppedRun: puts the robot where its run starts; returns what `is_stepping` knows it by."""
+        self._rest_in_neutral(None)
+        if start is not None:
+            self._put(start, None)
+        self._set_first_command(0.0)
+        self.simulator.Initialize()
+        return self._runs
+
+    def is_stepping(self, token: int) -> bool:
+        """Whether no other run has begun since `begin_stepped` gave this token."""
+        return token == self._runs
+
+    def advance_stepped(self, commands: Commands | None, begin: float, end: float) -> tuple[Array, dict[str, Array]]:
+        """For SteppedRun: goes on from `begin` to `end` [s]."""
+        return self._advance(commands, 0.0, begin, end)
+
+    def on_log_grid(self, t: float) -> float:
+        """The instant of the log nearest to t [s]."""
+        return self._whole_steps(t)
+
+    def present_state(self) -> Start:
+        """The state of joints, base and ramps now."""
+        q = np.array([j.get_angle(self._plant_context) for j in self._joints])
+        v = np.array([j.get_angular_rate(self._plant_context) for j in self._joints])
+        base = None
+        if self.config.base == "free":
+            X_WB = self.plant.GetFreeBodyPose(self._plant_context, self._base)
+            V_WB = self._base.EvalSpatialVelocityInWorld(self._plant_context)
+            base = BaseState(*(np.array(x) for x in (X_WB.translation(), X_WB.rotation().ToQuaternion().wxyz(),
+                                                   V_WB.rotational(), V_WB.translational())))
+        bank, context = self._bank()
+        reference = np.array(bank.GetOutputPort("reference").Eval(context))
+        return Start(q - self._zero, v, logged=True, base=base, reference=reference)
+
+    def stepped_take(self, name: str, sent: Commands | None, commands: Commands | None, sampled: Array,
+                     forces: dict[str, Array]) -> Take:
+        """For SteppedRun: what was written down since its start."""
+        return self._take(name, 0.0, sent, commands, sampled, forces)
 
     def _as_built(self, take: Take, state: Array) -> Take:
         """The take with what the links do, where they do not follow the servos as the model says."""
@@ -206,6 +246,7 @@ class Simulation:
             self.simulator.AdvanceTo(self._whole_steps(self.config.settle))
             self._centre_base()
             self._rest = key, self.context.Clone()
+        self._runs, self._resumes = self._runs + 1, False
         self.context.SetTimeStateAndParametersFrom(self._rest[1])
         self.context.SetTime(0.0)
         self._hold_neutral()  # the inputs' values are no part of what was restored
@@ -240,9 +281,10 @@ class Simulation:
         return bank, self.diagram.GetMutableSubsystemContext(bank, self.context)
 
     def _put(self, start: Start, commands: Commands | None) -> None:
-        """Starts from given joint angles and velocities, with the ramp of each servo at its first goal."""
-        if self.config.base == "free":
-            raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
+        """Starts from a given state, with the ramp of each servo where it says, or at its first goal."""
+        if self.config.base == "free" and start.base is None:
+            raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path', or the pose "
+                             "and velocity of the free one")
         servos = np.asarray(start.q, dtype=float)
         if start.logged:
             servos = servos + self._zero
@@ -252,9 +294,24 @@ class Simulation:
         for joint, angle, rate in zip(self._joints, servos, start.v):
             joint.set_angle(self._plant_context, float(angle))
             joint.set_angular_rate(self._plant_context, float(rate))
+        if self.config.base == "free" and start.base is not None:
+            self._put_base(start.base)
         if self.config.drive == "servo":
+            reference = start.reference
+            if reference is None:
+                reference = servos if commands is None else commands.goals[0] + self._zero
             bank, context = self._bank()
-            bank.SetReference(context, servos if commands is None else commands.goals[0] + self._zero)
+            bank.SetReference(context, np.asarray(reference, dtype=float))
+            if start.reference is not None:  # held until the first command
+                self._command(start.reference - self._zero, np.zeros(len(self.joints)), np.ones(len(self.joints)))
+                self._resumes = True
+
+    def _put_base(self, base: BaseState) -> None:
+        R_WB = Rotation.from_quat(np.asarray(base.quat_WB, dtype=float), scalar_first=True).as_matrix()
+        self.plant.SetFloatingBaseBodyPoseInWorldFrame(
+            self._plant_context, self._base, RigidTransform(RotationMatrix(R_WB), np.asarray(base.p_WB, dtype=float)))
+        self.plant.SetFreeBodySpatialVelocity(
+            context=self._plant_context, body=self._base, V_JpJc=SpatialVelocity(np.asarray(base.w_WB), np.asarray(base.v_WB)))
 
     def _centre_base(self) -> None:
         """Takes the millimetres and the heading that settling added out of the state: the floor is the same everywhere."""
@@ -298,9 +355,10 @@ class Simulation:
             times, rows = np.concatenate([s * lead, times]), np.vstack([np.outer(s * s * (3 - 2 * s), rows[0]), rows])
         self._update_reference(times, rows)
 
-    def _advance(self, commands: Commands | None, lead: float, end: float, setter: BaseSetter | None
+    def _advance(self, commands: Commands | None, lead: float, begin: float, end: float, setter: BaseSetter | None = None
                  ) -> tuple[Array, dict[str, Array]]:
-        """Runs to `end`, changing commands and the base's state at their times; returns the times and values of foot forces."""
+        """Runs from `begin` to `end` [s], changing commands and the base's state at their times from `begin` on, those at `end`
+        not yet; returns the times and values of foot forces, that at `end` only if it is on a sample."""
         puts = {} if setter is None else {self._whole_steps(lead + t): k for k, t in enumerate(setter.states.times.tolist())}
         commanded = commands is not None and self.config.drive == "servo"
         times = commands.times.tolist() if commands is not None and commanded else []
@@ -309,12 +367,13 @@ class Simulation:
         steps = np.arange(0, round(end / self.config.logged_every) + 1, every)
         sampling = self.config.contact_period > 0 and self.config.base == "free" and not self.config.uses_cenic
         samples = steps * self.config.logged_every if sampling else np.empty(0)
+        samples = samples[samples >= begin - 1e-9] if begin > 0 else samples
         forces: list[Array] = []
         sampled: list[float] = []
-        self.simulator.Initialize()
         due = set(samples.tolist())
-        for t in sorted(due | {c for c in (*changes, *puts) if c < end} | {self._on_grid(end)}):
-            self.simulator.AdvanceTo(t)
+        for t in sorted(due | {c for c in (*changes, *puts) if begin <= c < end} | {self._on_grid(end)}):
+            if not self._resumes or t > self.context.get_time():  # else a command at once would come a step late
+                self.simulator.AdvanceTo(t)
             if setter is not None and t in puts:
                 setter.put(puts[t], t)
             if t in due:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,8 @@ from workbench.device.virtual import (
     VirtualPort,
     VirtualServo,
 )
-from workbench.effects.apply import played, seen
+from workbench.effects.apply import played, resolved, seen
+from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Take, observe
 from workbench.robot import InputError, RobotModel
@@ -37,52 +39,69 @@ PIVOT = 0.012
 
 
 class StationBody:
-    """Joints of a station, moved by servos whose bus tells the time; as long as no servo has torque, a hand holds the robot where
-    it stands, in neutral."""
+    """Joints of a station, moved by servos whose bus tells the time; as long as not all servos have torque, a hand holds the
+    robot where it stands, in neutral. What grows from the first command on does so from when the hand lets go."""
 
     def __init__(self, model: RobotModel, base: str = "free") -> None:
-        self.simulation = Simulation(model, SimulationConfig(base=base, contact_period=0.0))
-        self.simulation.stand()
-        self._step = self.simulation.config.time_step
+        self.simulation = Simulation(_without_controller(model), SimulationConfig(base=base, contact_period=0.0))
+        self.step = self.simulation.config.time_step
+        self._run = self.simulation.stepped()
+        self._joints = model.joints
         n = len(model.joints)
-        self._goal, self._speed, self._on = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._goal, self._speed, self._on = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
         self._column = {i: model.joints.index(joint) for joint, i in bus_ids(model).items()}
-        self._released: int | None = None
-        self._ready = self._started = False
-        self._now = self.simulation.advance(0.0)
+        self._changed = False
+        self._here: tuple[Array, Array, Array] | None = None
+        self.let_go: int | None = None
+        """When the hand let go [ticks]; None before."""
 
     def drive(self, joint: int, now: int, drive: Drive) -> None:
         """From now on the servo does this."""
         self._advance(now)
         k = self._column[joint]
-        self._goal[k], self._speed[k], self._on[k] = drive.goal, drive.speed, float(drive.enabled and drive.torque_limit > 0)
-        if self._released is None:
-            if not self._on.all():
-                return
-            self._released = now
-        self.simulation.command(self._goal.copy(), self._speed.copy(), self._on.copy())
-        neutral = bool((np.abs(self._goal) < 1e-9).all())
-        if self._ready and not neutral and not self._started:
-            self.simulation.first_command()
-            self._started = True
-        self._ready = self._ready or neutral
+        self._goal[k], self._speed[k], self._on[k] = drive.goal, drive.speed, drive.enabled and drive.torque_limit > 0
+        self._changed = True
+        if self.let_go is None and self._on.all():
+            self.let_go = now
 
     def sense(self, joint: int, now: int) -> Sense:
         """How the joint is now."""
         self._advance(now)
-        q, v, duty = self._now
+        if self._here is None:
+            state = self._run.state
+            duty = self.simulation.diagram.GetOutputPort("duty").Eval(self.simulation.context)
+            self._here = np.asarray(state.q), np.asarray(state.v), np.asarray(duty)
+        q, v, duty = self._here
         k = self._column[joint]
-        since = self.time(now) - self.simulation.context.get_time()
+        since = self.time(now) - self._run.time
         return Sense(float(q[k] + since * v[k]), float(v[k]), float(duty[k] * self._on[k]))
 
     def time(self, now: int) -> float:
         """The station's clock [s] at a time of the bus's [ticks]: it starts when the hand lets go."""
-        return 0.0 if self._released is None else (now - self._released) / SECOND
+        return 0.0 if self.let_go is None else (now - self.let_go) / SECOND
+
+    def take(self, started: float) -> Take:
+        """What the robot has done since then, time 0 at `started` [s on the station's clock]."""
+        take = self._run.take()
+        return replace(take, time=take.time - started, starts_at=0.0)
 
     def _advance(self, now: int) -> None:
-        steps = int(self.time(now) / self._step + 1e-6)
-        if steps * self._step > self.simulation.context.get_time() + 1e-9:
-            self._now = self.simulation.advance(steps * self._step)
+        """Whole steps up to now; what servos were told in the same instant goes out as one command."""
+        target = int(self.time(now) / self.step + 1e-6) * self.step
+        if target <= self._run.time + 1e-9:
+            return
+        if self._changed:
+            self._changed = False
+            self._run.send(Commands(np.zeros(1), self._joints, self._goal[None].copy(), self._speed[None].copy(),
+                                    self._on[None].copy(), end=1.0, poses=np.array([-1])))
+        self._run.advance(target - self._run.time)
+        self._here = None
+
+
+def _without_controller(model: RobotModel) -> RobotModel:
+    """The same robot with a controller that does as it is told: what the bus carries has been through the real one."""
+    kept = tuple(spec for effect, spec, _ in resolved(model) if type(effect).commands is Effect.commands)
+    return replace(model, effects=kept)
 
 
 class VirtualRobot:
@@ -120,10 +139,9 @@ class VirtualRobot:
         [rad, m]; a yaw and pivots by `seed`.
         """
         rng = np.random.default_rng(seed)
-        released = self.body._released
-        assert released is not None, "nothing was played"
-        first = started - released / SECOND
-        take = self.body.simulation.so_far(first)
+        let_go = self.body.let_go
+        assert let_go is not None, "nothing was played"
+        take = self.body.take(started - let_go / SECOND)
         begin = max(take.time[0], -0.9)
         rest = take.resampled(take.time[take.time >= begin - 1e-9])
         measurement = seen(self._measurement(rest, rng), self.model)
@@ -134,7 +152,7 @@ class VirtualRobot:
         quat = {n: _shaken(t.quat, rng.normal(0, rotation_noise, t.p.shape)) for n, t in tracks.items()}
 
         def scene(t: float) -> Mapping[str, Pose]:
-            k = min(max(round(t / self.body._step), 0), len(times) - 1)
+            k = min(max(round(t / self.body.step), 0), len(times) - 1)
             return {n: (tuple(p[n][k]), (*quat[n][k][1:], quat[n][k][0]), True) for n in names}
 
         return names, scene, started + float(rest.time[0]), started + float(rest.time[-1])

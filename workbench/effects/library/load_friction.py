@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec
-from workbench.servo import Instant, ServoLaw, ServoTerm
+from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -29,6 +29,9 @@ class _Rubbing(ServoTerm):
 
     def most_friction(self, law: ServoLaw) -> Array:
         return np.asarray(self.coefficient * MOST_LOAD * law.full_torque)
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(rubbing=self.coefficient)
 
 
 class LoadFriction(Effect):

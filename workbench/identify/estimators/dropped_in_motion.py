@@ -116,7 +116,7 @@ def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array)
     time, channel = e.take.recorded.since_start, e.channels.index(joint)
     own = (time > came) & (time <= until) & np.isfinite(before[:, channel])
     was, now = (float(np.sum(r[own, channel] ** 2)) for r in (before, after))
-    return was - now > EXPLAINED * (was - own.sum())
+    return bool(was - now > EXPLAINED * (was - own.sum()))
 
 
 def _between(e: TakeEvidence, k: int) -> tuple[float, float]:

@@ -1,0 +1,1 @@
+"""Gaits that a robot's servos can follow: asked for, found, certified."""

@@ -1,0 +1,157 @@
+"""The robots that a gait must stand: random draws of a file, or of the posterior of a diagnosis."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.sdf import SdfRobot
+from workbench.effects.sdf_values import read_inertia, write_inertia
+from workbench.gait.legs import legs_of
+from workbench.robot import EffectSpec, InputError, RobotModel, data_file
+from workbench.robot.files import write_whole
+from workbench.robot.model_file import Posterior, parameter_names
+from workbench.robot.yaml_file import Fields, read_yaml
+
+Array = NDArray[np.float64]
+
+BUNDLED = "gait_ensemble.yaml"
+RANGES = ("friction", "supply_voltage", "supply_sag", "backlash", "command_delay")
+"""Keys of the file that hold `low` and `high`."""
+EFFECTS = {"friction": ("ground_friction", "friction"), "supply_voltage": ("supply_voltage", "voltage"),
+           "supply_sag": ("supply_sag", "drop"), "backlash": ("backlash", "gap"), "command_delay": ("command_delay", "delay")}
+"""The effect and the parameter that each range is of, in the contract's units."""
+EACH_SERVO = ("backlash", "command_delay")
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """What is drawn. ranges: by key of RANGES, low and high, in the file's units. mass_share: by which each link's mass may
+    differ. payload: [kg]. zero_sd: [deg]. posterior: of a diagnosed model, whose parameters are drawn too. source: for
+    messages."""
+
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    mass_share: float = 0.0
+    payload: float = 0.0
+    zero_sd: float = 0.0
+    posterior: Posterior | None = None
+    source: str = "ensemble"
+
+    def draws(self, model: RobotModel, count: int, seed: int, folder: Path) -> list[RobotModel]:
+        """`count` robots, the same for the same seed. Robots whose links' masses differ are written into `folder` as SDF files of
+        their own; what a diagnosed model's effects say is drawn from its posterior, the rest is added to it."""
+        rng = np.random.default_rng([seed, 20])
+        return [self._draw(model, rng, folder) for _ in range(count)]
+
+    @property
+    def sha256(self) -> str:
+        """Of everything that is drawn."""
+        said = [sorted(self.ranges.items()), self.mass_share, self.payload, self.zero_sd]
+        if self.posterior is not None:
+            said += [list(self.posterior.names), np.asarray(self.posterior.mean).tolist(),
+                     np.asarray(self.posterior.covariance).tolist()]
+        return hashlib.sha256(repr(said).encode()).hexdigest()
+
+    def _draw(self, model: RobotModel, rng: np.random.Generator, folder: Path) -> RobotModel:
+        drawn = model if self.posterior is None else _from_posterior(model, self.posterior, rng)
+        legs = sorted({j for leg in legs_of(model) for j in leg.joints})
+        effects: list[EffectSpec] = []
+        for key, (low, high) in self.ranges.items():
+            name, parameter = EFFECTS[key]
+            if key in EACH_SERVO:
+                joints = legs if key == "backlash" else list(model.joints)
+                effects += [EffectSpec(name, (j,), {parameter: float(rng.uniform(low, high))}) for j in joints]
+            else:
+                effects.append(EffectSpec(name, (), {parameter: float(rng.uniform(low, high))}))
+        if self.zero_sd:
+            effects += [EffectSpec("zero_offset", (j,), {"angle": float(self.zero_sd * rng.standard_normal())}) for j in legs]
+        if self.payload:
+            x, y, z = _inside(model, rng)
+            effects.append(EffectSpec("payload", (model.base,), {"mass": self.payload, "position": (x, y, z)}))
+        if self.mass_share:
+            factors = {link: float(1 + self.mass_share * rng.uniform(-1, 1)) for link in model.kinematics.links}
+            drawn = with_masses(drawn, factors, folder)
+        told = {e.effect for e in model.effects}  # what a diagnosis found is better known than the file's range
+        return replace(drawn, effects=(*drawn.effects, *(e for e in effects if e.effect not in told)))
+
+
+def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -> RobotModel:
+    """The robot with each link's mass and inertia times its factor, as an SDF file in `folder` named by its content."""
+    sdf = SdfRobot(model.path)
+    for link, factor in factors.items():
+        inertial = sdf.inertial(link)
+        mass, center, inertia = read_inertia(inertial)
+        write_inertia(inertial, mass * factor, center, inertia * factor)
+    text = sdf.text()
+    path = folder / f"masses-{hashlib.sha256(text.encode()).hexdigest()[:12]}.sdf"
+    if not path.is_file():
+        write_whole(path, text)
+    return replace(model, description=str(path))
+
+
+def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = None) -> Ensemble:
+    """Reads the file (default: the one that ships). InputError names file, key and what was expected."""
+    path = data_file(BUNDLED) if path is None else Path(path)
+    top = Fields(path, read_yaml(path))
+    if top.raw("format") != 1:
+        raise top.error("format", "expected 1")
+    ranges = {}
+    for key in RANGES:
+        f = top.mapping(key)
+        if f is not None:
+            low, high = (float(f.required(k, f.number(k, least=0))) for k in ("low", "high"))
+            if high < low:
+                raise f.error("high", f"expected at least {low:g}, got {high:g}")
+            f.done()
+            ranges[key] = (low, high)
+
+    def one(key: str, name: str) -> float:
+        f = top.mapping(key)
+        if f is None:
+            return 0.0
+        value = float(f.required(name, f.number(name, least=0)))
+        f.done()
+        return value
+
+    mass, payload, zero = one("link_mass", "share"), one("payload", "mass"), one("zero_offset", "sd")
+    if mass >= 1:
+        raise InputError(path, f"link_mass.share: expected less than 1, got {mass:g}")
+    top.done()
+    return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
+
+
+def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Generator) -> RobotModel:
+    """The diagnosed model with its effects' parameters drawn together, kept within what the effects allow."""
+    from workbench.effects.registry import effect_named
+
+    assert list(posterior.names) == list(parameter_names(model.effects))
+    known_well = np.isfinite(np.diag(posterior.covariance))  # what the data say nothing about stays at its mean
+    covariance = np.where(np.outer(known_well, known_well), posterior.covariance, 0.0)
+    values = iter(rng.multivariate_normal(np.asarray(posterior.mean), covariance, method="eigh").tolist())
+    effects = []
+    for spec in model.effects:
+        known = {p.name: p for p in effect_named(spec.effect).parameters}
+        drawn: dict[str, Any] = {}
+        for name, value in spec.parameters.items():
+            p = known[name]
+            if isinstance(value, tuple):
+                drawn[name] = tuple(float(np.clip(next(values), p.low, p.high)) for _ in value)
+            else:
+                drawn[name] = float(np.clip(next(values), p.low, p.high))
+        effects.append(replace(spec, parameters=drawn))
+    return replace(model, effects=tuple(effects))
+
+
+def _inside(model: RobotModel, rng: np.random.Generator) -> tuple[float, float, float]:
+    """A point anywhere in the box that spans the base link's joints and centre of mass [m], in its frame."""
+    k = model.kinematics
+    places = [k.centers[model.base], *(f.X_PF_p for f in k.frames.values() if f.parent == model.base)]
+    low, high = np.min(places, axis=0), np.max(places, axis=0)
+    x, y, z = rng.uniform(low, high)
+    return float(x), float(y), float(z)

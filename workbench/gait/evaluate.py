@@ -1,0 +1,162 @@
+"""Many gaits on many robots: simulated once, remembered, and judged."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from workbench.gait.limits import Margin, allowed_rms, contact_margin, run_margins, table_margins, violation
+from workbench.gait.machine import GaitMachine
+from workbench.gait.measure import GaitMeasure, as_plain, from_plain, measure
+from workbench.gait.request import Request
+from workbench.gait.shape import GaitShape
+from workbench.gait.table import AT_ONCE, GaitTable, gait_table
+from workbench.motion import PoseTable
+from workbench.robot import InputError, RobotModel
+from workbench.simulation import Job, SimulationConfig, simulate_batch
+
+SECONDS, CYCLES = 2.0, 2
+"""A gait is measured over at least so long [s], and so many cycles."""
+SEARCH = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
+"""While searching: 2 ms and 1 ms agree to a hundredth in speed."""
+
+
+def table_sha256(*tables: PoseTable) -> str:
+    """Of what the firmware plays: joints, goals, speeds, dwells."""
+    digest = hashlib.sha256()
+    for t in tables:
+        said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist()}
+        digest.update(json.dumps(said).encode())
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A gait with what is known of it. nominal: None where its table alone breaks a limit. draws: on the ensemble's robots, empty
+    where that was not worth it. margins: of all limits. cost: to be made small."""
+
+    table: GaitTable
+    margins: tuple[Margin, ...]
+    nominal: GaitMeasure | None = None
+    draws: tuple[GaitMeasure, ...] = ()
+    cost: float = math.inf
+
+    @property
+    def shape(self) -> GaitShape:
+        """In numbers."""
+        return self.table.shape
+
+    @cached_property
+    def violation(self) -> float:
+        """By how much limits are broken in all; 0 where none is."""
+        return violation(self.margins) + (0.0 if self.nominal else 10.0)
+
+    @property
+    def good(self) -> bool:
+        """Keeps every limit."""
+        return self.nominal is not None and self.violation == 0.0
+
+    def rank(self) -> tuple[bool, float, float]:
+        """For sorting: what keeps all limits first, by cost; the rest by what it breaks."""
+        return (not self.good, 0.0 if self.good else self.violation, self.cost)
+
+
+class Evaluator:
+    """Simulates gaits of one request. memory: a file in which measures are kept, so that a run that was stopped goes on."""
+
+    def __init__(self, machine: GaitMachine, request: Request, draws: Sequence[RobotModel], memory: Path | None = None,
+                 n_jobs: int = 2, config: SimulationConfig = SEARCH) -> None:
+        self.machine, self.request, self.n_jobs, self.config = machine, request, n_jobs, config
+        self.nominal = request.on_slope(machine.model)
+        self.draws = tuple(request.on_slope(d) for d in draws)
+        self._memory, self._known = memory, _read(memory)
+        self.rollouts = 0
+
+    def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
+               ) -> list[Candidate]:
+        """The shapes as candidates, in their order. draws: on how many of the ensemble's robots those are tried which `keep`
+        (default: all that keep the limits so far) picks from what they do on the nominal robot."""
+        tables = [self._table(s) for s in shapes]
+        first = [t for t, margins in tables if t is not None and violation(margins) == 0.0]
+        nominal = dict(zip(map(id, first), self._measures([(t, self.nominal) for t in first])))
+        out = [self._candidate(t, margins, nominal.get(id(t))) for t, margins in tables]
+        chosen = [c for c in (keep(out) if keep else out) if c.nominal is not None and not c.nominal.fell] if draws else []
+        robots = self.draws[:draws]
+        told = self._measures([(c.table, robot) for robot in robots for c in chosen])
+        for i, c in enumerate(chosen):
+            measures = tuple(told[i + k * len(chosen)] for k in range(len(robots)))
+            out[next(k for k, o in enumerate(out) if o is c)] = self._judge(c.table, [m for m in c.margins if _of_table(m)],
+                                                                            c.nominal, measures)
+        return out
+
+    def _table(self, shape: GaitShape) -> tuple[GaitTable | None, list[Margin]]:
+        try:
+            table = gait_table(self.machine, shape, ways=AT_ONCE)
+        except InputError:
+            return None, []
+        margins = table_margins(self.machine, table, self.request.limits)
+        if violation(margins) == 0.0:
+            margins.append(contact_margin(self.machine, table, self.request.limits))
+        return table, margins
+
+    def _candidate(self, table: GaitTable | None, margins: list[Margin], nominal: GaitMeasure | None) -> Candidate:
+        if table is None:
+            beyond = Margin("range", "robot", math.inf, 1.0, "registers", 100.0)
+            return Candidate(gait_table(self.machine, GaitShape(), ways=AT_ONCE), (beyond,))
+        if nominal is None:
+            return Candidate(table, tuple(margins))
+        return self._judge(table, margins, nominal, ())
+
+    def _judge(self, table: GaitTable, margins: list[Margin], nominal: GaitMeasure | None, draws: tuple[GaitMeasure, ...],
+               ) -> Candidate:
+        assert nominal is not None
+        limits, request = self.request.limits, self.request
+        ran = run_margins(self.machine, nominal, limits)
+        everything = (*margins, *ran, *request.strays(nominal), *request.wanted(nominal, draws))
+        allowed = allowed_rms(self.machine, limits)
+        cost = request.cost(nominal, draws, max(r / a for r, a in zip(nominal.rms, allowed)))
+        return Candidate(table, everything, nominal, draws, cost)
+
+    def _measures(self, wanted: Sequence[tuple[GaitTable, RobotModel]]) -> list[GaitMeasure]:
+        keys = [f"{table_sha256(t.start, t.cycle)[:24]} {m.sha256[:24]}" for t, m in wanted]
+        missing = {k: w for k, w in zip(keys, wanted) if k not in self._known}
+        jobs = []
+        for table, model in missing.values():
+            cycles = max(CYCLES, math.ceil(SECONDS / table.period))
+            end = table.start_seconds + cycles * table.period
+            jobs.append(Job(model, self.config, table.commands(cycles), end))
+        takes = simulate_batch(jobs, self.n_jobs) if jobs else []
+        self.rollouts += len(jobs)
+        lines = []
+        for (key, (table, model)), take in zip(missing.items(), takes):
+            self._known[key] = measure(take, model, table.start_seconds, table.period)
+            lines.append(json.dumps([key, as_plain(self._known[key])]) + "\n")
+        if self._memory is not None and lines:
+            with self._memory.open("a") as f:
+                f.writelines(lines)
+        return [self._known[k] for k in keys]
+
+
+
+
+def _of_table(margin: Margin) -> bool:
+    return margin.name in ("range", "moving speed", "reach", "poses", "bus time", "self-contact")
+
+
+def _read(path: Path | None) -> dict[str, GaitMeasure]:
+    """What an earlier run wrote; a last line that was cut off is left out."""
+    known: dict[str, GaitMeasure] = {}
+    if path is None or not path.is_file():
+        return known
+    for line in path.read_text().splitlines():
+        try:
+            key, content = json.loads(line)
+        except ValueError:
+            continue
+        known[key] = from_plain(content)
+    return known

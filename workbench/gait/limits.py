@@ -1,0 +1,145 @@
+"""The limits of a gait, as constraints with names, joints and margins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.gait.machine import GaitMachine
+from workbench.gait.measure import GaitMeasure
+from workbench.gait.table import GaitTable
+from workbench.robot import SPEED_UNIT
+
+
+@dataclass(frozen=True)
+class GaitLimits:
+    """What a gait must keep. Each field: unit and reason.
+
+    rms: torque of each servo [N m], RMS over the gait; None: half of what full duty gives at standstill. ROBOTIS advises a fifth,
+    which its own walk of the puppy breaks by far (the tail's 0.80 N m of 1.39); half is below what that walk asks and gives I²R
+    heat of a quarter of a stalled servo's, for minutes and not for hours. `advised` is the fifth.
+    torque: share of the torque-speed line that may be asked for 10 ms or longer; the rest of it is where a servo stops following.
+    fuse: supply current [A] (CM-530: 10 A). reach: feet off the path asked for [m]: a millimetre is within play and rounding.
+    clearance: between links [m]: 2 mm for cables and screw heads. capacity: poses in the controller's table: 512 poses of 15
+    servos take 32 kB, half of a CM-530's memory. bus: bit rate of the servo bus [1/s].
+    fall_draws: share of draws that may fall: none. tilt: of the base [rad], 30 deg, where the feet's track no longer
+    holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the
+    same, RMS over draws [rad/m]: 12 deg, an eighth of the ROBOTIS walk's 98. aside: speed across over speed along.
+    """
+
+    rms: float | None = None
+    torque: float = 1.0
+    fuse: float = 10.0
+    reach: float = 1e-3
+    clearance: float = 2e-3
+    capacity: int = 512
+    bus: float = 1e6
+    tilt: float = float(np.radians(30))
+    drift: float = float(np.radians(3))
+    spread: float = float(np.radians(12))
+    aside: float = 0.1
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far one limit is: value and limit in `unit`, at `where` (a joint, a foot, two links, or the robot). use: value by
+    limit; above 1 it is broken. `advice`: a rule that it had better keep, and need not."""
+
+    name: str
+    where: str
+    value: float
+    limit: float
+    unit: str
+    use: float
+    advice: bool = False
+
+    @property
+    def margin(self) -> float:
+        """What is left, as a share of the limit; negative where it is broken."""
+        return 1.0 - self.use
+
+    def __str__(self) -> str:
+        return f"{self.name}, {self.where}: {self.value:.3g} of {self.limit:.3g} {self.unit}"
+
+
+def allowed_rms(machine: GaitMachine, limits: GaitLimits) -> np.ndarray:
+    """RMS torque (n,) [N m] that each servo may take."""
+    law = machine.law
+    return np.full(len(law.full_torque), limits.rms) if limits.rms is not None else law.full_torque / 2
+
+
+def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> list[Margin]:
+    """What can be told without a simulation: ranges, moving speeds, reach, self-contact, bus time, capacity."""
+    model, out = machine.model, []
+    for part in (table.cycle, table.start, table.stop):
+        angles = part.angles()
+        for i, joint in enumerate(model.joints):
+            r = machine.ranges[joint]
+            k = int(np.argmax(np.where(angles[:, i] > 0, angles[:, i] / r.upper, angles[:, i] / r.lower)))
+            bound = r.upper if angles[k, i] > 0 else r.lower
+            out.append(_of("range", joint, np.degrees(angles[k, i]), np.degrees(bound), "deg", float(angles[k, i] / bound)))
+    no_load = machine.law.full_torque / machine.law.back_emf
+    for i, joint in enumerate(model.joints):
+        asked = float(table.cycle.speeds[:, i].max()) * SPEED_UNIT
+        out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))
+    for i, leg in enumerate(machine.legs):
+        out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))
+    out.append(_of("poses", "table", len(table.cycle) + len(table.start) + len(table.stop), limits.capacity, "poses"))
+    packet = 10 * (5 * len(model.joints) + 8) / limits.bus  # a Sync Write of goal and speed: ID and four bytes a servo
+    out.append(_of("bus time", "robot", 1000 * packet, float(table.cycle.dwells_ms.min()), "ms of the shortest dwell"))
+    return _worst(out)
+
+
+def contact_margin(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> Margin:
+    """Of links against each other, at the poses asked for."""
+    near = machine.self_contact.nearest(table.asked)
+    where = " and ".join(near.links) if near.links[0] else "robot"
+    return _of("self-contact", where, 1000 * limits.clearance, 1000 * max(near.distance, 1e-6), "mm of clearance")
+
+
+def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) -> list[Margin]:
+    """What a run on the nominal robot tells: torque, RMS, current, tilt; and ROBOTIS's advice."""
+    out, law = [], machine.law
+    allowed = allowed_rms(machine, limits)
+    for i, joint in enumerate(machine.model.joints):
+        out.append(_of("RMS torque", joint, measure.rms[i], float(allowed[i]), "N m"))
+        out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of what it has"))
+        out.append(_of("RMS torque, ROBOTIS's fifth", joint, measure.rms[i], float(law.full_torque[i]) / 5, "N m", advice=True))
+    out.append(_of("supply current", "robot", measure.peak_current, limits.fuse, "A"))
+    out.append(_of("tilt", "robot", float(np.degrees(measure.tilt)), float(np.degrees(limits.tilt)), "deg"))
+    return out
+
+
+def binding(margins: Iterable[Margin]) -> Margin | None:
+    """The limit that leaves least, advice left out."""
+    return max((m for m in margins if not m.advice), key=lambda m: m.use, default=None)
+
+
+def violation(margins: Iterable[Margin]) -> float:
+    """Sum of what limits are exceeded by, as shares of them; 0 where all are kept."""
+    return sum(max(min(m.use, 1e3) - 1.0, 0.0) for m in margins if not m.advice)
+
+
+def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False) -> Margin:
+    share = use if use is not None else value / limit if limit > 0 else np.inf
+    return Margin(name, where, float(value), float(limit), unit, float(share), advice)
+
+
+def _worst(margins: Sequence[Margin]) -> list[Margin]:
+    """One for each name and place: the one that leaves least."""
+    worst: dict[tuple[str, str], Margin] = {}
+    for m in margins:
+        if (m.name, m.where) not in worst or m.use > worst[m.name, m.where].use:
+            worst[m.name, m.where] = m
+    return list(worst.values())
+
+
+def each(margins: Iterable[Margin]) -> Iterator[tuple[str, Margin]]:
+    """For each name the margin that leaves least."""
+    by_name: dict[str, Margin] = {}
+    for m in margins:
+        if m.name not in by_name or m.use > by_name[m.name].use:
+            by_name[m.name] = m
+    yield from by_name.items()

@@ -1,0 +1,112 @@
+"""What stays the same while gaits of one robot are sought: legs, ranges, servos, self-contact, inverse dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.dynamics import InverseDynamics, RobotTrajectory
+from workbench.effects.apply import physics_of
+from workbench.gait.legs import Leg, legs_of
+from workbench.gait.self_contact import SelfContact
+from workbench.gait.shape import GaitShape, foot_path
+from workbench.robot import SPEED_UNIT, InputError, RobotModel
+from workbench.robot.ranges import JointRange, joint_ranges
+from workbench.servo import ServoLaw
+
+Array = NDArray[np.float64]
+
+CREEP = 0.3
+"""Joint speed [rad/s] about which Coulomb friction changes sign in the inverse servo law, so that a pose at a turning point asks
+for none of it."""
+STANDING_KNEES = 1
+"""Which way knees point when the robot folds up, where a robot's neutral does not tell: back."""
+
+
+@dataclass(frozen=True)
+class GaitMachine:
+    """One robot, as gaits need it. InputError for a robot that cannot walk: no feet, or fewer than two legs."""
+
+    model: RobotModel
+
+    def __post_init__(self) -> None:
+        if len(self.legs) < 2:
+            raise InputError(self.model.description, f"expected at least two legs, found {len(self.legs)}")
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """The legs, by foot."""
+        return legs_of(self.model)
+
+    @cached_property
+    def ranges(self) -> dict[str, JointRange]:
+        """How far joints turn."""
+        return joint_ranges(self.model)
+
+    @cached_property
+    def law(self) -> ServoLaw:
+        """The servos' law, effects included."""
+        return physics_of(self.model).law
+
+    @cached_property
+    def self_contact(self) -> SelfContact:
+        """Distances between links."""
+        return SelfContact(self.model)
+
+    @cached_property
+    def inverse_dynamics(self) -> InverseDynamics:
+        """Of the robot on its feet."""
+        return InverseDynamics(self.model)
+
+    @property
+    def leg_length(self) -> float:
+        """Of the shortest leg in neutral [m]."""
+        return min(leg.length for leg in self.legs)
+
+    @cached_property
+    def fastest(self) -> NDArray[np.int64]:
+        """Moving speed (n,) [counts] that full duty just reaches against the servo's own friction: the most that is asked."""
+        law = self.law
+        return np.floor(np.maximum(law.full_torque - law.coulomb, 0) / law.damping / SPEED_UNIT).astype(np.int64)
+
+    def angles(self, shape: GaitShape, phases: Array, size: float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Joint angles (N, n) [rad] that put the feet on the shape's path at phases (N,), joints outside legs at zero; how far
+        each foot stays from it (N, F) [m]; and which feet should stand (N, F)."""
+        path = foot_path(shape, self.legs, phases, size)
+        q = np.zeros((len(phases), len(self.model.joints)))
+        off = np.empty(path.stance.shape)
+        middle = float(np.mean([leg.neutral[0] for leg in self.legs]))
+        for i, leg in enumerate(self.legs):
+            bend = shape.knees[0] if leg.neutral[0] > middle else shape.knees[1]
+            q_leg, off[:, i] = leg.solve(path.p[:, i], bend)
+            q[:, [self.model.joints.index(j) for j in leg.joints]] = q_leg
+        return q, off, path.stance
+
+    def droop(self, shape: GaitShape, q: Array, stance: NDArray[np.bool_]) -> Array:
+        """What the reference must be ahead of the joints (P, n) [rad], so that the servos' duty gives what the gait takes at its
+        poses: the inverse of the servo law on inverse dynamics of the joints' periodic path q (P, n), the body going evenly."""
+        P, period = len(q), shape.period
+        v = _periodic(q, period, 1)
+        a = _periodic(q, period, 2)
+        advance = np.array([shape.stride, shape.side, 0.0]) / (shape.duty * period)
+        V = np.tile([0.0, 0.0, shape.turn / (shape.duty * period), *advance], (P, 1))
+        height = -min(float(leg.neutral[2]) for leg in self.legs) - shape.crouch
+        trajectory = RobotTrajectory(np.arange(P) * period / P, self.model.joints, q, v, a, np.tile([0, 0, height], (P, 1)),
+                                     np.tile([1.0, 0, 0, 0], (P, 1)), V, np.zeros((P, 6)))
+        feet = {leg.foot: stance[:, i] for i, leg in enumerate(self.legs)}
+        torque = self.inverse_dynamics.of(trajectory, feet).torque
+        law = self.law
+        needed = torque + law.inertia * a + law.viscous * v + law.coulomb * np.clip(v / CREEP, -1, 1) + law.back_emf * v
+        return law.rest_error(np.clip(needed, -law.full_torque, law.full_torque))
+
+
+def _periodic(q: Array, period: float, order: int) -> Array:
+    """Time derivative of a periodic path (P, n) at its samples, by its Fourier series."""
+    P = len(q)
+    factor = (2j * np.pi * np.fft.fftfreq(P, 1 / P) / period) ** order
+    if P % 2 == 0 and order % 2 == 1:
+        factor[P // 2] = 0.0
+    return np.asarray(np.fft.ifft(factor[:, None] * np.fft.fft(q, axis=0), axis=0).real)

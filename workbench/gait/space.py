@@ -1,0 +1,102 @@
+"""Where gaits are sought: a box of shapes for each request, and shapes as points of a unit cube."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gait.machine import GaitMachine
+from workbench.gait.request import Request
+from workbench.gait.shape import FAMILIES, KNEES, GaitShape
+
+Array = NDArray[np.float64]
+
+LENGTHS: Mapping[str, tuple[float, float]] = {
+    "lift": (0.03, 0.28), "crouch": (0.05, 0.45), "nose": (-0.12, 0.12), "front": (-0.25, 0.25), "hind": (-0.25, 0.25),
+    "spread": (-0.08, 0.25), "sway": (-0.15, 0.15), "push": (-0.03, 0.12), "difference": (-0.2, 0.2)}
+"""Ranges by leg length; a leg of the puppy has 0.184 m."""
+SHARES: Mapping[str, tuple[float, float]] = {
+    "duty": (0.40, 0.80), "sway_phase": (0.0, 1.0), "apex": (-0.25, 0.25), "lag": (-0.12, 0.12), "lead": (0.0, 1.3),
+    "hurry": (0.8, 2.0)}
+POSES = (2.0, 8.0)
+"""Half the poses in a cycle."""
+FREQUENCY = (0.7, 4.6)
+"""[Hz] of a robot with a leg of 0.184 m; others swing with the root of gravity by length."""
+PUPPY_LEG = 0.1835
+WEIGHTS: Mapping[str, float] = {"trot": 0.5, "walk": 0.15, "crawl": 0.1, "bound": 0.125, "pace": 0.125}
+"""How often a seed is of each family."""
+
+
+@dataclass(frozen=True)
+class Space:
+    """Names and ranges (n,) of what is sought, in SI. poses are halves of their number and whole."""
+
+    names: tuple[str, ...]
+    low: Array
+    high: Array
+
+    @property
+    def whole(self) -> list[int]:
+        """Indices of what takes whole numbers only."""
+        return [self.names.index("poses")]
+
+    def shape(self, x: Array, family: str, knees: tuple[int, int]) -> GaitShape:
+        """The shape at a point x (n,) of the unit cube."""
+        values = dict(zip(self.names, (self.low + np.clip(x, 0, 1) * (self.high - self.low)).tolist()))
+        values["poses"] = 2 * round(values["poses"])
+        if family == "crawl":
+            values["duty"] = max(values["duty"], 0.75)
+        return GaitShape(family=family, knees=knees, **values)
+
+    def point(self, shape: GaitShape) -> Array:
+        """The point (n,) of a shape, moved into the cube."""
+        values = np.array([getattr(shape, n) / (2 if n == "poses" else 1) for n in self.names])
+        return np.clip((values - self.low) / (self.high - self.low), 0.0, 1.0)
+
+
+def space_of(machine: GaitMachine, request: Request) -> Space:
+    """The box for a request on one robot."""
+    length = machine.leg_length
+    pace = np.sqrt(PUPPY_LEG / length)
+    box = {"poses": POSES, "frequency": (FREQUENCY[0] * pace, FREQUENCY[1] * pace)}
+    box |= {k: (a * length, b * length) for k, (a, b) in LENGTHS.items()}
+    box |= dict(SHARES)
+    box |= {k: (a, b) for k, (a, b) in _strides(request, length).items() if b > a}
+    if request.way == "sideways":
+        del box["difference"]
+    names = tuple(box)
+    low, high = (np.array([box[n][i] for n in names]) for i in (0, 1))
+    return Space(names, low, high)
+
+
+def _strides(request: Request, length: float) -> dict[str, tuple[float, float]]:
+    """Ranges of stride, side [m] and turn [rad]."""
+    along = (0.08 * length, 0.95 * length)
+    little = (-0.08 * length, 0.08 * length)
+    if request.way == "backward":
+        return {"stride": (-along[1], -along[0])}
+    if request.way == "sideways":
+        return {"stride": little, "side": (0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
+    if request.way == "turn":
+        return {"stride": little, "turn": (0.1, 1.2)}
+    if request.radius is not None:
+        return {"stride": along, "turn": (0.0, min(1.2, 2 * along[1] / request.radius))}
+    return {"stride": along}
+
+
+def seeds(machine: GaitMachine, request: Request, space: Space, count: int, seed: int) -> list[GaitShape]:
+    """Random shapes of all families and ways of the knees, the same for the same seed."""
+    rng = np.random.default_rng([seed, 10])
+    families, weights = list(WEIGHTS), np.array(list(WEIGHTS.values()))
+    assert set(families) == set(FAMILIES)
+    knees = KNEES[:1] if request.built_knees else KNEES
+    out = []
+    for _ in range(count):
+        family = str(rng.choice(families, p=weights / weights.sum()))
+        x = rng.uniform(size=len(space.names))
+        x[space.names.index("poses")] = rng.choice([0.33, 0.5, 0.67])  # 4, 6 … 12: extremes come by search
+        out.append(replace(space.shape(x, family, knees[rng.integers(len(knees))])))
+    return out

@@ -1,0 +1,94 @@
+"""From a gait's shape to the table that the firmware plays, and the ways into the gait and out of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gait.machine import GaitMachine
+from workbench.gait.shape import GaitShape
+from workbench.motion import Commands, PoseTable
+from workbench.motion.table import CENTRE, LARGEST
+from workbench.robot import COUNT, SPEED_UNIT, InputError
+
+Array = NDArray[np.float64]
+
+GENTLY = (700, 300)
+"""Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.7 s are 1 rad/s, a fifth of
+what the servos reach, so that the robot is not thrown."""
+AT_ONCE = (250, 50)
+"""The same where nothing but the gait that follows is looked at."""
+HALF = 0.5
+"""Size of strides and lifts in the first and the last cycle."""
+
+
+@dataclass(frozen=True, eq=False)
+class GaitTable:
+    """A gait as the firmware plays it. cycle: the poses that repeat. start: from neutral into the cycle. stop: from the cycle's
+    end to neutral. reach: (P, F) [m] how far the feet of `cycle` stay from the path asked for. asked: (P, n) [rad] the angles
+    that the joints should have at the poses."""
+
+    shape: GaitShape
+    cycle: PoseTable
+    start: PoseTable
+    stop: PoseTable
+    reach: Array
+    asked: Array
+
+    def commands(self, cycles: int, whole: bool = False) -> Commands:
+        """Start and `cycles` cycles, and with `whole` the stop."""
+        parts = [self.start, *[self.cycle] * cycles, *([self.stop] if whole else [])]
+        return _joined(parts, self.cycle.source).commands()
+
+    @property
+    def start_seconds(self) -> float:
+        """How long the start takes [s]."""
+        return float(self.start.dwells_ms.sum()) / 1000
+
+    @property
+    def period(self) -> float:
+        """Of one cycle [s], in whole milliseconds a pose."""
+        return float(self.cycle.dwells_ms.sum()) / 1000
+
+
+def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait", ways: tuple[int, int] = GENTLY) -> GaitTable:
+    """The table of a shape, rounded to counts and milliseconds. ways: dwells [ms] from neutral to the gait's stance, and in it.
+    InputError where a goal is beyond the registers."""
+    q, off, stance = machine.angles(shape, shape.phases)
+    goals = q + shape.lead * machine.droop(shape, q, stance) if shape.lead else q
+    dwells = _dwells(shape)
+    cycle = _table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
+    standing = replace(shape, stride=0.0, side=0.0, turn=0.0, difference=0.0)
+    stand = machine.angles(standing, np.zeros(1), 0.0)[0]
+    small = machine.angles(shape, shape.phases, HALF)[0]
+    neutral = np.zeros_like(stand)
+    there, back = np.array(ways), np.array(ways[::-1])
+    start = [_table(machine, np.vstack([stand, stand]), np.vstack([neutral, stand]), there, 1.0, source),
+             _table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
+    stop = [_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
+            _table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
+    return GaitTable(shape, cycle, _joined(start, source), _joined(stop, source), off, q)
+
+
+def _dwells(shape: GaitShape) -> NDArray[np.int64]:
+    """Whole milliseconds whose sums are nearest to the poses' arrivals, so that nothing adds up."""
+    arrivals = np.round(1000 * shape.period * np.concatenate([[0.0], shape.phases])).astype(np.int64)
+    return np.maximum(np.diff(arrivals), 1)
+
+
+def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np.int64], hurry: float, source: str) -> PoseTable:
+    """Goals (P, n) [rad], each reached from `before` (P, n) at the end of its dwell, or as fast as the servo can."""
+    counts = CENTRE + np.round(goals / COUNT).astype(np.int64)
+    for k, i in np.argwhere((counts < 0) | (counts > LARGEST))[:1]:
+        raise InputError(source, f"pose {k + 1}, joint {machine.model.joints[i]}: goal {counts[k, i]} is outside 0 to {LARGEST}")
+    speed = hurry * np.abs(goals - before) / (dwells[:, None] / 1000) / SPEED_UNIT
+    speeds = np.clip(np.ceil(speed), 1, machine.fastest).astype(np.int64)
+    return PoseTable(machine.model.joints, counts, speeds, dwells, source)
+
+
+def _joined(parts: list[PoseTable], source: str) -> PoseTable:
+    first = parts[0]
+    goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
+    return PoseTable(first.joints, goals, speeds, dwells, source)

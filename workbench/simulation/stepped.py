@@ -1,0 +1,81 @@
+"""A run that goes on in pieces: what a controller or a learner drives."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.apply import played
+from workbench.motion.commands import Commands
+from workbench.recording.take import Take
+from workbench.robot import InputError
+
+if TYPE_CHECKING:
+    from workbench.simulation.rollout import Simulation, Start
+
+Array = NDArray[np.float64]
+
+
+class SteppedRun:
+    """One run of a simulation, advanced piece by piece. Time 0 is where it starts.
+
+    Commands that are sent reach the servos as in one long run of all of them (late ones, where the model says so, in a later
+    piece), so that the same commands in pieces or at once give the same take to the bit.
+    """
+
+    def __init__(self, simulation: Simulation, start: Start | None) -> None:
+        if simulation.config.drive != "servo" or simulation.config.base == "path":
+            raise InputError(None, "a stepped run needs drive 'servo' and a base that is free or fixed")
+        self._simulation = simulation
+        self._sent: Commands | None = None
+        self._played: Commands | None = None
+        self._sampled: list[Array] = []
+        self._forces: list[dict[str, Array]] = []
+        self._token = simulation.begin_stepped(start)
+        self.time = 0.0
+
+    def send(self, commands: Commands) -> None:
+        """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
+        self._check_alive()
+        self._sent = _followed(self._sent, commands.reordered(self._simulation.joints), self.time)
+        self._played = played(self._sent, self._simulation.model)
+
+    def advance(self, seconds: float) -> None:
+        """Goes on for so long, in whole steps of the log."""
+        self._check_alive()
+        end = self._simulation.on_log_grid(self.time + seconds)
+        sampled, forces = self._simulation.advance_stepped(self._played, self.time, end)
+        self._sampled.append(sampled)
+        self._forces.append(forces)
+        self.time = end
+
+    @property
+    def state(self) -> Start:
+        """Where the robot is now; another run starts from it."""
+        self._check_alive()
+        return self._simulation.present_state()
+
+    def take(self, name: str = "simulation") -> Take:
+        """What has been written down so far, from the start of the run."""
+        self._check_alive()
+        sampled = np.concatenate([*self._sampled, np.empty(0)])
+        unique, rows = np.unique(sampled, return_index=True)
+        feet = self._forces[0] if self._forces else {}
+        forces = {foot: np.concatenate([f[foot] for f in self._forces])[rows] for foot in feet}
+        return self._simulation.stepped_take(name, self._sent, self._played, unique, forces)
+
+    def _check_alive(self) -> None:
+        if not self._simulation.is_stepping(self._token):
+            raise RuntimeError("another run of the same simulation has ended this one")
+
+
+def _followed(before: Commands | None, after: Commands, now: float) -> Commands:
+    """A schedule on the run's clock: what was sent before `now` [s], then `after`."""
+    if before is None:
+        return Commands(after.times + now, after.joints, after.goals, after.speeds, after.enabled, after.end + now, after.poses)
+    kept = before.times < now - 1e-9
+    rows = {f: np.concatenate([getattr(before, f)[kept], getattr(after, f)]) for f in ("goals", "speeds", "enabled", "poses")}
+    return Commands(times=np.concatenate([before.times[kept], after.times + now]), joints=after.joints, end=after.end + now,
+                    **rows)
