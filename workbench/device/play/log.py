@@ -37,8 +37,8 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     the line between them; duty where the servo's output is what it reports. InputError where nothing was read.
     """
     content = _read(journal)
-    if not content.sent or not all(content.read.get(j) for j in content.joints):
-        raise InputError(journal, "no goals, or a joint that was never read; expected a motion that was played")
+    if not content.sent or not all(len(content.read.get(j, ())) > 1 for j in content.joints):
+        raise InputError(journal, "no goals, or a joint that was not read twice; expected a motion that was played")
     start = _rest_begins(content)
     end = max(rows[-1][0] for rows in content.read.values())
     poses = [t for t, _ in content.sent if t >= start]

@@ -107,6 +107,8 @@ class _Performance:
                 rig.journal.write(t=bus.now(), torque=dict.fromkeys(rig.ids, False))
                 released = True
             self._watchdog(0)
+            rig.mark(False)
+            bus.pause(0.002)
         except BaseException as e:
             rig.journal.write(t=_time(bus), stopped=str(e) or type(e).__name__)
             self._let_go()
@@ -127,6 +129,7 @@ class _Performance:
         rig.torque(True)
         rig.send(self.goals, slow)  # families that forget a goal while torque is off
         self._watchdog(self.options.watchdog)
+        rig.mark(True)
         bus.options = BusOptions(tries=1, settle=careful.settle)
 
     def _keep_in_range(self) -> None:

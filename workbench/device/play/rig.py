@@ -15,7 +15,7 @@ STATE = ("present_position", "present_load", "present_voltage", "present_tempera
 ROUND = 0.02
 """Shortest time in which all servos are read once [s]: no faster than the log's rows."""
 LIMP_EVERY = 5
-"""Torque enable is read with every fifth reading of a servo: it lies far from the rest in some families."""
+"""Torque enable, and what a restart forgets, are read with every fifth reading of a servo: they lie far from the rest."""
 
 
 @dataclass
@@ -32,6 +32,8 @@ class Rig:
         self._turn = 0
         self._cost = 0.0
         self._round_began = -math.inf
+        marker = self.bus.profile.marker
+        self._limp = ("torque_enable", marker) if marker else ("torque_enable",)
         self.angles: dict[str, float] = {}
 
     def measure(self) -> dict[str, float]:
@@ -71,6 +73,12 @@ class Rig:
                 self.bus.write(servo, {"torque_enable": int(on)})
             self.journal.write(t=self.bus.now(), torque={joint: on})
 
+    def mark(self, on: bool) -> None:
+        """Sets, or clears, what a restart forgets."""
+        marker = self.bus.profile.marker
+        if marker:
+            self.bus.sync_write({servo: {marker: int(on)} for servo in self.ids.values()})
+
     def read_until(self, due: float, stop: Callable[[], bool]) -> None:
         """Reads one servo after the other until `due` [s], as long as there is time for one more; ends early on `stop()` or where
         the watch reacts."""
@@ -97,7 +105,7 @@ class Rig:
             values = bus.read(servo, *STATE)
             after = bus.now()
             if limp:
-                values |= bus.read(servo, "torque_enable")
+                values |= bus.read(servo, *self._limp)
         except NoAnswerError:
             self.watch.silent(servo, bus.now())
             return

@@ -64,9 +64,12 @@ class Watch:
         if volts is not None:
             self._judge(servo, "dead", volts < low * self._options.dead, "release", f"{volts:.1f} V, the supply is gone")
             self._judge(servo, "low", volts < low, "neutral", f"{volts:.1f} V, below {low:g} V")
+        marker = self._profile.marker
+        if marker and marker in values:
+            self._judge(servo, "restart", not values[marker], "neutral", "it restarted; did its supply break down?")
         if "torque_enable" in values:
             self._judge(servo, "limp", not values["torque_enable"], "neutral",
-                        "its torque is off: it restarted, or somebody switched it off")
+                        "its torque is off")
 
     def silent(self, servo: int, time: float) -> None:
         """No answer, or none that could be read, at a time [s]."""
