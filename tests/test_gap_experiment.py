@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import write_session
-from workbench.compare.footfalls import foot_points
 from workbench.compare.session import load_session
 from workbench.device.limits import check_limits
 from workbench.experiment.design import Experiment, ObservationModel, Separation, design_experiment
@@ -15,7 +14,7 @@ from workbench.experiment.rivals import Pair
 from workbench.experiment.segment import joined
 from workbench.experiment.stance import BodyMoves
 from workbench.motion import Motion, load_motion, save_motion
-from workbench.robot import EffectSpec, puppy_model
+from workbench.robot import EffectSpec, foot_points, puppy_model
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +80,10 @@ def test_the_body_goes_down_and_the_feet_stay(puppy, arm):
     moves = BodyMoves(model, reach)
     pose = moves._pose((0.0, 0.0, -0.15, 0.0, 0.0, 0.0))
     k = model.kinematics
-    assert set(foot_points(model.path)) <= set(pose)
-    for foot in foot_points(model.path):
-        link = k.frames[foot].child
-        point = foot_points(model.path)[foot][0].mean(axis=0)
+    assert set(foot_points(model)) <= set(pose)
+    for foot in foot_points(model):
+        link = model.foot_links[foot]
+        point = foot_points(model)[foot][0].mean(axis=0)
         at = []
         for q in ({}, pose):
             p, R = k.forward(np.array([[q.get(j, 0.0) for j in model.joints]]), model.joints)[link]

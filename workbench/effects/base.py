@@ -219,9 +219,9 @@ def vector(values: Mapping[str, float], name: str) -> Array:
 def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     """InputError unless `where` names what the model has and the effect can act on."""
     k = model.kinematics
-    feet = tuple(j for j in model.joints if j in k.frames and not any(f.parent == k.frames[j].child for f in k.frames.values()))
     known: dict[str, tuple[str, ...]] = {
-        "joint": model.joints, "foot": feet, "link": k.links, "rigid_body": tuple(model.rigid_bodies), "robot": ()}
+        "joint": model.joints, "foot": tuple(model.foot_links), "link": k.links, "rigid_body": tuple(model.rigid_bodies),
+        "robot": ()}
     if not spec.where:
         if "robot" not in effect.places:
             raise InputError(None, f"effect '{spec.effect}': where is empty; expected one {' or '.join(effect.places)}")

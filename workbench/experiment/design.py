@@ -28,7 +28,7 @@ from workbench.experiment.stance import BodyMoves
 from workbench.identify.findings import NextExperiment
 from workbench.motion import Motion
 from workbench.recording.take import Take
-from workbench.robot import FEET, RobotModel
+from workbench.robot import RobotModel, legs
 
 __all__ = ["Experiment", "ObservationModel", "Separation", "design_experiment"]
 
@@ -116,10 +116,8 @@ def _better_base(pair: Pair, nominal: RobotModel) -> Base:
 
 
 def _trunk(model: RobotModel) -> list[str]:
-    """Links that carry feet's legs: those from which the legs' last three joints hang."""
-    k = model.kinematics
-    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints] for f in FEET if f in k.frames]
-    return [k.frames[leg[-3]].parent for leg in legs if len(leg) >= 3]
+    """Links from which the legs hang."""
+    return [model.kinematics.frames[leg[0]].parent for leg in legs(model).values() if leg]
 
 
 def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
@@ -129,8 +127,7 @@ def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
     joints = tuple(dict.fromkeys(j for j in named if j in model.joints))
     if joints:
         return joints
-    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints][-2:] for f in FEET if f in model.joints]
-    return tuple(j for leg in legs for j in leg) or model.joints
+    return tuple(j for leg in legs(model).values() for j in leg[-2:]) or model.joints
 
 
 class _Bench:

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from workbench.compare.footfalls import foot_points
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
@@ -51,7 +50,7 @@ def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
 def heavy_links(model: RobotModel) -> list[str]:
     """Links with at least the share HEAVY of the robot's mass, HEAVY_APART where they are no part of one leg."""
     k = model.kinematics
-    feet = [k.frames[f].child for f in foot_points(model.path) if f in k.frames]
+    feet = list(model.foot_links.values())
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
     return [link for link in k.links if k.masses[link] >= k.mass * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
 
@@ -60,10 +59,10 @@ def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[
     if effect.moves_center:
         yield from ((link,) for link in heavy_links(model))
         return
-    frames, feet = model.kinematics.frames, [f for f in foot_points(model.path) if f in seen]
+    frames, feet = model.kinematics.frames, [f for f in model.foot_links if f in seen]
     links: Sequence[str] = model.kinematics.links
     if effect.layer == "structure":  # what hangs on a joint and carries the next, or a foot
-        carrying = {f.parent for f in frames.values()} | {frames[f].child for f in feet}
+        carrying = {f.parent for f in frames.values()} | {model.foot_links[f] for f in feet}
         links = [f.child for f in frames.values() if f.child in carrying]
     names = {"joint": seen, "foot": feet, "link": links, "rigid_body": list(model.rigid_bodies)}
     for place in effect.places:
