@@ -269,7 +269,7 @@ def test_a_pull_straight_down_is_no_cable(worn, force, down):
     assert bool(left) is down
     for u in left:
         assert (u.error, u.floor) == pytest.approx((0.7, 0.01 * tether.typical[2]))
-        assert "71 g" in u.description
+        assert "71 g" in str(u.description)
 
 
 @pytest.mark.parametrize(("likely", "sure"), [(0.4, 0.25), (0.2, 0.5)])
