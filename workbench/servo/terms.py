@@ -16,12 +16,15 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Instant:
     """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) of the joints [rad/s]; duty (n,), 0 with
-    torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it."""
+    torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it. Known where friction is
+    asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or would but for friction."""
 
     elapsed: float
     velocity: Array
     duty: Array
     load: Array
+    motor: Array
+    direction: Array
 
 
 class ServoTerm:
@@ -35,6 +38,10 @@ class ServoTerm:
         """Most of the motor's torque, duty torque less back-EMF [N m]."""
         return np.inf
 
+    def saturation(self) -> Array | float:
+        """Torque s [N m] by which the motor's, x, acts as x / (1 + |x|/s)."""
+        return np.inf
+
     def friction(self, now: Instant) -> Array | float:
         """Dry friction beyond the law's Coulomb friction [N m], not negative."""
         return 0.0
@@ -43,10 +50,28 @@ class ServoTerm:
         """The most that `friction` may ask for [N m]; above 0 where it varies."""
         return 0.0
 
+    def friction_ratio(self, now: Instant) -> Array | float:
+        """What all dry friction is times, by direction."""
+        return 1.0
+
+    def most_friction_ratio(self) -> Array | float:
+        """The most that `friction_ratio` may be."""
+        return 1.0
+
 
 def most_friction(terms: Sequence[ServoTerm], law: ServoLaw) -> Array:
     """The most dry friction of each servo, Coulomb's included (n,) [N m]."""
-    most = law.coulomb.copy()
+    most, ratio = law.coulomb.copy(), np.ones_like(law.coulomb)
     for term in terms:
         most = most + term.most_friction(law)
-    return most
+        ratio = ratio * term.most_friction_ratio()
+    return np.asarray(most * ratio)
+
+
+def wanted_friction(terms: Sequence[ServoTerm], law: ServoLaw, now: Instant) -> Array:
+    """The dry friction of each servo, Coulomb's included (n,) [N m]."""
+    friction, ratio = law.coulomb, np.ones_like(law.coulomb)
+    for term in terms:
+        friction = friction + term.friction(now)
+        ratio = ratio * term.friction_ratio(now)
+    return np.asarray(friction * ratio)
