@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from workbench.cli.options import add_model, add_out, load_model, positive
+
+if TYPE_CHECKING:
+    from workbench.motion import Motion
+    from workbench.robot import InputError, RobotModel
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -14,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "export",
         help="turn a motion into the robot's firmware tables",
         description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt and motion.h. The motion is "
-        "played on the simulated robot first; what breaks a servo's range, speed or torque is refused unless --force.",
+        "played on the simulated robot first; what breaks a servo's range, speed or torque, or was made by optimize and lacks "
+        "its certificate, is refused unless --force.",
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
@@ -36,12 +42,31 @@ def run(args: argparse.Namespace) -> int:
     model = load_model(args.model)
     motion = load_motion(args.motion, model)
     motion.as_table()  # refused before the simulation
+    uncertified = _uncertified(args.motion, motion, model)
+    if uncertified is not None and not args.force:
+        raise uncertified
     base = "fixed" if model.kinematics.fixed_to_world else "free"
     with output_directory(args.out) as folder, Progress("export") as progress:
         take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, args.cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)
+    if uncertified is not None:
+        print(f"workbench export: warning: {uncertified}", file=sys.stderr)
     for violation in exported.violations:
         print(f"workbench export: warning: {violation}", file=sys.stderr)
     print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}")
     return 0
+
+
+def _uncertified(path: str, motion: Motion, model: RobotModel) -> InputError | None:
+    """What is wrong with the certificate of a motion that `optimize` made."""
+    from workbench.gait.certificate import check_certificate, has_mark
+    from workbench.robot import InputError
+
+    if not has_mark(path):
+        return None
+    try:
+        check_certificate(path, motion, model)
+    except InputError as e:
+        return e
+    return None

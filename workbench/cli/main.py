@@ -15,7 +15,9 @@ from typing import NoReturn
 
 import workbench
 
-VERBS = ("demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "export", "record", "bench")
+VERBS = (
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "record", "bench",
+)
 
 
 class OneLineParser(argparse.ArgumentParser):

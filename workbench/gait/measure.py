@@ -101,7 +101,8 @@ def measure(take: Take, model: RobotModel, begin: float, period: float) -> GaitM
         torque_use=_floats(_torque_use(law, torque, v, every)),
         speed_use=_floats(np.quantile(np.abs(v), 0.995, axis=0) * law.back_emf / law.full_torque),
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
-        power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()), jerk=_jerk(time, p))
+        power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
+        jerk=base_jerk(time, p))
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
@@ -144,7 +145,7 @@ def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
     return np.asarray(minimum_filter1d(share, max(1, round(LASTING / every)), axis=0).max(axis=0))
 
 
-def _jerk(time: Array, p: Array) -> float:
+def base_jerk(time: Array, p: Array) -> float:
     """RMS of the third derivative of the base's path, smoothed over 50 ms so that single impacts of feet do not decide."""
     if len(time) < 12:
         return float("nan")

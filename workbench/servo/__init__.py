@@ -4,6 +4,6 @@ from workbench.servo.bank import AddServos, SetServoPhysics
 from workbench.servo.law import ServoLaw
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
-from workbench.servo.terms import Instant, ServoTerm
+from workbench.servo.terms import Instant, ServoTerm, TermNumbers
 
-__all__ = ["AddServos", "Instant", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank"]
+__all__ = ["AddServos", "Instant", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank", "TermNumbers"]

@@ -27,8 +27,33 @@ class Instant:
     direction: Array
 
 
+@dataclass(frozen=True)
+class TermNumbers:
+    """A term in numbers, by which it can be computed elsewhere than here. ceiling (n,) [N m]; sag [V] lost for each servo at full
+    duty; fade [1/s]; sticking (n,) [N m] more friction at rest, fading as exp(-(w / speed)^2), speed [rad/s]; rubbing (n,):
+    friction by load, rubbing_still (n,) more at rest, fading likewise by rubbing_speed [rad/s], rubbing_backwards (n,) more where
+    the load drives the motor; bend (n,) [1/(N m)]: one over the torque at which the motor saturates; lopsided (n,): share by which
+    friction is more forwards and less backwards."""
+
+    ceiling: Array | None = None
+    sag: float = 0.0
+    fade: float = 0.0
+    sticking: Array | None = None
+    speed: float = 1.0
+    rubbing: Array | None = None
+    rubbing_still: Array | None = None
+    rubbing_speed: float = 1.0
+    rubbing_backwards: Array | None = None
+    bend: Array | None = None
+    lopsided: Array | None = None
+
+
 class ServoTerm:
     """Does nothing unless overridden. What it returns is for all servos (n,), or one number for all."""
+
+    def numbers(self) -> TermNumbers | None:
+        """All that the term does, in numbers; None where they do not say it."""
+        return None
 
     def strength(self, law: ServoLaw, now: Instant) -> Array | float:
         """What is left of the duty torque, 0 to 1."""

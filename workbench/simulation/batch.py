@@ -4,39 +4,22 @@ from __future__ import annotations
 
 import warnings
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
 
 from joblib import Parallel, delayed
+from joblib.parallel import get_active_backend
 
-from workbench.motion.commands import Commands
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
-from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Array, Simulation, Start
-from workbench.simulation.steady import BaseStates
+from workbench.robot import InputError
+from workbench.simulation.job import Job
+from workbench.simulation.rollout import Simulation
+
+__all__ = ["Job", "run_job", "simulate_batch", "simulate_stream"]
 
 KEPT_STATIONS = 3
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run: what Simulation.run takes, of a model in a configuration. times: (N,) [s] after the first command at which
-    the take is wanted, without torques and contact; the whole log if None. Less log is less traffic between processes."""
-
-    model: RobotModel
-    config: SimulationConfig
-    commands: Commands | None = None
-    duration: float | None = None
-    lead: float = 0.1
-    trajectory: tuple[Array, Array] | None = None
-    path: Take | None = None
-    name: str = "simulation"
-    times: Array | None = None
-    start: Start | tuple[Array, Array] | None = None
-    elapsed: float = 0.0
-    steadied: BaseStates | None = None
 
 
 def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int, int], None] | None = None) -> list[Take]:
@@ -53,13 +36,31 @@ def simulate_batch(jobs: Sequence[Job], n_jobs: int = 2, progress: Callable[[int
 
 
 def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
-    """The same takes one by one, each as soon as it and those before it are there; the others go on meanwhile."""
+    """The same takes one by one, each as soon as it and those before it are there; the others go on meanwhile.
+
+    What the compiled station covers runs in threads of this process, the rest in processes."""
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
-    return _in_processes(jobs, n_jobs)
+    if get_active_backend()[0].__class__.__name__ != "LokyBackend":  # somebody's cluster
+        return _in_processes(jobs, n_jobs)
+    return _in_threads_and_processes(jobs, n_jobs)
+
+
+def _in_threads_and_processes(jobs: Sequence[Job], n_jobs: int) -> Iterator[Take]:
+    here = [_is_compiled(job) for job in jobs]
+    elsewhere = iter(_in_processes([_by_drake(job) for job, c in zip(jobs, here) if not c], n_jobs))
+    with ThreadPoolExecutor(n_jobs) as threads:
+        started = [threads.submit(run_job, job) if c else None for job, c in zip(jobs, here)]
+        try:
+            for run in started:
+                yield next(elsewhere) if run is None else run.result()
+        finally:
+            threads.shutdown(cancel_futures=True)
 
 
 def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
+    if not jobs:
+        return
     with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
         yield from Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)
@@ -69,8 +70,35 @@ _stations: OrderedDict[Any, Simulation] = OrderedDict()
 
 
 def run_job(job: Job) -> Take:
-    """One job in this process, on a kept station where model and configuration are those of an earlier job."""
-    key = (job.model.sha256, job.config)
+    """One job in this process, by the engine that its configuration says."""
+    if job.config.engine == "drake":
+        return _run_by_drake(job)
+    from workbench.simulation.compiled import NotCoveredError, run_compiled
+
+    try:
+        return run_compiled(job)
+    except NotCoveredError as why:
+        if job.config.engine == "compiled":
+            raise InputError(None, f"engine 'compiled' does not know: {why}; expected 'auto' or 'drake'") from why
+        return _run_by_drake(job)
+
+
+def _is_compiled(job: Job) -> bool:
+    """Whether the compiled station is to play a job, as far as can be told before it runs."""
+    if job.config.engine == "drake":
+        return False
+    from workbench.simulation.compiled import covers
+
+    return job.config.engine == "compiled" or covers(job) is None
+
+
+def _by_drake(job: Job) -> Job:
+    return replace(job, config=replace(job.config, engine="drake"))
+
+
+def _run_by_drake(job: Job) -> Take:
+    """On a kept station where model and configuration are those of an earlier job."""
+    key = (job.model.sha256, replace(job.config, engine="drake"))
     if key not in _stations:
         _stations[key] = Simulation(job.model, job.config)
     _stations.move_to_end(key)

@@ -6,6 +6,7 @@ BASES = ("free", "fixed", "path")
 DRIVES = ("servo", "fast_servo", "ideal", "playback")
 CONTACTS = ("point", "hydroelastic")
 APPROXIMATIONS = ("lagged", "sap", "similar")
+ENGINES = ("auto", "drake", "compiled")
 
 
 @dataclass(unsafe_hash=True)  # not frozen: Drake's YAML loader fills an instance in
@@ -19,6 +20,8 @@ class SimulationConfig:
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
     hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
     written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces, in whole steps; 0: none.
+    engine: of jobs and batches: "compiled" (Drake's discrete step compiled; `simulation.compiled` says what it covers), "drake",
+    or "auto", the compiled one for what it covers. A `Simulation` is always Drake's.
     """
 
     time_step: float = 1e-3
@@ -32,13 +35,15 @@ class SimulationConfig:
     settle: float = 1.0
     log_period: float = 0.0
     contact_period: float = 1 / 120
+    engine: str = "auto"
 
     def __post_init__(self) -> None:
         self.check()
 
     def check(self) -> None:
         """ValueError names a field out of range; called again when a station is made, as loaders and callers may set fields."""
-        for name, allowed in (("base", BASES), ("drive", DRIVES), ("contact", CONTACTS), ("approximation", APPROXIMATIONS)):
+        for name, allowed in (("base", BASES), ("drive", DRIVES), ("contact", CONTACTS), ("approximation", APPROXIMATIONS),
+                              ("engine", ENGINES)):
             if getattr(self, name) not in allowed:
                 raise ValueError(f"{name}: expected one of {', '.join(allowed)}, got {getattr(self, name)!r}")
         for f in fields(self):

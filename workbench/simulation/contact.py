@@ -101,14 +101,14 @@ def SetFootContact(plant: MultibodyPlant, scene_graph: SceneGraph, instance: Mod
             continue
         changed = ProximityProperties(properties)
         if link in friction:
-            mu = _partner_friction(friction[link], mu_ground)
+            mu = partner_friction(friction[link], mu_ground)
             changed.UpdateProperty("material", "coulomb_friction", CoulombFriction(mu, mu))
         if stiffness is not None:
             changed.UpdateProperty("material", "point_contact_stiffness", stiffness)
         scene_graph.AssignRole(plant.get_source_id(), g, changed, RoleAssign.kReplace)
 
 
-def _partner_friction(pair: float, ground: float) -> float:
+def partner_friction(pair: float, ground: float) -> float:
     """What gives the pair, 2ab/(a+b), with the ground's; at most 1e3, where the pair should exceed twice the ground's."""
     return min(pair * ground / (2 * ground - pair), 1e3) if pair < 2 * ground else 1e3
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import Instant, ServoTerm
+from workbench.servo import Instant, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -26,6 +26,9 @@ class _Asymmetric(ServoTerm):
 
     def most_friction_ratio(self) -> Array:
         return np.asarray(1.0 + np.abs(self.share))
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(lopsided=self.share)
 
 
 class FrictionAsymmetry(Effect):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import Instant, ServoLaw, ServoTerm
+from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,10 @@ class _Rubbing(ServoTerm):
 
     def most_friction(self, law: ServoLaw) -> Array:
         return np.asarray(self.here * (self.coefficient + self.static + self.backdrive) * MOST_LOAD * law.full_torque)
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(rubbing=self.here * self.coefficient, rubbing_still=self.here * self.static, rubbing_speed=self.speed,
+                           rubbing_backwards=self.here * self.backdrive)
 
 
 class LoadFriction(Effect):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import Instant, ServoLaw, ServoTerm
+from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,9 @@ class _Sticking(ServoTerm):
 
     def most_friction(self, law: ServoLaw) -> Array:
         return self.torque
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(sticking=self.torque, speed=self.speed)
 
 
 class StribeckFriction(Effect):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec
-from workbench.servo import Instant, ServoLaw, ServoTerm
+from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,9 @@ class _Sagging(ServoTerm):
     def strength(self, law: ServoLaw, now: Instant) -> Array:
         supply = law.full_torque / law.torque_per_volt
         return np.asarray(np.maximum(1.0 - self.drop * np.abs(now.duty).sum() / supply, 0.0))
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(sag=self.drop)
 
 
 class SupplySag(Effect):

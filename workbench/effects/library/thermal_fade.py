@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec
-from workbench.servo import Instant, ServoLaw, ServoTerm
+from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,9 @@ class _Fading(ServoTerm):
 
     def strength(self, law: ServoLaw, now: Instant) -> float:
         return math.exp(-self.rate * now.elapsed)
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(fade=self.rate)
 
 
 class ThermalFade(Effect):

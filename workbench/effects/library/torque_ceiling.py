@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import ServoTerm
+from workbench.servo import ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,9 @@ class _Ceiling(ServoTerm):
 
     def ceiling(self) -> Array:
         return self.most
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(ceiling=self.most)
 
 
 class TorqueCeiling(Effect):

@@ -1,0 +1,39 @@
+/* Vectors, memory, and what the compiler itself may call. */
+#include "../core/bytes.h"
+#include "chip.h"
+#include "registers.h"
+
+extern uint32_t data_load, data_start, data_end, bss_start, bss_end, stack_top;
+
+void *memcpy(void *to, const void *from, size_t n) {
+    uint8_t *d = to;
+    const uint8_t *s = from;
+    while (n--) *d++ = *s++;
+    return to;
+}
+
+void *memset(void *to, int value, size_t n) {
+    uint8_t *d = to;
+    while (n--) *d++ = (uint8_t)value;
+    return to;
+}
+
+static void reset(void) {
+    SCB_VTOR = 0x08003000;
+    for (uint32_t *s = &data_load, *d = &data_start; d < &data_end;) *d++ = *s++;
+    for (uint32_t *d = &bss_start; d < &bss_end;) *d++ = 0;
+    run();
+}
+
+/* A fault stops everything; the watchdog then resets, and the robot stands still and says so. */
+static void stop(void) {
+    for (;;) {
+    }
+}
+
+__attribute__((section(".vectors"), used)) static void (*const vectors[16 + 60])(void) = {
+    (void (*)(void))(uintptr_t)&stack_top, reset, stop, stop, stop, stop, stop, 0, 0, 0, 0, stop, stop, 0, stop, systick_interrupt,
+    [16 + IRQ_DMA1_CHANNEL5] = bus_received_interrupt,
+    [16 + IRQ_USART1] = bus_interrupt,
+    [16 + IRQ_USART3] = pc_interrupt,
+    [16 + IRQ_UART5] = zigbee_interrupt};

@@ -1,0 +1,7 @@
+/* The built-in table, byte for byte the file that `workbench export` writes. */
+    .section .rodata.table, "a"
+    .balign 4
+    .global built_in_table, built_in_table_end
+built_in_table:
+    .incbin TABLE
+built_in_table_end:

@@ -1,0 +1,115 @@
+/* What people and the PC want: START button, remote, frames on the links. */
+#include "robot.h"
+
+static void start(struct robot *r, uint8_t reason) {
+    if (r->joints == 0) return;
+    if (r->state == STATE_STILL || r->state == STATE_LIMP) enter(r, STATE_CHECK, reason, 0xFF);
+    if (r->state != STATE_NEUTRAL) return;
+    enter(r, STATE_PLAY, reason, 0xFF);
+    begin_play(r);
+}
+
+static void stop(struct robot *r, uint8_t reason) {
+    if (r->state == STATE_STILL || r->state == STATE_LIMP) start(r, reason);
+    if (r->state != STATE_PLAY && !(r->state == STATE_RAMP && r->after == STATE_PLAY)) return;
+    r->reason = reason;
+    ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
+}
+
+/* The button acts when it is let go; held, it releases. One that was down when power came is not believed before it was up. */
+static void button(struct robot *r) {
+    if (r->start_pressed != r->pressed) {
+        r->pressed = r->start_pressed;
+        uint32_t lasted = r->now - r->pressed_since;
+        r->pressed_since = r->now;
+        if (!r->pressed && r->armed && !r->held_told && lasted >= BUTTON_MS) {
+            if (r->state == STATE_PLAY) stop(r, REASON_BUTTON);
+            else start(r, REASON_BUTTON);
+        }
+        r->held_told = false;
+        return;
+    }
+    uint32_t lasted = r->now - r->pressed_since;
+    if (!r->pressed && lasted >= BUTTON_MS) r->armed = true;
+    if (r->pressed && r->armed && lasted >= HELD_MS && !r->held_told) {
+        r->held_told = true;
+        if (r->state == STATE_BRIDGE) bridge_end(r, REASON_HELD);
+        react(r, REASON_HELD, 0xFF);
+    }
+}
+
+void commands_tick(struct robot *r) { button(r); }
+
+static void result(struct robot *r, uint8_t link, uint8_t code) {
+    const struct frame_reader *f = &r->link[link].reader;
+    uint8_t payload[5] = {f->type, code, 0, 0, r->upload.sequence};
+    put16(payload + 2, r->upload.got);
+    frame_send(&r->link[link].tx, FRAME_ANSWER, f->number, payload, 5);
+}
+
+static void upload(struct robot *r, uint8_t link) {
+    const struct frame_reader *f = &r->link[link].reader;
+    uint8_t code = r->joints ? upload_frame(&r->upload, f, link, r->now) : UPLOAD_NONE;
+    bool later = f->type == FRAME_END && code == UPLOAD_OK; /* answered when it has been checked */
+    bool quiet = f->type == FRAME_DATA && code == UPLOAD_OK;
+    if (!later && !quiet) result(r, link, code);
+}
+
+static void frame(struct robot *r, uint8_t link) {
+    const struct frame_reader *f = &r->link[link].reader;
+    switch (f->type) {
+    case FRAME_BEGIN:
+    case FRAME_DATA:
+    case FRAME_END:
+        upload(r, link);
+        return;
+    case FRAME_ASK:
+        r->state_told = false;
+        break;
+    case FRAME_PLAY:
+        start(r, REASON_LINK);
+        break;
+    case FRAME_STOP:
+        stop(r, REASON_LINK);
+        break;
+    case FRAME_RELEASE:
+        if (r->state != STATE_BRIDGE && r->joints) enter(r, STATE_LIMP, REASON_LINK, 0xFF);
+        break;
+    case FRAME_BRIDGE:
+        if (link != LINK_PC || torque_on(r) || r->joints == 0) {
+            result(r, link, UPLOAD_BUSY);
+            return;
+        }
+        result(r, link, UPLOAD_OK);
+        bridge_begin(r);
+        return;
+    case FRAME_BRIDGE_END:
+        if (r->state == STATE_BRIDGE) bridge_end(r, REASON_LINK);
+        break;
+    default:
+        return;
+    }
+    result(r, link, UPLOAD_OK);
+}
+
+static void remote(struct robot *r, uint8_t byte) {
+    uint16_t pressed = remote_feed(&r->remote, byte, r->now);
+    if (r->state == STATE_BRIDGE) return;
+    if (pressed == REMOTE_U) start(r, REASON_REMOTE);
+    if (pressed == REMOTE_1) stop(r, REASON_REMOTE);
+}
+
+/* Some bytes of each link at each wake, so that no pose has to wait for a long message. */
+void commands_bytes(struct robot *r) {
+    for (uint8_t link = 0; link < LINKS; link++) {
+        struct links *l = &r->link[link];
+        for (uint32_t k = 0; k < 16u && ring_used(&l->rx); k++) {
+            uint8_t byte = ring_get(&l->rx);
+            bool bridged = link == LINK_PC && r->state == STATE_BRIDGE;
+            if (link == LINK_ZIGBEE) remote(r, byte);
+            if (bridged) bridge_feed(r, byte);
+            if (!frame_feed(&l->reader, byte)) continue;
+            if (!bridged || l->reader.type == FRAME_BRIDGE_END) frame(r, link);
+        }
+    }
+}

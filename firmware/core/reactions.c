@@ -1,0 +1,76 @@
+/* What is done about what is wrong; the table stands in docs/robot.md, and a test goes through its cells. */
+#include "robot.h"
+
+enum reaction reaction_of(uint8_t reason) {
+    switch (reason) {
+    case REASON_SILENT:
+    case REASON_GARBLED:
+    case REASON_WRONG_MODEL:
+    case REASON_OVERLOAD:
+    case REASON_HOT:
+    case REASON_LOW_BATTERY:
+    case REASON_GOAL_REFUSED:
+    case REASON_BRIDGE_SILENT:
+        return YIELD;
+    case REASON_DEAD_SUPPLY:
+    case REASON_BABBLE:
+    case REASON_HELD:
+    case REASON_NOT_ARRIVED:
+        return RELEASE;
+    default:
+        return GO_ON;
+    }
+}
+
+void react(struct robot *r, uint8_t reason, uint8_t servo) {
+    enum reaction what = reaction_of(reason);
+    if (what == GO_ON || !torque_on(r)) return;
+    if (what == RELEASE) {
+        enter(r, STATE_LIMP, reason, servo);
+    } else if (r->state != STATE_YIELD) {
+        r->reason = reason;
+        r->servo_named = servo;
+        ramp_to_neutral(r, STATE_YIELD, STATE_LIMP);
+    }
+}
+
+static void judge_supply(struct robot *r) {
+    uint32_t low = 0, dead = 0, missed = 0, most = r->joints / 2u;
+    for (uint32_t j = 0; j < r->joints; j++) {
+        low += r->servo[j].volts < LOW_DECIVOLT;
+        dead += r->servo[j].volts < DEAD_DECIVOLT;
+        missed += r->servo[j].missed >= SUPPLY_ROUNDS;
+    }
+    r->low_rounds = (uint8_t)(low > most ? r->low_rounds + 1u : 0);
+    r->dead_rounds = (uint8_t)(dead > most ? r->dead_rounds + 1u : 0);
+    if (missed > most || r->dead_rounds >= ALARM_READINGS) react(r, REASON_DEAD_SUPPLY, 0xFF);
+    if (r->low_rounds >= LOW_ROUNDS) {
+        r->low_rounds = LOW_ROUNDS;
+        react(r, REASON_LOW_BATTERY, 0xFF);
+    }
+}
+
+/* After every round of readings. */
+void judge_round(struct robot *r) {
+    if (!torque_on(r)) return;
+    judge_supply(r);
+    for (uint32_t j = 0; j < r->joints && torque_on(r); j++) {
+        const struct servo *s = &r->servo[j];
+        uint8_t id = table_id(playing(r), j);
+        if (s->missed >= DEAD_ROUNDS) react(r, 2u * s->garbled >= s->missed ? REASON_GARBLED : REASON_SILENT, id);
+        if (s->overloaded >= ALARM_READINGS) react(r, REASON_OVERLOAD, id);
+        if (s->hot >= ALARM_READINGS) react(r, REASON_HOT, id);
+    }
+}
+
+/* Every millisecond: bytes that nobody asked for. */
+void judge_stray(struct robot *r) {
+    if (r->now - r->stray_since < STRAY_WINDOW_MS) return;
+    uint32_t heard = r->bus.stray - r->stray_seen;
+    r->stray_seen = r->bus.stray;
+    r->stray_since = r->now;
+    r->stray_windows = (uint8_t)(heard >= STRAY_BYTES ? r->stray_windows + 1u : 0);
+    if (r->stray_windows < STRAY_WINDOWS) return;
+    r->stray_windows = 0;
+    react(r, REASON_BABBLE, 0xFF);
+}

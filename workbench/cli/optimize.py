@@ -1,0 +1,120 @@
+"""`workbench optimize`: a gait that the servos can follow, as a table with a certificate."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from typing import TYPE_CHECKING
+
+from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
+
+if TYPE_CHECKING:
+    from workbench.gait.request import Request
+    from workbench.robot import RobotModel
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "optimize",
+        help="seek a gait that the servos can follow, as a certified table",
+        description="Seeks a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
+        "supply, on a robot that nobody measured (an ensemble of them), and certifies it: gait.csv, start.csv (from neutral into "
+        "it), stop.csv, certificate.json and a page. A request that cannot be met says which limit binds, and exits with 2. "
+        "Stopped and called again with the same arguments it goes on where it was and ends in the same table.")
+    parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as can be (default: max)")
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--backward", action="store_true", help="go backwards")
+    way.add_argument("--sideways", action="store_true", help="go to the left")
+    way.add_argument("--turn", type=_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s")
+    way.add_argument("--arc", type=_positive, metavar="R", help="go round a circle of R m to the left")
+    parser.add_argument("--slope", type=_positive, default=0.0, metavar="DEG", help="go uphill")
+    parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of what "
+                        "full duty gives; ROBOTIS advises a fifth)")
+    best = parser.add_mutually_exclusive_group()
+    best.add_argument("--least-energy", action="store_true", help="with the least electrical power, at the speed asked for or at "
+                      "that of the ROBOTIS walk")
+    best.add_argument("--smoothest", action="store_true", help="with the least jerk of the base, likewise")
+    best.add_argument("--gentlest", action="store_true", help="with the least RMS torque, likewise")
+    parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all point back, as the robot has them")
+    parser.add_argument("--ensemble", metavar="FILE", help="the robots to stand, as YAML (default: the one that ships)")
+    parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
+    add_model(parser)
+    add_out(parser, default="runs/optimize")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Seeks, certifies, writes, and says what came of it."""
+    from workbench.cli.output import output_directory
+    from workbench.cli.progress import Progress
+    from workbench.gait.engines import other_engine
+    from workbench.gait.ensemble import load_ensemble
+    from workbench.gait.machine import GaitMachine
+    from workbench.gait.optimize import memory_key, optimize, options_of, write_gait
+    from workbench.robot.model_file import load_model_file
+    from workbench.view.report.gait import write_gait_page
+
+    model = load_model(args.model)
+    posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
+    machine, ensemble, options = GaitMachine(model), load_ensemble(args.ensemble, posterior), options_of(args.effort, args.seed)
+    request = _request(args, model)
+    with output_directory(args.out) as folder, Progress("optimize") as progress:
+        args.out.mkdir(parents=True, exist_ok=True)
+        memory = args.out / f".search-{memory_key(machine, request, ensemble, options)}.jsonl"
+        result = optimize(machine, request, ensemble, options, progress, memory, other_engine())
+        if result.table is not None and result.certified is not None:
+            progress("drawing")
+            write_gait(folder, result.table, result.certified)
+            write_gait_page(folder, model, result)
+    if not result.met:
+        where = f" (written to {args.out})" if result.table is not None else ""
+        print(f"workbench optimize: {result.problem}{where}", file=sys.stderr)
+        return 2
+    assert result.certified is not None
+    print(result.certified.certificate.summary())
+    print(f"wrote {args.out}: open {args.out / 'report.html'}")
+    return 0
+
+
+def _request(args: argparse.Namespace, model: RobotModel) -> Request:
+    from workbench.gait.limits import GaitLimits
+    from workbench.gait.optimize import walk_speed
+    from workbench.gait.request import Aim, Request, Way
+
+    way: Way = "forward"
+    for name, asked in (("backward", args.backward), ("sideways", args.sideways), ("turn", args.turn), ("arc", args.arc)):
+        way = name if asked else way  # type: ignore[assignment]
+    aim: Aim = "energy" if args.least_energy else "smoothness" if args.smoothest else "gentleness" if args.gentlest else "speed"
+    speed = None if args.speed in (None, math.inf) else args.speed
+    if way == "turn":
+        speed = None if args.turn == math.inf else math.radians(args.turn)
+    elif aim != "speed" and speed is None:
+        speed = walk_speed(model)
+    return Request(way=way, speed=speed, radius=args.arc, slope=math.radians(args.slope), aim=aim,
+                   built_knees=args.knees == "built", limits=GaitLimits(rms=args.rms))
+
+
+def _is_model_file(name: str) -> bool:
+    from pathlib import Path
+
+    from workbench.robot.yaml_file import read_yaml
+
+    if name == PUPPY or Path(name).suffix.lower() not in (".yaml", ".yml"):
+        return False
+    content = read_yaml(name)
+    return isinstance(content, dict) and {"takes", "predict"}.isdisjoint(content)
+
+
+def _speed(text: str) -> float:
+    """A positive number or `max`, for argparse."""
+    return math.inf if text == "max" else _positive(text)
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text}")
+    return value

@@ -1,0 +1,238 @@
+"""Frames on the PC link and over ZigBee, as the controller's program sends and takes them (layout in docs/robot.md)."""
+
+from __future__ import annotations
+
+import binascii
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+SYNC = b"\xa5\x5a"
+PAYLOAD = 204
+"""Longest payload of a frame [bytes]."""
+
+
+class FrameType(IntEnum):
+    """What a frame is; from 0x80 on the controller's."""
+
+    ASK = 0x01
+    PLAY = 0x02
+    STOP = 0x03
+    RELEASE = 0x04
+    BEGIN = 0x10
+    DATA = 0x11
+    END = 0x12
+    BRIDGE = 0x20
+    BRIDGE_END = 0x21
+    STATE = 0x80
+    ANSWER = 0x81
+    LOG = 0x90
+
+
+class ControllerState(IntEnum):
+    """What the controller is at (firmware/core/robot.h)."""
+
+    STILL = 0
+    LIMP = 1
+    CHECK = 2
+    RAMP = 3
+    NEUTRAL = 4
+    PLAY = 5
+    STOP = 6
+    YIELD = 7
+    BRIDGE = 8
+
+
+REASONS = (
+    "none", "power on", "reset button", "watchdog: the program hung", "reset by program", "brown-out", "button", "remote", "PC link",
+    "the table came to its end", "a servo is silent", "a servo's answers are garbled (two with one ID, or a bad line)",
+    "a servo of another model", "a servo is overloaded", "a servo is hot", "the battery is low", "the servos' supply is dead",
+    "somebody babbles on the bus", "a joint did not arrive", "a servo does not take its goal",
+    "a servo's angle limits are narrower than the table", "START was held", "the PC fell silent in bridge mode",
+    "the built-in table is broken", "a joint was moving before torque went on",
+)
+"""Why a state was entered, by the controller's number."""
+
+TABLE_FAULTS = (
+    "none", "too short", "not a table", "another version", "number of joints", "no poses", "flags", "size", "bus IDs", "bounds",
+    "a dwell", "a goal out of bounds", "a speed out of bounds", "CRC", "for another robot", "its first pose is out of reach",
+)
+UPLOAD_RESULTS = ("taken", "another upload is under way", "no upload is under way", "bytes are missing", "its number was there before",
+                  "too big", "malformed")
+UPLOAD_FAULT = 0x10
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: type, its number (0 to 255), payload."""
+
+    type: int
+    number: int
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class StateMessage:
+    """What the controller is at since `time` [s of its own clock], why, which servo it blames (bus ID or None), which reset it
+    woke from, what was wrong with the last table, number of the last table taken, battery [V]."""
+
+    time: float
+    state: ControllerState
+    reason: str
+    servo: int | None
+    woke_from: str
+    table_fault: str
+    accepted: int
+    battery: float
+
+
+@dataclass(frozen=True)
+class AnswerMessage:
+    """What became of a frame of ours: its type and number, result in words, how many bytes of a table have come, whether all is well."""
+
+    type: int
+    number: int
+    result: str
+    received: int
+    well: bool
+
+
+@dataclass(frozen=True)
+class SlowReading:
+    """What changes seldom of one joint: speed and load as the servo's registers hold them, voltage [V], temperature [deg C]."""
+
+    joint: int
+    speed: int
+    load: int
+    voltage: float
+    temperature: int
+
+
+@dataclass(frozen=True)
+class LogMessage:
+    """One round of readings: it began at `time` [s of the controller's clock] and took `duration` [s], joints evenly in between.
+
+    goals, positions: (n,) counts; position None where the servo did not answer. slow: three joints' slow values. pose: counts of
+    poses sent in this cycle.
+    """
+
+    time: float
+    duration: float
+    state: ControllerState
+    pose: int
+    battery: float
+    goals: tuple[int, ...]
+    positions: tuple[int | None, ...]
+    slow: tuple[SlowReading, ...]
+
+
+Message = StateMessage | AnswerMessage | LogMessage
+
+_STATE = struct.Struct("<I6BH")
+_ANSWER = struct.Struct("<BBHB")
+_LOG = struct.Struct("<IBBHBHI")
+_SLOW = struct.Struct("<HHBB")
+
+
+def crc16(data: bytes) -> int:
+    """CCITT, start 0xFFFF."""
+    return binascii.crc_hqx(data, 0xFFFF)
+
+
+def frame(kind: int, payload: bytes = b"", number: int = 0) -> bytes:
+    """A frame's bytes; ValueError where the payload is too long."""
+    if len(payload) > PAYLOAD:
+        raise ValueError(f"payload of {len(payload)} bytes; a frame takes {PAYLOAD}")
+    body = bytes([kind, number, len(payload)]) + payload
+    return SYNC + body + struct.pack("<H", crc16(body))
+
+
+class FrameReader:
+    """Finds whole frames with a right sum in a stream; everything else is skipped, byte for byte as the controller skips it."""
+
+    def __init__(self) -> None:
+        self._body = bytearray()
+        self._sync = 0
+        self.broken = 0
+        """Frames whose sum was wrong."""
+
+    def feed(self, data: bytes) -> Iterator[Frame]:
+        """Frames that end in these bytes."""
+        for value in data:
+            got = self._take(value)
+            if got is not None:
+                yield got
+
+    def _take(self, value: int) -> Frame | None:
+        if self._sync < 2:
+            if value == SYNC[self._sync]:
+                self._sync += 1
+            else:
+                self._sync = 1 if value == SYNC[0] else 0
+            return None
+        body = self._body
+        body.append(value)
+        if len(body) < 3 or (body[2] <= PAYLOAD and len(body) < body[2] + 5):
+            return None
+        whole = bytes(body)
+        body.clear()
+        self._sync = 0
+        if whole[2] > PAYLOAD:
+            return None
+        if crc16(whole[:-2]) != struct.unpack("<H", whole[-2:])[0]:
+            self.broken += 1
+            return None
+        return Frame(whole[0], whole[1], whole[3:-2])
+
+
+def message(got: Frame) -> Message | None:
+    """What a frame of the controller says; None for types that mean nothing here, or a payload that does not fit."""
+    try:
+        if got.type == FrameType.STATE:
+            return _state(got.payload)
+        if got.type == FrameType.ANSWER:
+            return _answer(got)
+        if got.type == FrameType.LOG:
+            return _log(got)
+    except (struct.error, ValueError, IndexError):
+        pass
+    return None
+
+
+def _state(payload: bytes) -> StateMessage:
+    ms, state, reason, servo, cause, fault, accepted, battery = _STATE.unpack(payload)
+    return StateMessage(ms / 1000, ControllerState(state), REASONS[reason], None if servo == 0xFF else servo, REASONS[cause],
+                        TABLE_FAULTS[fault], accepted, battery / 10)
+
+
+def _answer(got: Frame) -> AnswerMessage:
+    kind, code, received, _ = _ANSWER.unpack(got.payload)
+    result = TABLE_FAULTS[code - UPLOAD_FAULT] if code >= UPLOAD_FAULT else UPLOAD_RESULTS[code]
+    return AnswerMessage(kind, got.number, result, received, code == 0)
+
+
+def _log(got: Frame) -> LogMessage:
+    """The number of a log frame is that of its joints."""
+    n = got.number
+    ms, took, state, pose, first, battery, answered = _LOG.unpack_from(got.payload)
+    if len(got.payload) != _LOG.size + 4 * n + 3 * _SLOW.size:
+        raise ValueError("another number of joints")
+    counts = struct.unpack_from(f"<{2 * n}H", got.payload, _LOG.size)
+    slow = []
+    for k in range(3):
+        speed, load, volts, heat = _SLOW.unpack_from(got.payload, _LOG.size + 4 * n + _SLOW.size * k)
+        slow.append(SlowReading((first + k) % n, speed, load, volts / 10, heat))
+    positions = tuple(p if answered >> j & 1 else None for j, p in enumerate(counts[1::2]))
+    return LogMessage(ms / 1000, took / 1000, ControllerState(state), pose, battery / 10, counts[::2], positions, tuple(slow))
+
+
+def upload_frames(table: bytes, sequence: int, ramps: bool = False) -> list[bytes]:
+    """Frames that bring a table over: BEGIN, DATA in order, END. sequence: one more than the last taken, modulo 256. ramps: where
+    its first pose is out of reach, ramp there instead of refusing."""
+    begin = struct.pack("<IIBB", len(table), binascii.crc32(table), sequence, int(ramps))
+    frames = [frame(FrameType.BEGIN, begin)]
+    step = PAYLOAD - 4
+    for at in range(0, len(table), step):
+        frames.append(frame(FrameType.DATA, struct.pack("<H", at) + table[at:at + step]))
+    return [*frames, frame(FrameType.END)]

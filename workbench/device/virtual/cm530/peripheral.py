@@ -1,0 +1,35 @@
+"""What every peripheral is: words at offsets, dead while its clock is off."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from workbench.device.virtual.cm530.board import Board
+
+
+class Peripheral:
+    """Words that can be read and written; sub-classes give some of them a meaning. gate: RCC register offset and bit of its
+    clock, None where it is always on."""
+
+    known: frozenset[int] = frozenset()
+
+    def __init__(self, board: Board, gate: tuple[int, int] | None) -> None:
+        self.board, self.gate = board, gate
+        self.words: dict[int, int] = {}
+
+    def reset(self) -> None:
+        """As after a reset of the chip."""
+        self.words = {}
+
+    def read(self, offset: int) -> int:
+        """A word."""
+        return self.words.get(offset, 0)
+
+    def write(self, offset: int, value: int) -> None:
+        """A word."""
+        self.words[offset] = value
+
+    def interrupts(self) -> bool:
+        """Whether its interrupt line is up."""
+        return False

@@ -1,0 +1,231 @@
+"""USARTs with byte times, and the DMA channels that serve them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from workbench.device.virtual.clock import SECOND
+from workbench.device.virtual.cm530.peripheral import Peripheral
+
+if TYPE_CHECKING:
+    from workbench.device.virtual.cm530.board import Board
+
+SR, DR, BRR, CR1, CR2, CR3 = 0x00, 0x04, 0x08, 0x0C, 0x10, 0x14
+ORE, RXNE, TC, TXE = 1 << 3, 1 << 5, 1 << 6, 1 << 7
+RE, TE, RXNEIE, TCIE, TXEIE, UE = 1 << 2, 1 << 3, 1 << 5, 1 << 6, 1 << 7, 1 << 13
+DMAR, DMAT = 1 << 6, 1 << 7
+
+
+class Usart(Peripheral):
+    """One USART. `sends` takes (bytes, bit rate, start [ticks]) and puts them on the wire."""
+
+    known = frozenset((SR, DR, BRR, CR1, CR2, CR3))
+
+    def __init__(self, board: Board, gate: tuple[int, int], fast: bool, sends: Callable[[bytes, int, int], None]) -> None:
+        super().__init__(board, gate)
+        self._fast, self._sends = fast, sends
+        self.tx_dma: Channel | None = None
+        self.rx_dma: Channel | None = None
+        self._hold: int | None = None
+        self._shifting_until = -1
+        self._received = 0
+        self._epoch = 0
+
+    def reset(self) -> None:
+        """Off, nothing under way."""
+        self.words = {SR: TC | TXE}
+        self._hold = None
+        self._shifting_until = -1
+        self._epoch += 1
+
+    @property
+    def rate(self) -> int:
+        """bit/s."""
+        clocks = self.board.clocks
+        return (clocks.hertz if self._fast else clocks.slow_hertz) // max(self.words.get(BRR, 0), 1)
+
+    @property
+    def byte(self) -> int:
+        """Duration of a byte [ticks]."""
+        return 10 * SECOND // self.rate
+
+    @property
+    def _status(self) -> int:
+        return self.words[SR]
+
+    def read(self, offset: int) -> int:
+        """Reading DR takes RXNE and ORE away."""
+        if offset != DR:
+            return super().read(offset)
+        self.words[SR] &= ~(RXNE | ORE)
+        return self._received
+
+    def write(self, offset: int, value: int) -> None:
+        """DR sends; SR's TC and RXNE can only be cleared."""
+        if offset == DR:
+            self._send(value & 0xFF)
+        elif offset == SR:
+            self.words[SR] &= value | ~(TC | RXNE)
+        else:
+            super().write(offset, value)
+        if offset in (CR1, CR3, SR):
+            if self.tx_dma is not None:
+                self.tx_dma.serve()
+            self.board.cpu.wish()
+
+    def interrupts(self) -> bool:
+        """TC, TXE and RXNE (or ORE), each if enabled."""
+        control, status = self.words.get(CR1, 0), self._status
+        return bool((control & TCIE and status & TC) or (control & TXEIE and status & TXE)
+                    or (control & RXNEIE and status & (RXNE | ORE)))
+
+    def _send(self, value: int) -> None:
+        if self.words.get(CR1, 0) & (UE | TE) != UE | TE:
+            return
+        self.words[SR] &= ~TC
+        if self._shifting_until > self.board.clock.now:
+            self._hold = value
+            self.words[SR] &= ~TXE
+            return
+        self._shift(value)
+
+    def _shift(self, value: int) -> None:
+        now = self.board.clock.now
+        self._shifting_until = now + self.byte
+        self._sends(bytes([value]), self.rate, now)
+        epoch = self._epoch
+        self.board.clock.at(self._shifting_until, lambda: self._shifted(epoch))
+
+    def _shifted(self, epoch: int) -> None:
+        if epoch != self._epoch:
+            return
+        if self._hold is not None:
+            value, self._hold = self._hold, None
+            self._shift(value)
+            self.words[SR] |= TXE
+        else:
+            self.words[SR] |= TC | TXE
+        self.board.cpu.wish()
+
+    def send_block(self, data: bytes, ended: Callable[[], None]) -> None:
+        """What DMA brings: back to back from now."""
+        start = max(self.board.clock.now, self._shifting_until)
+        self._shifting_until = start + self.byte * len(data)
+        self.words[SR] &= ~TC
+        self._sends(data, self.rate, start)
+        epoch = self._epoch
+
+        def done() -> None:
+            if epoch != self._epoch:
+                return
+            self.words[SR] |= TC | TXE
+            ended()
+            self.board.cpu.wish()
+
+        self.board.clock.at(self._shifting_until, done)
+
+    @property
+    def sending(self) -> bool:
+        """Whether bytes are under way."""
+        return self._shifting_until > self.board.clock.now
+
+    def receive(self, value: int) -> None:
+        """One byte has come in."""
+        if self.words.get(CR1, 0) & (UE | RE) != UE | RE:
+            return
+        if self.words.get(CR3, 0) & DMAR and self.rx_dma is not None and self.rx_dma.take(value):
+            return
+        if self._status & RXNE:
+            self.words[SR] |= ORE
+        else:
+            self._received = value
+            self.words[SR] |= RXNE
+        self.board.cpu.wish()
+
+
+class Dma(Peripheral):
+    """DMA1: channels 2 (USART3 out), 4 and 5 (USART1 out and in)."""
+
+    known = frozenset({0, 4} | {0x08 + 20 * (k - 1) + 4 * w for k in (2, 4, 5) for w in range(4)})
+
+    def __init__(self, board: Board, gate: tuple[int, int]) -> None:
+        super().__init__(board, gate)
+        self.channels = {k: Channel(self, k) for k in (2, 4, 5)}
+
+    def read(self, offset: int) -> int:
+        """Counters are as of now."""
+        if offset == 0x08 + 20 * 4 + 4:
+            self.board.bus.settle()
+        return super().read(offset)
+
+    def write(self, offset: int, value: int) -> None:
+        """IFCR clears flags; an enabled channel starts."""
+        if offset == 4:
+            for channel in range(7):
+                if value >> 4 * channel & 1:
+                    self.words[0] = self.words.get(0, 0) & ~(15 << 4 * channel)
+            self.words[0] = self.words.get(0, 0) & ~value
+            return
+        if offset >= 8 and (offset - 8) % 20 == 0:
+            self.board.bus.settle()
+        super().write(offset, value)
+        if offset >= 8 and (offset - 8) % 20 == 0:
+            channel = self.channels[(offset - 8) // 20 + 1]
+            channel.armed = self.board.clock.now
+            channel.serve()
+
+    def finished(self, channel: int) -> None:
+        """Transfer complete."""
+        self.words[0] = self.words.get(0, 0) | 3 << 4 * (channel - 1)
+        self.board.cpu.wish()
+
+    def waits(self, channel: int) -> bool:
+        """Whether the channel's interrupt line is up."""
+        return bool(self.words.get(0, 0) >> 4 * (channel - 1) & 2 and self.channels[channel].control & 2)
+
+
+class Channel:
+    """One DMA channel; its words live in the controller's."""
+
+    def __init__(self, dma: Dma, number: int) -> None:
+        self.dma, self.number = dma, number
+        self.base = 0x08 + 20 * (number - 1)
+        self.usart: Usart | None = None
+        self.armed = 0
+        self._under_way = False
+        self._taken = 0
+
+    @property
+    def control(self) -> int:
+        """CCR."""
+        return self.dma.words.get(self.base, 0)
+
+    def serve(self) -> None:
+        """Memory to USART: starts once channel and USART are both enabled."""
+        usart, words = self.usart, self.dma.words
+        if not self.control & 1:
+            self._under_way = False
+            self._taken = 0
+        if usart is None or self._under_way or not self.control & 1 or not self.control & 16 or not words.get(self.base + 4):
+            return
+        if usart.words.get(CR1, 0) & (UE | TE) != UE | TE or not usart.words.get(CR3, 0) & DMAT:
+            return
+        self._under_way = True
+        count = words[self.base + 4]
+        words[self.base + 4] = 0
+        data = bytes(self.dma.board.cpu.uc.mem_read(words[self.base + 12], count))
+        usart.send_block(data, lambda: self.dma.finished(self.number))
+
+    def take(self, value: int) -> bool:
+        """USART to memory: one byte; False where the channel is off or has had all."""
+        words = self.dma.words
+        left = words.get(self.base + 4, 0)
+        if not self.control & 1 or self.control & 16 or not left:
+            return False
+        words[self.base + 4] = left - 1
+        self.dma.board.cpu.uc.mem_write(words[self.base + 12] + self._taken, bytes([value]))
+        self._taken += 1
+        if left == 1:
+            self.dma.finished(self.number)
+        return True

@@ -1,0 +1,133 @@
+"""The certificate of a gait: one JSON file, bound by hash to its tables and its model."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from workbench.gait.evaluate import table_sha256
+from workbench.gait.limits import Margin
+from workbench.motion import Motion, PoseTable
+from workbench.robot import InputError, RobotModel
+from workbench.robot.files import read_text
+
+NAME = "certificate.json"
+MARK = "made by workbench optimize; its certificate is certificate.json beside it"
+"""What stands in the first line of a motion that has a certificate."""
+CLAIM = ("All numbers are the model's. On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went "
+         "37: a speed here is a claim about the model until a robot has walked it.")
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What was found out about a gait. Angles in degrees.
+
+    kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait, start, stop). margins: of
+    limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the quantiles 0, 5, 50, 95, 100 % over the
+    ensemble; falls, and how many were drawn. floor: by which steps and contact models move speed and heading. other_engine: the
+    same table elsewhere; empty where it was not asked. ways: the way in and out. provenance: versions, seeds, time.
+    """
+
+    kept: bool
+    request: str
+    tables: Mapping[str, str]
+    model_sha256: str
+    margins: tuple[Margin, ...]
+    nominal: Mapping[str, Any]
+    draws: Mapping[str, Any]
+    floor: Mapping[str, Any]
+    other_engine: Mapping[str, Any]
+    ways: Mapping[str, Any]
+    shape: Mapping[str, Any]
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_text(self) -> str:
+        """The file: JSON with the sha256 of all that stands before it."""
+        content = {"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"},
+                   "margins": [vars(m) for m in self.margins]}
+        content["sha256"] = _digest(content)
+        return json.dumps(content, indent=1, allow_nan=False, default=_plain) + "\n"
+
+
+    def summary(self) -> str:
+        """In a few lines, for a person."""
+        n, d = self.nominal, self.draws
+        turns = n["unit"] == "rad/s"
+        unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)
+        lines = [f"{self.request}: {factor * n['speed']:.3g} {unit} on the nominal robot of the model"]
+        if d.get("count"):
+            low = factor * d[f"speed {n['unit']}"][1]
+            lines.append(f"{d['count']} robots nobody measured: {d['falls']} fell, 5th percentile {low:.3g} {unit}, heading "
+                         f"{d['heading deg/m RMS']:.2g} deg/m RMS")
+        worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
+        lines.append(f"binds: {worst}")
+        advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)
+        if advice is not None and advice.use > 1:
+            lines.append(f"warning: beyond {advice}: it heats")
+        if self.other_engine:
+            e = self.other_engine
+            apart = f"heading {e['heading apart deg/m']:+.1f} deg/m apart"
+            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}")
+        return "\n".join(lines)
+
+
+def read_certificate(path: str | Path) -> Certificate:
+    """Reads the file; InputError where it is missing, not whole or was changed."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "the certificate is missing")
+    try:
+        content = json.loads(read_text(path))
+        digest = content.pop("sha256")
+        margins = tuple(Margin(**m) for m in content.pop("margins"))
+        kept = {k: content[k] for k in Certificate.__dataclass_fields__ if k != "margins"}
+        good = content["format"] == 1 and digest == _digest({**content, "margins": [vars(m) for m in margins]})
+    except (ValueError, KeyError, TypeError, AttributeError) as e:
+        raise InputError(path, f"not a certificate ({type(e).__name__}: {e})") from None
+    if not good:
+        raise InputError(path, "the certificate was changed after it was written")
+    return Certificate(margins=margins, **kept)
+
+
+def has_mark(path: str | Path) -> bool:
+    """Whether a motion file says that `optimize` made it."""
+    file = Path(str(path).partition("#")[0])
+    return file.is_file() and file.suffix.lower() == ".csv" and MARK in read_text(file).split("\n", 1)[0]
+
+
+def check_certificate(path: str | Path, motion: Motion, model: RobotModel) -> Certificate:
+    """The certificate beside a motion file that `optimize` made; InputError where it is absent, another's, broken, or says that a
+    limit is broken."""
+    certificate = read_certificate(Path(path).parent / NAME)
+    at = Path(path).parent / NAME
+    if table_sha256(motion.as_table()) not in certificate.tables.values():
+        raise InputError(at, f"it is another table's than {Path(path).name}")
+    if certificate.model_sha256 != model.sha256:
+        raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
+    if not certificate.kept:
+        broken = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
+        raise InputError(at, f"it says that a limit is broken: {broken}")
+    return certificate
+
+
+def hashes(**tables: PoseTable) -> dict[str, str]:
+    """sha256 by name."""
+    return {name: table_sha256(t) for name, t in tables.items()}
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    said = json.dumps({k: v for k, v in content.items() if k != "sha256"}, sort_keys=True, default=_plain)
+    return hashlib.sha256(said.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return dict(value)
+    if hasattr(value, "item"):
+        return value.item()
+    raise TypeError(f"expected plain types, got {type(value).__name__}")

@@ -1,0 +1,75 @@
+"""What the feet of a simulated gait did: slip, clearance, and how far the robot was from tipping over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.gait.legs import Leg
+from workbench.recording.mocap import quaternions
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+
+TOUCHING = 1.5e-3
+"""Height of a foot's tip [m] below which it carries load: what points of 1e4 N/m and a foot tilted by 10 deg make of it."""
+
+
+@dataclass(frozen=True)
+class FeetMeasure:
+    """slip: mean speed over the ground of feet that touch it [m/s]. clearance: the least over feet and cycles of how high a foot
+    comes [m]. tipping: least angle [rad] between the base's tilt and that at which the middle between the neutral feet
+    carries the centre of mass over their edge."""
+
+    slip: float
+    clearance: float
+    tipping: float
+
+
+def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float) -> FeetMeasure:
+    """Of a free take from `begin` [s] on, in whole cycles of `period` [s]. Feet are where the model's kinematics put them."""
+    places = tip_places(take, model, legs)
+    inside = take.time >= begin - 1e-9
+    z = places[:, :, 2] - _floor(places[:, :, 2], take.time < 0)
+    speed = np.linalg.norm(np.gradient(places[:, :, :2], take.time, axis=0), axis=2)
+    down = (z < TOUCHING) & inside[:, None]
+    cycles = range(max(int((take.time[-1] - begin) / period + 1e-6), 1))
+    tops = [z[(take.time >= begin + k * period - 1e-9) & (take.time < begin + (k + 1) * period)].max(axis=0) for k in cycles]
+    return FeetMeasure(slip=float(speed[down].mean()) if down.any() else float("nan"),
+                       clearance=float(np.min(tops)), tipping=_tipping_angle(model, legs) - _tilt(take))
+
+
+def tip_places(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> Array:
+    """The feet's tips in W (N, F, 3) [m]."""
+    assert take.p_WB is not None
+    assert take.quat_WB is not None
+    poses, R_WB = model.kinematics.forward(take.q, take.joints), quaternions.matrix(take.quat_WB)
+    out = np.empty((len(take), len(legs), 3))
+    for i, leg in enumerate(legs):
+        p, R = poses[leg.link]
+        out[:, i] = take.p_WB + np.einsum("nij,nj->ni", R_WB, p + R @ leg.tip)
+    return out
+
+
+def _floor(z: Array, resting: NDArray[np.bool_]) -> Array:
+    """Where each foot's tip stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
+    return np.asarray(np.median(z[resting], axis=0) if resting.any() else z.min(axis=0))
+
+
+def _tilt(take: Take) -> float:
+    assert take.quat_WB is not None
+    _, x, y, _ = take.quat_WB.T
+    return float(np.arccos(np.clip((1 - 2 * (x * x + y * y)).min(), -1, 1)))
+
+
+def _tipping_angle(model: RobotModel, legs: tuple[Leg, ...]) -> float:
+    """Tilt [rad] about the nearest edge of the neutral feet's rectangle at which the centre of mass is above it."""
+    k = model.kinematics
+    poses = k.forward(np.zeros((1, len(k.joints))))
+    com = sum(k.masses[link] * (p[0] + R[0] @ k.centers[link]) for link, (p, R) in poses.items()) / k.mass
+    feet = np.array([leg.neutral for leg in legs])
+    reach = np.minimum(feet.max(axis=0) - com, com - feet.min(axis=0))[:2].min()
+    return float(np.arctan2(reach, com[2] - feet[:, 2].min()))

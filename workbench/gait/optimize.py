@@ -1,0 +1,182 @@
+"""From a request to a certified table."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.gait.certificate import MARK, NAME
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.ensemble import Ensemble
+from workbench.gait.evaluate import Candidate, Evaluator
+from workbench.gait.limits import Margin, binding
+from workbench.gait.machine import GaitMachine
+from workbench.gait.measure import measure
+from workbench.gait.request import Request
+from workbench.gait.search import Budget, Found, search
+from workbench.gait.shape import GaitShape
+from workbench.gait.table import GaitTable, gait_table
+from workbench.motion import Motion, load_motion
+from workbench.motion.files import motion_text
+from workbench.robot import InputError, RobotModel, data_file
+from workbench.robot.files import write_together
+from workbench.simulation import Job, SimulationConfig, simulate_batch
+
+WALK = "robotis_walk.csv"
+"""The vendor's walk, whose speed is the one to keep where a request does not say another."""
+
+
+@dataclass(frozen=True)
+class OptimizeOptions:
+    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start
+    from."""
+
+    budget: Budget = field(default_factory=Budget)
+    certify: CertifyOptions = field(default_factory=CertifyOptions)
+    seed: int = 0
+    n_jobs: int = 2
+    given: tuple[GaitShape, ...] = ()
+
+
+@dataclass(frozen=True)
+class Optimized:
+    """What came of a request. met: whether its gait keeps every limit and the speed asked for. problem: else, in a line, which
+    limit binds, and what works. table, certified: of the gait, or of the nearest that works; None where none does."""
+
+    request: Request
+    met: bool
+    problem: str
+    table: GaitTable | None
+    certified: Certified | None
+    found: Found | None
+
+
+def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions, progress: Progress,
+             memory: Path | None = None, other: tuple[str, OtherEngine] | None = None) -> Optimized:
+    """Seeks and certifies. memory: a file that lets a run that was killed go on; the same request with the same seed and code
+    ends in the same table."""
+    impossible = out_of_reach(machine, request)
+    if impossible is not None:
+        return Optimized(request, False, f"cannot be met by any gait: {impossible}", None, None, None)
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
+        draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
+        evaluator = Evaluator(machine, request, draws, memory, options.n_jobs)
+        found = search(evaluator, options.budget, options.seed, progress, options.given)
+        chosen = found.best if found.best.good else found.nearest
+        if chosen is None:
+            return Optimized(request, False, _unmet(request, found, None), None, None, found)
+        fresh = ensemble.draws(machine.model, options.certify.draws, 2 * options.seed + 1, Path(folder))
+        table = gait_table(machine, chosen.shape)
+        provenance: dict[str, Any] = {
+            "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
+            "ensemble_sha256": ensemble.sha256, "generations": found.generations, "rollouts": found.rollouts,
+            "searched in": round(time.monotonic() - began, 1)}
+        certified = certify(machine, request, table, fresh, options.certify, progress, provenance, other)
+    met = found.best.good and certified.certificate.kept
+    return Optimized(request, met, "" if met else _unmet(request, found, certified), table, certified, found)
+
+
+def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
+    """What no gait can do, told before any search: speed beyond what feet reach at the servos' no-load speed, a slope beyond
+    friction."""
+    law = machine.law
+    legs = {leg.foot: max(float(law.full_torque[i] / law.back_emf[i]) for i in map(machine.model.joints.index, leg.joints))
+            for leg in machine.legs}
+    if request.speed is not None:
+        fastest = min(2 * legs[leg.foot] * leg.length for leg in machine.legs)  # two joints of a leg that add up
+        if request.way == "turn":
+            fastest /= min(float(np.hypot(*leg.neutral[:2])) for leg in machine.legs)
+        if request.speed > fastest:
+            return Margin("foot speed", "servos at no load", request.speed, fastest, request.unit, request.speed / fastest)
+    friction = machine.model.ground.friction
+    if friction is not None and math.tan(request.slope) > friction:
+        bound = math.degrees(math.atan(friction))
+        return Margin("slope", f"friction {friction:g}", math.degrees(request.slope), bound, "deg",
+                      math.degrees(request.slope) / bound)
+    return None
+
+
+def walk_speed(model: RobotModel) -> float:
+    """Speed of the ROBOTIS walk on this robot [m/s], in its servos. InputError for a robot that cannot play it forwards."""
+    try:
+        motion = load_motion(data_file(WALK), model)
+    except InputError:
+        raise InputError(None, "the ROBOTIS walk is not for this robot; expected a speed (--speed V)") from None
+    take = simulate_batch([Job(model, SimulationConfig(), motion.commands(13), 6.0)])[0]
+    speed = measure(take, model, motion.duration, motion.duration).speed
+    if speed <= 0:
+        raise InputError(None, "the ROBOTIS walk does not go forwards on this robot; expected a speed (--speed V)")
+    return speed
+
+
+def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:
+    """Names and contents: the gait, the ways in and out, the certificate."""
+    files = {f"{name}.csv": motion_text(Motion.from_table(t), MARK)
+             for name, t in (("gait", table.cycle), ("start", table.start), ("stop", table.stop))}
+    return files | {NAME: certified.certificate.as_text()}
+
+
+def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Path]:
+    """Writes them, all or none."""
+    return write_together(folder, gait_files(table, certified))
+
+
+def memory_key(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions) -> str:
+    """What a remembered search must be of to be gone on with."""
+    said = [machine.model.sha256, repr(request), ensemble.sha256, asdict(options.budget), options.seed,
+            [asdict(s) for s in options.given]]
+    return hashlib.sha256(json.dumps(said, default=str).encode()).hexdigest()[:16]
+
+
+def shape_from(content: dict[str, Any]) -> GaitShape:
+    """The shape that a certificate holds."""
+    return GaitShape(**{**content, "knees": tuple(content["knees"])})
+
+
+def _unmet(request: Request, found: Found, certified: Certified | None) -> str:
+    """In a line: what binds, by how much, and what works."""
+    said = f"{request}: not met"
+    limits: Sequence[Margin] = found.best.margins
+    if found.best.good and certified is not None:
+        limits = certified.certificate.margins
+    limit = binding(_without_speed(limits, found)) if not found.best.good else binding(limits)
+    if limit is not None:
+        said += f"; {limit} binds ({100 * (limit.use - 1):+.0f} %)"
+    if found.nearest is not None and not found.best.good:
+        said += f"; the nearest table that keeps every limit goes {_speed(request, found.nearest)}"
+    return said
+
+
+def _without_speed(margins: Sequence[Margin], found: Found) -> list[Margin]:
+    """Of a gait that is too slow: what keeps it from being faster, if something else is at its limit."""
+    others = [m for m in margins if not m.name.startswith("speed")]
+    tight = [m for m in others if m.use > 0.97 and not m.advice]
+    return tight if tight and found.best.nominal is not None else list(margins)
+
+
+def _speed(request: Request, c: Candidate) -> str:
+    assert c.nominal is not None
+    value = request.progress(c.nominal)
+    return f"{math.degrees(value):.0f} deg/s" if request.way == "turn" else f"{value:.2f} m/s"
+
+
+def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
+    """Options for an effort: 1 is a first look with few draws, 4 the default, beyond that the search is longer."""
+    budget, examined = Budget(), CertifyOptions(n_jobs=n_jobs)
+    scale = effort / 4
+    budget = replace(budget, seeds=round(budget.seeds * min(scale, 2.0)), generations=max(3, round(budget.generations * scale)),
+                     robust=max(3, round(budget.robust * scale)), draws=max(4, min(16, round(16 * scale))))
+    if effort == 1:
+        examined = replace(examined, draws=8, checked=0, seconds=4.0)
+    return OptimizeOptions(budget, examined, seed, n_jobs)

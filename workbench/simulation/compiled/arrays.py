@@ -1,0 +1,208 @@
+"""The compiled station's data: a robot, its schedule and its state as plain arrays, grouped by what they describe.
+
+n joints turn (servos' and those put between servo and link), m of them are servos', in the model's order. The root R is the base,
+or the world where the base is held. nv = n + 6 velocities: of a free base its w_WB and v_WB, both in W, then the joints', as in
+Drake. Bodies are numbered by their joint, the root is number n. Everything is SI; all arrays are C-contiguous.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Tree(NamedTuple):
+    """Kinematics, inertia and what acts on joints. parent (n,): body that carries each joint. path (nv,): the velocity before
+    each on the way to the root, -1 at its end. group (nv,): the tree of Drake's forest that a velocity belongs to. R (n, 3, 3), p
+    (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3), inertia (n+1, 6): of bodies in their
+    joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping, stiffness, rest, lower, upper (n,): of
+    joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while it holds. gravity, pull (3,): the
+    latter on the base's origin."""
+
+    free: bool
+    parent: Ints
+    path: Ints
+    group: Ints
+    R: Array
+    p: Array
+    axis: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    armature: Array
+    damping: Array
+    stiffness: Array
+    rest: Array
+    lower: Array
+    upper: Array
+    brake: Array
+    brake_gain: Array
+    gravity: Array
+    pull: Array
+
+
+class Servos(NamedTuple):
+    """The law's constants (m,) and what servos do beyond it. joint (m,): number of each. zero (m,) [rad]: of the link.
+
+    terms: whether there is anything beyond. varies: whether friction does. most (m,): the most friction. ceiling (m,).
+    sag (a,): volts lost for each servo at full duty, by term; supply (m,) [V]. fade [1/s]. sticking (b, m), speed (b,):
+    friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it at
+    rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates. lopsided
+    (d, m): shares by which friction is more forwards, by term."""
+
+    joint: Ints
+    zero: Array
+    gain: Array
+    margin: Array
+    punch: Array
+    full_torque: Array
+    back_emf: Array
+    viscous: Array
+    coulomb: Array
+    terms: bool
+    varies: bool
+    most: Array
+    ceiling: Array
+    sag: Array
+    supply: Array
+    fade: float
+    sticking: Array
+    speed: Array
+    rubbing: Array
+    still: Array
+    still_speed: Array
+    backwards: Array
+    bend: Array
+    lopsided: Array
+
+
+class Shapes(NamedTuple):
+    """Collision shapes. body (s,); p (s, 3) their middle, R (s, 3, 3) and half (s, 3): their box, in the body's frame; radius
+    (s,): of spheres, 0 of others. stiffness, dissipation, friction, depth (s,): of the pair with the ground; where between ground
+    (0) and shape (1) the contact point is. bodies (b,), middle (b, 3), reach (b,): a ball round the shapes of each body that has
+    any. near (k, 2): numbers in `bodies` of those that can touch each other. may_touch (s, s)."""
+
+    body: Ints
+    p: Array
+    R: Array
+    half: Array
+    radius: Array
+    stiffness: Array
+    dissipation: Array
+    friction: Array
+    depth: Array
+    bodies: Ints
+    middle: Array
+    reach: Array
+    near: Ints
+    may_touch: NDArray[np.bool_]
+
+
+class Schedule(NamedTuple):
+    """What happens when. steps of length dt; log_every: steps between two rows of the log. begin [s]: the first command,
+    on which terms count. command_step (K,): the step before which a command comes, late (K,) [s] how long before; goal (K, m),
+    speed (K, m), on (K, m). put_step (P,): the step before which the base is put; quat (P, 4), v, w (P, 3) as in BaseStates."""
+
+    dt: float
+    steps: int
+    log_every: int
+    begin: float
+    command_step: Ints
+    late: Array
+    goal: Array
+    speed: Array
+    on: NDArray[np.bool_]
+    put_step: Ints
+    put_quat: Array
+    put_v: Array
+    put_w: Array
+
+
+class State(NamedTuple):
+    """Changed by a run. base (7,): quaternion wxyz and position of the base in W; q (n,), v (nv,); reference (m,): the ramp;
+    goal, reach (m,): of the command, and how far the ramp goes in a step; on (m,). memory (4, m): velocity, what is known of the
+    load, load and friction of the step before; stepped (1,): 1 where there was one."""
+
+    base: Array
+    q: Array
+    v: Array
+    reference: Array
+    goal: Array
+    reach: Array
+    on: NDArray[np.bool_]
+    memory: Array
+    stepped: Array
+
+
+class Log(NamedTuple):
+    """Written by a run. q, v (rows, n); base (rows, 7) with the turns of `put` taken out; torque (rows, m) on the servos' joints;
+    force (rows, s, 3): of the ground on each shape, in W. torque and force may have no rows: not wanted."""
+
+    q: Array
+    v: Array
+    base: Array
+    torque: Array
+    force: Array
+
+
+class Work(NamedTuple):
+    """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational."""
+
+    R: Array
+    p: Array
+    S: Array
+    mass: Array
+    moment: Array
+    inertia: Array
+    V: Array
+    A: Array
+    F: Array
+    M: Array
+    H: Array
+    force: Array
+    v_star: Array
+    v_next: Array
+    momentum: Array
+    momentum_star: Array
+    gradient: Array
+    impulse: Array
+    scale: Array
+    dv: Array
+    dp: Array
+    active: NDArray[np.bool_]
+    brake_gain: Array
+    limit_on: NDArray[np.bool_]
+    limit_v: Array
+    limit_R: Array
+    push: Array
+    motor: Array
+    relief: Array
+    shape: Ints
+    J: Array
+    elastic: Array
+    normal: Array
+    soft: Array
+    vc: Array
+    dvc: Array
+    hessian: Array
+    turned: Array
+
+
+def work_for(tree: Tree, servos: Servos, shapes: Shapes) -> Work:
+    """Room for one run of a robot."""
+    n, nv, m, s = len(tree.parent), len(tree.path), len(servos.joint), len(shapes.body)
+    zeros = np.zeros
+    return Work(
+        R=zeros((n + 1, 3, 3)), p=zeros((n + 1, 3)), S=zeros((nv, 6)), mass=zeros(n + 1), moment=zeros((n + 1, 3)),
+        inertia=zeros((n + 1, 6)), V=zeros((n + 1, 6)), A=zeros((n + 1, 6)), F=zeros((n + 1, 6)), M=zeros((nv, nv)),
+        H=zeros((nv, nv)), force=zeros(nv), v_star=zeros(nv), v_next=zeros(nv), momentum=zeros(nv), momentum_star=zeros(nv),
+        gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv), dp=zeros(nv),
+        active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
+        limit_on=zeros((n, 2), dtype=np.bool_), limit_v=zeros((n, 2)), limit_R=zeros(n), push=zeros(m), motor=zeros(m),
+        relief=zeros(m), shape=zeros(s, dtype=np.int64), J=zeros((s, 3, nv)), elastic=zeros(s), normal=zeros(s), soft=zeros(s),
+        vc=zeros((s, 3)), dvc=zeros((s, 3)), hessian=zeros((s, 4)), turned=zeros(4))

@@ -1,0 +1,61 @@
+"""How the compiled station's functions are compiled: by numba, without the GIL, kept on disk under what they were made from.
+
+numba asks of a kept function only whether its own file has changed, not those of the functions it calls. So the folder of kept
+code is named after the content of all files that functions and constants come from.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+_OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "fastmath": {"contract"}, "error_model": "numpy"}
+"""No GIL; nothing is allocated, so nothing is counted; a product and a sum may be one instruction, with one rounding, but nothing
+is taken to be finite; 1/0 is infinity."""
+_SOURCES = ("arrays", "contact", "kernel", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
+            "../../servo/term_bank")
+
+
+@cache
+def cache_folder() -> Path:
+    """Where compiled code is kept; in the user's cache folder, or under NUMBA_CACHE_DIR."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    for name in _SOURCES:
+        digest.update((Path(__file__).parent / f"{name}.py").read_bytes())
+    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "drake-workbench"
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or user) / f"compiled-{digest.hexdigest()[:16]}"
+
+
+_found = False
+
+
+def is_compiled() -> bool:
+    """Whether this version's code was compiled on this machine before: else the first run takes half a minute longer."""
+    global _found
+    _found = _found or any(cache_folder().rglob("run.run*.nbc"))
+    return _found
+
+
+def part(function: F) -> F:
+    """A piece of a kernel; Python does not call it."""
+    return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def kernel(function: F) -> F:
+    """A function that Python calls; compiled at its first call and kept on disk."""
+    before = numba.config.CACHE_DIR
+    try:
+        numba.config.CACHE_DIR = str(cache_folder())
+        return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    except RuntimeError:  # no folder to write to: compiled in each process
+        return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+    finally:
+        numba.config.CACHE_DIR = before

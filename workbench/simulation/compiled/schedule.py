@@ -1,0 +1,69 @@
+"""When things happen in a run, in whole steps: commands, states that the base is put to, rows of the log."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from workbench.motion.commands import Commands
+from workbench.simulation.compiled.arrays import Schedule
+from workbench.simulation.config import SimulationConfig
+from workbench.simulation.steady import BaseStates
+
+ROUNDING = 1e-9
+"""Seconds by which an instant may miss one of the log's and be that."""
+
+
+def whole_steps(config: SimulationConfig, seconds: float) -> float:
+    """The log's instant that is nearest [s]."""
+    return round(seconds / config.logged_every) * config.logged_every
+
+
+def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float, duration: float, elapsed: float,
+                steadied: BaseStates | None) -> Schedule:
+    """lead: in whole steps of the log. commands: as the servos get them, columns in the model's order.
+
+    What comes at or after the end does not come; of two things at one instant the later stays, as in `Simulation`."""
+    dt = config.time_step
+    end = _on_grid(config, lead + duration)
+    sent = {} if commands is None else {_on_grid(config, lead + t): k for k, t in enumerate(commands.times.tolist())}
+    sent = {t: k for t, k in sorted(sent.items()) if t < end}
+    puts = {} if steadied is None else {whole_steps(config, lead + t): k for k, t in enumerate(steadied.times.tolist())}
+    puts = {t: k for t, k in sorted(puts.items()) if t < end}
+    steps = np.array([math.ceil(t / dt - 1e-6) for t in sent], dtype=np.int64)
+    late = np.array([dt * math.ceil(t / dt - 1e-6) - t for t in sent])
+    which, put = list(sent.values()), list(puts.values())
+    n = 0 if commands is None else len(commands.joints)
+    empty = np.zeros((0, n))
+    return Schedule(
+        dt=dt, steps=math.ceil(end / dt - 1e-6), log_every=max(1, round(config.logged_every / dt)), begin=lead - elapsed,
+        command_step=steps, late=np.where(late > ROUNDING, late, 0.0),
+        goal=empty if commands is None else np.ascontiguousarray(commands.goals[which], dtype=float),
+        speed=empty if commands is None else np.ascontiguousarray(commands.speeds[which], dtype=float),
+        on=empty.astype(bool) if commands is None else np.ascontiguousarray(commands.enabled[which], dtype=bool),
+        put_step=np.array([round(t / dt) for t in puts], dtype=np.int64),
+        put_quat=_rows(steadied, "quat", put, 4), put_v=_rows(steadied, "v", put, 3), put_w=_rows(steadied, "w", put, 3))
+
+
+def settling(config: SimulationConfig, servos: int) -> Schedule:
+    """Nothing but time, before the first command."""
+    still = schedule_of(config, None, 0.0, whole_steps(config, config.settle), 0.0, None)
+    none = np.zeros((0, servos))
+    return still._replace(begin=math.inf, goal=none, speed=none, on=none.astype(bool))
+
+
+def rows_of(config: SimulationConfig, end: float) -> int:
+    """Rows of the log from 0 to the end."""
+    return math.floor(_on_grid(config, end) / config.logged_every + 1e-6) + 1
+
+
+def _on_grid(config: SimulationConfig, t: float) -> float:
+    nearest = whole_steps(config, t)
+    return nearest if abs(nearest - t) < ROUNDING else t
+
+
+def _rows(states: BaseStates | None, name: str, which: list[int], width: int) -> np.ndarray:
+    if states is None:
+        return np.zeros((0, width))
+    return np.ascontiguousarray(getattr(states, name)[which], dtype=float).reshape(-1, width)

@@ -1,0 +1,347 @@
+"""Drake's discrete step as a convex problem in the next velocities, and its solution by Newton with an exact line search.
+
+    least over v:  1/2 |v - v*|^2_A + sum of the constraints' costs in their velocities J v
+
+A. Castro, F. Permenter, X. Han, "An Unconstrained Convex Formulation of Compliant Contact", IEEE T-RO 2023 (the solver, its
+stopping criteria, near-rigid constraints), and A. Castro, X. Han, J. Masterjohn, "A Theory of Irrotational Contact Fields", 2024
+(lagged friction). Steps, tolerances and their order are those of Drake's SAP, so that a solution is Drake's to rounding, even
+where it stops short of the minimum.
+"""
+
+from __future__ import annotations
+
+import math
+
+from workbench.simulation.compiled.arrays import Shapes, State, Tree, Work
+from workbench.simulation.compiled.contact import along_path
+from workbench.simulation.compiled.kernel import part
+from workbench.simulation.compiled.tree import copy_paths, factor, solve_factored, times_matrix
+from workbench.simulation.compiled.vectors import clamp
+
+STICTION = 1e-4
+"""Slip speed below which a contact sticks [m/s]: MultibodyPlant's default stiction tolerance."""
+SIGMA = 1e-3
+"""Softening of friction by the weight that a contact feels, dimensionless."""
+NEAR_RIGID = 0.1**2 / (4.0 * math.pi**2)
+"""beta^2/(4 pi^2) with beta = 0.1: constraints are no stiffer than a period of 0.1 steps."""
+LIMIT_STIFFNESS = 1e12
+"""Of joints' limits [N m/rad]: always near rigid."""
+LIMIT_WINDOW = 2.0
+"""Limits farther away than this many steps' travel are left out."""
+RELATIVE, ABSOLUTE = 1e-6, 1e-14
+"""Of the momentum's balance, as shares of momentum and in sqrt(J)."""
+COST_RELATIVE, COST_ABSOLUTE = 1e-15, 1e-30
+MOST_ITERATIONS = 100
+LONGEST_STEP = 1.5
+LINE_TOLERANCE = 1e-8
+
+
+@part
+def prepare(tree: Tree, shapes: Shapes, state: State, dt: float, count: int, w: Work) -> None:
+    """Free motion v*, the constraints there are and their constants, from M, forces and contacts."""
+    n = tree.parent.shape[0]
+    o = 6 if tree.free else 0
+    copy_paths(tree.path, w.M, w.H)
+    factor(tree.path, w.H)
+    for k in range(tree.path.shape[0]):
+        w.v_star[k] = w.force[k]
+        w.scale[k] = 1.0 / math.sqrt(w.M[k, k])
+    solve_factored(tree.path, w.H, w.v_star)
+    for k in range(tree.path.shape[0]):
+        w.v_star[k] = state.v[k] + dt * w.v_star[k]
+    for g in range(w.active.shape[0]):
+        w.active[g] = count > 0
+    for i in range(n):
+        _prepare_joint(tree, state, i, o + i, dt, w)
+    for c in range(count):
+        w.soft[c] = max(STICTION, shapes.friction[w.shape[c]] * SIGMA * _weight(tree, shapes, c, w) * w.normal[c])
+    for k in range(tree.path.shape[0]):  # trees without constraints move freely
+        w.v_next[k] = state.v[k] if w.active[tree.group[k]] else w.v_star[k]
+
+
+@part
+def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work) -> None:
+    """Dry friction and limits of one joint."""
+    near_rigid = NEAR_RIGID / w.M[k, k]
+    if tree.brake[i] > 0.0:
+        w.brake_gain[i] = tree.brake_gain[i] if 1.0 / (dt * tree.brake_gain[i]) >= near_rigid else 1.0 / (dt * near_rigid)
+        w.active[tree.group[k]] = True
+    window = LIMIT_WINDOW * dt * max(abs(state.v[k]), abs(w.v_star[k]))
+    w.limit_on[i, 0] = tree.lower[i] >= state.q[i] - window
+    w.limit_on[i, 1] = tree.upper[i] <= state.q[i] + window
+    if w.limit_on[i, 0] or w.limit_on[i, 1]:
+        w.active[tree.group[k]] = True
+        w.limit_R[i] = max(near_rigid, 1.0 / (dt * LIMIT_STIFFNESS * (dt + dt)))
+        w.limit_v[i, 0] = -(state.q[i] - tree.lower[i]) / (dt + dt)
+        w.limit_v[i, 1] = -(tree.upper[i] - state.q[i]) / (dt + dt)
+
+
+@part
+def _weight(tree: Tree, shapes: Shapes, c: int, w: Work) -> float:
+    """Norm over three of J diag(A)^-1 J' of a contact."""
+    b = shapes.body[w.shape[c]]
+    total = 0.0
+    for r in range(3):
+        for s in range(r + 1):
+            entry = 0.0
+            j = 6 + b if b < tree.parent.shape[0] else 5
+            while j >= 0:
+                entry += w.J[c, r, j] * w.J[c, s, j] * w.scale[j] * w.scale[j]
+                j = tree.path[j]
+            total += entry * entry if r == s else 2.0 * entry * entry
+    return math.sqrt(total) / 3.0
+
+
+@part
+def _limit_impulse(w: Work, i: int, side: int, v: float) -> float:
+    """Of one end of a joint that comes towards it at -v, not negative."""
+    return max((w.limit_v[i, side] - v) / w.limit_R[i], 0.0)
+
+
+@part
+def _normal_impulse(shapes: Shapes, s: int, elastic: float, v: float, dt: float) -> tuple[float, float]:
+    """Impulse of a contact at normal velocity v, and minus its slope (Hunt-Crossley, implicit)."""
+    force, damping = elastic - dt * shapes.stiffness[s] * v, 1.0 - shapes.dissipation[s] * v
+    if force <= 0.0 or damping <= 0.0:
+        return 0.0, 0.0
+    return dt * force * damping, dt * (shapes.stiffness[s] * dt * damping + shapes.dissipation[s] * force)
+
+
+@part
+def _gradient(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> tuple[float, float]:
+    """w.gradient = A (v - v*) - J' impulses, w.impulse = J' impulses, w.hessian of contacts (xx, xy, yy, zz); returns the
+    residual and the scale of momentum."""
+    o = 6 if tree.free else 0
+    for k in range(tree.path.shape[0]):
+        w.impulse[k] = 0.0
+    for i in range(tree.parent.shape[0]):
+        v = w.v_next[o + i]
+        if tree.brake[i] > 0.0:
+            w.impulse[o + i] += dt * clamp(-w.brake_gain[i] * v, -tree.brake[i], tree.brake[i])
+        if w.limit_on[i, 0]:
+            w.impulse[o + i] += _limit_impulse(w, i, 0, v)
+        if w.limit_on[i, 1]:
+            w.impulse[o + i] -= _limit_impulse(w, i, 1, -v)
+    for c in range(count):
+        _push_contact(tree, shapes, c, dt, w)
+    residual = momentum = impulse = 0.0
+    for k in range(tree.path.shape[0]):
+        if w.active[tree.group[k]]:
+            w.gradient[k] = w.momentum[k] - w.momentum_star[k] - w.impulse[k]
+            residual += (w.scale[k] * w.gradient[k]) ** 2
+            momentum += (w.scale[k] * w.momentum[k]) ** 2
+            impulse += (w.scale[k] * w.impulse[k]) ** 2
+        else:
+            w.gradient[k] = 0.0
+    return math.sqrt(residual), math.sqrt(max(momentum, impulse))
+
+
+@part
+def _push_contact(tree: Tree, shapes: Shapes, c: int, dt: float, w: Work) -> None:
+    """Adds J' times a contact's impulse to w.impulse; its part of the Hessian."""
+    s = w.shape[c]
+    x, y = w.vc[c, 0], w.vc[c, 1]
+    per_speed = shapes.friction[s] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
+    share = 1.0 / (x * x + y * y + w.soft[c] * w.soft[c])
+    normal, slope = _normal_impulse(shapes, s, w.elastic[c], w.vc[c, 2], dt)
+    w.hessian[c, 0] = per_speed * (1.0 - x * x * share)
+    w.hessian[c, 1] = -per_speed * x * y * share
+    w.hessian[c, 2] = per_speed * (1.0 - y * y * share)
+    w.hessian[c, 3] = slope
+    b = shapes.body[s]
+    j = 6 + b if b < tree.parent.shape[0] else 5
+    while j >= 0:
+        w.impulse[j] += w.J[c, 2, j] * normal - per_speed * (w.J[c, 0, j] * x + w.J[c, 1, j] * y)
+        j = tree.path[j]
+
+
+@part
+def _cost(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, w: Work) -> float:
+    """The cost at v + alpha dv."""
+    o = 6 if tree.free else 0
+    cost = 0.0
+    for k in range(tree.path.shape[0]):
+        if w.active[tree.group[k]]:
+            gain = w.momentum[k] - w.momentum_star[k] + alpha * w.dp[k]
+            cost += 0.5 * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k]) * gain
+    for i in range(tree.parent.shape[0]):
+        v = w.v_next[o + i] + alpha * w.dv[o + i]
+        if tree.brake[i] > 0.0:
+            y = abs(w.brake_gain[i] * v)
+            cost += dt / w.brake_gain[i] * (0.5 * y * y if y < tree.brake[i] else tree.brake[i] * (y - 0.5 * tree.brake[i]))
+        if w.limit_on[i, 0]:
+            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 0, v) ** 2
+        if w.limit_on[i, 1]:
+            cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 1, -v) ** 2
+    for c in range(count):
+        cost += _contact_cost(shapes, c, dt, alpha, w)
+    return cost
+
+
+@part
+def _contact_cost(shapes: Shapes, c: int, dt: float, alpha: float, w: Work) -> float:
+    """Antiderivatives of the impulses: of the normal's, constant from where it has ended, and of lagged friction's."""
+    s = w.shape[c]
+    k, d, elastic = shapes.stiffness[s], shapes.dissipation[s], w.elastic[c]
+    x, y, z = w.vc[c, 0] + alpha * w.dvc[c, 0], w.vc[c, 1] + alpha * w.dvc[c, 1], w.vc[c, 2] + alpha * w.dvc[c, 2]
+    z = min(z, elastic / dt / (k + 1e-20), 1.0 / (d + 1e-20))
+    change = -dt * k * z
+    normal = dt * (z * (elastic + 0.5 * change) - 0.5 * d * z * z * (elastic + 2.0 / 3.0 * change))
+    slip = math.sqrt(x * x + y * y + w.soft[c] * w.soft[c]) - w.soft[c]
+    return shapes.friction[s] * w.normal[c] * slip - normal
+
+
+@part
+def _slope(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, curve: float, w: Work) -> tuple[float, float]:
+    """First and second derivative of the cost along dv. curve: dv' A dv."""
+    o = 6 if tree.free else 0
+    first, second = 0.0, curve
+    for k in range(tree.path.shape[0]):
+        first += w.dp[k] * (w.v_next[k] + alpha * w.dv[k] - w.v_star[k])
+    for i in range(tree.parent.shape[0]):
+        dv = w.dv[o + i]
+        v = w.v_next[o + i] + alpha * dv
+        if tree.brake[i] > 0.0:
+            y = -w.brake_gain[i] * v
+            if abs(y) <= tree.brake[i]:
+                second += dt * w.brake_gain[i] * dv * dv
+            first -= dt * clamp(y, -tree.brake[i], tree.brake[i]) * dv
+        if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
+            first -= _limit_impulse(w, i, 0, v) * dv
+            second += dv * dv / w.limit_R[i]
+        if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
+            first += _limit_impulse(w, i, 1, -v) * dv
+            second += dv * dv / w.limit_R[i]
+    for c in range(count):
+        s = w.shape[c]
+        a, b, e = w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2]
+        x, y = w.vc[c, 0] + alpha * a, w.vc[c, 1] + alpha * b
+        size = x * x + y * y + w.soft[c] * w.soft[c]
+        per_speed = shapes.friction[s] * w.normal[c] / math.sqrt(size)
+        normal, slope = _normal_impulse(shapes, s, w.elastic[c], w.vc[c, 2] + alpha * e, dt)
+        first += per_speed * (x * a + y * b) - normal * e
+        second += per_speed * (a * a + b * b - (x * a + y * b) ** 2 / size) + slope * e * e
+    return first, second
+
+
+@part
+def _direction(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> float:
+    """w.dv = -H^-1 gradient, w.dp = A dv, w.dvc = J dv; returns dv' A dv."""
+    o = 6 if tree.free else 0
+    n = tree.parent.shape[0]
+    copy_paths(tree.path, w.M, w.H)
+    for i in range(n):
+        v = w.v_next[o + i]
+        if tree.brake[i] > 0.0 and abs(w.brake_gain[i] * v) <= tree.brake[i]:
+            w.H[o + i, o + i] += dt * w.brake_gain[i]
+        if w.limit_on[i, 0] and w.limit_v[i, 0] - v > 0.0:
+            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
+        if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
+            w.H[o + i, o + i] += 1.0 / w.limit_R[i]
+    for c in range(count):
+        b = shapes.body[w.shape[c]]
+        _stiffen(tree, 6 + b if b < n else 5, c, w)
+    factor(tree.path, w.H)
+    for k in range(tree.path.shape[0]):
+        w.dv[k] = -w.gradient[k]
+    solve_factored(tree.path, w.H, w.dv)
+    times_matrix(tree.path, w.M, w.dv, w.dp)
+    for c in range(count):
+        b = shapes.body[w.shape[c]]
+        for r in range(3):
+            w.dvc[c, r] = along_path(tree, 6 + b if b < n else 5, w.J[c, r], w.dv)
+    curve = 0.0
+    for k in range(tree.path.shape[0]):
+        curve += w.dv[k] * w.dp[k]
+    return curve
+
+
+@part
+def _stiffen(tree: Tree, last: int, c: int, w: Work) -> None:
+    """H += J' G J of a contact."""
+    j = last
+    while j >= 0:
+        x = w.hessian[c, 0] * w.J[c, 0, j] + w.hessian[c, 1] * w.J[c, 1, j]
+        y = w.hessian[c, 1] * w.J[c, 0, j] + w.hessian[c, 2] * w.J[c, 1, j]
+        z = w.hessian[c, 3] * w.J[c, 2, j]
+        i = j
+        while i >= 0:
+            w.H[j, i] += x * w.J[c, 0, i] + y * w.J[c, 1, i] + z * w.J[c, 2, i]
+            i = tree.path[i]
+        j = tree.path[j]
+
+
+@part
+def _step_length(tree: Tree, shapes: Shapes, dt: float, count: int, curve: float, w: Work) -> float:
+    """Where the cost is least along dv: Newton on its slope, by halves where that is slow (as rtsafe, Press et al. 2007,
+    section 9.4)."""
+    falls = 0.0
+    for k in range(tree.path.shape[0]):
+        falls -= w.gradient[k] * w.dv[k]
+    slope, curvature = _slope(tree, shapes, dt, count, LONGEST_STEP, curve, w)
+    if slope <= 0.0:
+        return LONGEST_STEP
+    if falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, shapes, dt, count, LONGEST_STEP, w):
+        return 1.0
+    if slope / falls < LINE_TOLERANCE:
+        return LONGEST_STEP
+    guess = min(falls / curvature, LONGEST_STEP)
+    low, high, at = 0.0, LONGEST_STEP, guess
+    change = before = low - high
+    for _ in range(MOST_ITERATIONS):
+        slope, curvature = _slope(tree, shapes, dt, count, at, curve, w)
+        slope, curvature = slope / falls, curvature / falls
+        if slope < 0.0:
+            low = at
+        else:
+            high = at
+        if abs(slope) < LINE_TOLERANCE:
+            return at
+        slow = 2.0 * abs(slope) > abs(before * curvature)
+        before = change
+        change = slope / curvature
+        if slow or not low <= at - change <= high:
+            change = 0.5 * (low - high)
+            at = low - change
+        else:
+            at -= change
+        if abs(change) < LINE_TOLERANCE * guess:
+            return at
+    return at
+
+
+@part
+def solve(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> int:
+    """From w.v_next, the guess, to the velocities at the step's end; returns how many iterations it took, -1 if it failed."""
+    anything = False
+    for g in range(w.active.shape[0]):
+        anything |= w.active[g]
+    if not anything:
+        return 0
+    times_matrix(tree.path, w.M, w.v_star, w.momentum_star)
+    times_matrix(tree.path, w.M, w.v_next, w.momentum)
+    cost = _cost_here(tree, shapes, dt, count, w)
+    stalled = False
+    for iteration in range(MOST_ITERATIONS + 1):
+        residual, scale = _gradient(tree, shapes, dt, count, w)
+        if stalled or residual <= ABSOLUTE + RELATIVE * scale:
+            return iteration
+        if iteration == MOST_ITERATIONS or not residual < math.inf:
+            break
+        curve = _direction(tree, shapes, dt, count, w)
+        alpha = _step_length(tree, shapes, dt, count, curve, w)
+        for k in range(tree.path.shape[0]):
+            w.v_next[k] += alpha * w.dv[k]
+            w.momentum[k] += alpha * w.dp[k]
+        for c in range(count):
+            for r in range(3):
+                w.vc[c, r] += alpha * w.dvc[c, r]
+        before = cost
+        cost = _cost_here(tree, shapes, dt, count, w)
+        stalled = abs(before - cost) < COST_ABSOLUTE + COST_RELATIVE * 0.5 * (abs(before) + abs(cost)) and alpha > 0.5
+    return -1
+
+
+@part
+def _cost_here(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> float:
+    return _cost(tree, shapes, dt, count, 0.0, w)

@@ -1,0 +1,203 @@
+"""Jobs played by the compiled station: the same take as `Simulation.run` gives, or the reason why not."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.math import RotationMatrix
+from scipy.spatial.transform import Rotation
+
+from workbench.effects.apply import Physics, physics_of, played
+from workbench.motion.commands import Commands
+from workbench.recording.take import Take
+from workbench.robot import InputError
+from workbench.simulation.compiled.arrays import Log, Schedule, State, Work, work_for
+from workbench.simulation.compiled.kernel import is_compiled
+from workbench.simulation.compiled.machine import Machine, machine_of
+from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
+from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
+from workbench.simulation.compiled.tables import NotCoveredError, Tables, tables_of
+from workbench.simulation.job import Job
+from workbench.simulation.rollout import Start
+from workbench.simulation.structure import Structure
+
+ENDED = {TOUCHED: "shapes touch that are no foot on the floor"}
+"""Why a run was given up, by how it ended; any other way, Drake shall say."""
+
+
+def covers(job: Job) -> str | None:
+    """Why the compiled station cannot play this job; None where it can."""
+    try:
+        _CompiledJob(job)
+    except NotCoveredError as e:
+        return str(e)
+    return None
+
+
+def run_compiled(job: Job) -> Take:
+    """The take of a job; NotCoveredError says why it has to be Drake's."""
+    compiled = _CompiledJob(job)
+    if not is_compiled():
+        logging.getLogger(__name__).warning("compiling the station, once for this version and machine (half a minute) ...")
+    return compiled.take()
+
+
+def _check(job: Job) -> None:
+    c = job.config
+    known = {"drive": "servo", "contact": "point", "approximation": "lagged"}
+    for name, value in known.items():
+        if getattr(c, name) != value:
+            raise NotCoveredError(f"{name} '{getattr(c, name)}'")
+    if c.time_step == 0:
+        raise NotCoveredError("a continuous plant")
+    if c.base not in ("free", "fixed"):
+        raise NotCoveredError(f"base '{c.base}'")
+    if job.trajectory is not None or job.path is not None:
+        raise NotCoveredError("a trajectory or a path to follow")
+    if abs(c.logged_every / c.time_step - round(c.logged_every / c.time_step)) > 1e-9:
+        raise NotCoveredError("a log between the steps")
+    whole = job.times is None
+    if whole and job.steadied is not None:
+        raise NotCoveredError("torques of a run that is put back")
+    if whole and job.commands is not None and not job.commands.enabled.all():
+        raise NotCoveredError("torques of servos that are switched off")
+    if job.start is not None and c.base == "free":
+        raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
+
+
+@dataclass
+class _Plan:
+    commands: Commands | None
+    lead: float
+    duration: float
+
+
+class _CompiledJob:
+    """A job with its arrays; made, it is covered, but for what only the run can tell."""
+
+    def __init__(self, job: Job) -> None:
+        _check(job)
+        self.job, self.model, self.config = job, job.model, job.config
+        self.free = self.config.base == "free"
+        self.model.check_base(floating=self.free)
+        self.physics: Physics = physics_of(self.model)
+        self.tables: Tables = tables_of(self.model, self.physics.description, self.free)
+        self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step)
+        self.plan = self._plan()
+
+    def _plan(self) -> _Plan:
+        job = self.job
+        commands = None if job.commands is None else played(job.commands.reordered(self.model.joints), self.model)
+        duration = job.duration if job.duration is not None else commands.end if commands is not None else None
+        if duration is None:
+            raise ValueError("expected commands, a trajectory or a duration")
+        lead = 0.0 if job.start is not None else whole_steps(self.config, job.lead)
+        if commands is not None and len(commands.times) and lead + commands.times[0] < 0.0:
+            raise NotCoveredError("a command before the run begins")
+        if job.steadied is not None and not self.free:
+            raise NotCoveredError("a held base that is put somewhere")
+        return _Plan(commands, lead, duration)
+
+    def take(self) -> Take:
+        """Settles, plays, and reads the log; NotCoveredError where something touches that is no foot on the floor."""
+        config, plan = self.config, self.plan
+        state, work = self._rest(), work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
+        stand(*self.machine, state, work)
+        self._play(settling(config, len(self.model.joints)), state, self._log(0), work)
+        if self.free:
+            _centre(state)
+        schedule = schedule_of(config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
+        if self.job.start is not None:
+            self._put(Start(*self.job.start), state)
+        log = self._log(rows_of(config, plan.lead + plan.duration))
+        self._play(schedule, state, log, work)
+        return self._read(log, np.arange(len(log.q)) * config.logged_every - plan.lead)
+
+    def _play(self, schedule: Schedule, state: State, log: Log, work: Work) -> None:
+        how = run(*self.machine, schedule, state, log, work)
+        if how != DONE:
+            raise NotCoveredError(ENDED.get(how, "the step's problem was not solved"))
+
+    def _log(self, rows: int) -> Log:
+        whole = rows if self.job.times is None else 0
+        n, m, s = len(self.tables.joints), len(self.model.joints), len(self.machine.shapes.body)
+        forces = whole if self.free and self.config.contact_period > 0 else 0
+        return Log(q=np.empty((rows, n)), v=np.empty((rows, n)), base=np.empty((rows, 7)), torque=np.empty((whole, m)),
+                   force=np.empty((forces, s, 3)))
+
+    def _rest(self) -> State:
+        n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.path)
+        return State(base=np.array([1.0, 0, 0, 0, 0, 0, 0]), q=np.zeros(n), v=np.zeros(nv), reference=np.zeros(m),
+                     goal=self.physics.zero.copy(), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
+                     memory=np.zeros((4, m)), stepped=np.zeros(1))
+
+    def _put(self, start: Start, state: State) -> None:
+        """As `Simulation` puts its joints where a log's were; held bases alone."""
+        servos = np.asarray(start.q, dtype=float)
+        structure = self._structure()
+        if start.logged:
+            servos = servos + self.physics.zero
+        elif structure is not None:
+            servos = structure.servo_angles(servos, state.q[[self.tables.joints.index(j) for j in structure.joints]])
+        joint = self.machine.servos.joint
+        state.q[joint], state.v[joint] = servos, start.v
+        commands = self.plan.commands
+        state.reference[:] = servos if commands is None else commands.goals[0] + self.physics.zero
+        state.memory[:], state.stepped[:] = 0.0, 0.0
+
+    def _structure(self) -> Structure | None:
+        if not self.physics.stages and not self.physics.moved:
+            return None
+        key = str(self.physics.stages)
+        if key not in self.tables.derived:
+            self.tables.derived[key] = Structure(self.model, self.physics)
+        return self.tables.derived[key]  # type: ignore[return-value]
+
+    def _read(self, log: Log, time: np.ndarray) -> Take:
+        job, joint, config = self.job, self.machine.servos.joint, self.config
+        p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
+        if not self.free:
+            X = self.tables.X_WBase
+            p_WB = np.tile(X.translation(), (len(time), 1))
+            quat_WB = np.tile(RotationMatrix(X.rotation()).ToQuaternion().wxyz(), (len(time), 1))
+        take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=log.q[:, joint], starts_at=0.0,
+                    base=config.base, v=log.v[:, joint], p_WB=p_WB, quat_WB=quat_WB,
+                    torque=log.torque if len(log.torque) else None, contact=self._contact(log, time), commands=job.commands)
+        take = self._as_built(take, log)
+        return take if job.times is None else take.resampled(job.times)
+
+    def _contact(self, log: Log, time: np.ndarray) -> dict[str, np.ndarray]:
+        """Forces on feet, sampled as often as the configuration says."""
+        if not len(log.force):
+            return {}
+        every = max(1, round(self.config.contact_period / self.config.logged_every))
+        links = np.array(self.tables.shapes.link)
+        out = {}
+        for link in dict.fromkeys(self.tables.shapes.link):
+            force = log.force[::every, links == link].sum(axis=1)
+            foot = self.model.kinematics.parent_joint[link] or link
+            out[foot] = np.column_stack([np.interp(time, time[::every], c) for c in force.T])
+        return out
+
+    def _as_built(self, take: Take, log: Log) -> Take:
+        if self.physics.zero.any():
+            take = replace(take, servo_q=take.q - self.physics.zero)
+        structure = self._structure()
+        if structure is None:
+            return take
+        columns = [self.tables.joints.index(j) for j in structure.joints]
+        seen = structure.seen(log.q[:, columns], log.v[:, columns])
+        assert take.p_WB is not None
+        assert take.quat_WB is not None
+        return replace(take, q=seen.q, v=seen.v, off_axis=seen.off_axis, servo_q=take.q - self.physics.zero,
+                       links=structure.links(log.q[:, columns], take.p_WB, take.quat_WB))
+
+
+def _centre(state: State) -> None:
+    """Takes the heading and the place that settling added out of a free base's pose, as `Simulation` does; velocities stay."""
+    R = Rotation.from_quat(state.base[:4], scalar_first=True)
+    yaw = R.as_euler("ZYX")[0]
+    state.base[:4] = (Rotation.from_euler("z", -yaw) * R).as_quat(scalar_first=True)
+    state.base[4:6] = 0.0

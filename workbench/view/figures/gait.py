@@ -1,0 +1,59 @@
+"""A certified gait as figures: how near each limit is, and what robots nobody measured make of it."""
+
+from __future__ import annotations
+
+import math
+
+from matplotlib.figure import Figure
+
+from workbench.gait.certificate import Certificate
+from workbench.gait.limits import each
+from workbench.view.figures.style import ACCENT, COMMAND, FLOOR, RECORDED, SIMULATED, new_figure, styled
+
+
+@styled
+def limit_bars(certificate: Certificate) -> Figure:
+    """Each limit's worst use: value by limit, broken beyond one; advice is hatched."""
+    rows = sorted(each(certificate.margins), key=lambda item: item[1].use)
+    figure = new_figure(10, 0.42 * len(rows) + 1.2)
+    axes = figure.add_subplot()
+    for k, (_, m) in enumerate(rows):
+        use = min(m.use, 2.6)
+        colour = COMMAND if m.advice else RECORDED if m.use > 1 else FLOOR if m.use > 0.95 else SIMULATED
+        axes.barh(k, max(use, 0.0), color=colour, hatch="//" if m.advice else None, edgecolor="white", height=0.7)
+        where = "" if m.where in ("robot", "table") else f" ({m.where})"
+        axes.annotate(f"{m.value:.3g} of {m.limit:.3g} {m.unit}{where}", (max(use, 0.0), k), xytext=(5, 0),
+                      textcoords="offset points", va="center", fontsize=10)
+    axes.set_yticks(range(len(rows)), [name for name, _ in rows])
+    axes.axvline(1.0, color=RECORDED, linewidth=1.4)
+    axes.set_xlim(0, max(1.9, max(min(m.use, 2.6) for _, m in rows) + 0.9))
+    axes.set_xlabel("value by limit")
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+@styled
+def draw_ranges(certificate: Certificate) -> Figure:
+    """Of each quantity: lowest, 5 %, median, 95 % and highest over the ensemble, and the nominal robot's."""
+    rows = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k != "quantiles"]
+    nominal = _nominal(certificate)
+    figure = new_figure(10, 0.9 * len(rows) + 0.6)
+    for axes, (name, (low, five, half, ninety_five, high)) in zip(figure.subplots(len(rows), 1, squeeze=False).flat, rows):
+        axes.plot([low, high], [0, 0], color=COMMAND, linewidth=1.2)
+        axes.plot([five, ninety_five], [0, 0], color=SIMULATED, linewidth=8, solid_capstyle="butt")
+        axes.plot([half], [0], "o", color="white", markeredgecolor=SIMULATED, markersize=8)
+        if name in nominal:
+            axes.plot([nominal[name]], [0], "|", color=ACCENT, markersize=22, markeredgewidth=3)
+        axes.set_yticks([0], [name])
+        axes.set_ylim(-1, 1)
+        axes.grid(axis="y", visible=False)
+    return figure
+
+
+def _nominal(certificate: Certificate) -> dict[str, float]:
+    n = certificate.nominal
+    names = ("heading deg/m", "slip m/s", "foot clearance mm", "tipping margin deg", "electrical power W")
+    out = {k: float(n[k]) for k in names}
+    out[f"speed {n['unit']}"] = float(n["speed"])
+    out["largest RMS torque N m"] = max(n["RMS torque N m"].values())
+    return {k: v for k, v in out.items() if math.isfinite(v)}

@@ -1,0 +1,180 @@
+"""The page of an optimised gait: what it does, how near its limits are, what other robots make of it, in 3D beside the ROBOTIS
+walk."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from workbench.compare.footfalls import foot_phases
+from workbench.gait.certificate import CLAIM, Certificate
+from workbench.gait.limits import each
+from workbench.gait.measure import GaitMeasure, measure
+from workbench.gait.optimize import WALK, Optimized
+from workbench.gait.table import GaitTable
+from workbench.motion import load_motion
+from workbench.recording.take import Take
+from workbench.robot import InputError, RobotModel, data_file
+from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.view.figures import (
+    body_attitude,
+    body_path,
+    film_strip,
+    footfalls,
+    joint_grid,
+    joint_torques,
+    phase_portrait,
+    stance_of,
+)
+from workbench.view.figures.gait import draw_ranges, limit_bars
+from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.scene.replay import write_replay
+
+PAGE = "report.html"
+
+
+def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
+    """Writes report.html, and replay.html beside it: the gait solid, the ROBOTIS walk as its ghost, where the robot can play
+    that."""
+    assert result.certified is not None
+    assert result.table is not None
+    certificate, take = result.certified.certificate, result.certified.take
+    on = result.request.on_slope(model)
+    walk = _vendor_walk(on, float(take.time[-1]))
+    replay = write_replay(folder / "replay.html", on, take, None if walk is None else walk[0], title="optimised gait").path
+    report = Report("Optimised gait", _headline(result), CLAIM, _key_numbers(certificate), _provenance(certificate, model))
+    ghost = "" if walk is None else " The ghost is the ROBOTIS walk on the same model, from the same place."
+    strip = film_strip(on, take, None if walk is None else walk[0])
+    if result.problem:
+        report.add(Section("Not met", [Text(result.problem)]))
+    report.add(Section("The gait", [Replay(replay, "Six seconds from rest, with the ground's forces." + ghost, strip),
+                                    *_walking(take, on, walk)]))
+    report.add(_limits_section(certificate))
+    report.add(_draws_section(certificate))
+    report.add(_way_section(certificate))
+    report.add(_table_section(result.table))
+    return report.write(folder / PAGE)
+
+
+def _vendor_walk(model: RobotModel, seconds: float) -> tuple[Take, GaitMeasure] | None:
+    """The ROBOTIS walk for so long, and its numbers; None for a robot with other joints."""
+    try:
+        motion = load_motion(data_file(WALK), model)
+    except InputError:
+        return None
+    commands = motion.commands(math.ceil(seconds / motion.duration))
+    take = simulate_batch([Job(model, SimulationConfig(), commands, seconds, 0.3, name="ROBOTIS walk")])[0]
+    return take, measure(take, model, motion.duration, motion.duration)
+
+
+def _headline(result: Optimized) -> str:
+    assert result.certified is not None
+    n, d = result.certified.certificate.nominal, result.certified.certificate.draws
+    turns = n["unit"] == "rad/s"
+    speed = f"{math.degrees(n['speed']):.0f} deg/s" if turns else f"{100 * n['speed']:.0f} cm/s"
+    said = f"{str(result.request)[0].upper()}{str(result.request)[1:]}: {speed} on the model"
+    if d.get("count"):
+        said += f"; of {d['count']} robots nobody measured {d['falls'] or 'none'} fell"
+    return said + ("." if result.met else "; the request is not met.")
+
+
+def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
+    n, d, e = certificate.nominal, certificate.draws, certificate.other_engine
+    turns = n["unit"] == "rad/s"
+    factor, unit = (180 / math.pi, "deg/s") if turns else (100.0, "cm/s")
+    worst = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
+    numbers = [("speed", f"{factor * n['speed']:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} by the step"),
+               ("limit that binds", worst.name, f"{worst.value:.3g} of {worst.limit:.3g} {worst.unit}, {worst.where}"),
+               ("largest RMS torque", f"{max(n['RMS torque N m'].values()):.2f} N m", "ROBOTIS advises 0.28"),
+               ("electrical power", f"{n['electrical power W']:.0f} W",
+                f"cost of transport {n['electrical cost of transport']:.1f}")]
+    if d.get("count"):
+        low = d["speed " + n["unit"]][1]
+        numbers.insert(1, ("5th percentile of draws", f"{factor * low:.1f} {unit}",
+                           f"heading {d['heading deg/m RMS']:.1f} deg/m RMS"))
+    if e:
+        numbers.append((f"speed kept in {e['name']}", f"{100 * e['speed kept']:.0f} %",
+                        f"heading {e['heading apart deg/m']:+.1f} deg/m apart"))
+    return numbers
+
+
+def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | None) -> list[Part]:
+    stance = stance_of(foot_phases(take, model), take)
+    last = float(take.since_start[-1])
+    others = {} if walk is None else {"ROBOTIS walk": walk[0]}
+    assert take.torque is not None
+    limit = {j: model.servo(j).torque_at_full_duty for j in take.joints}
+    busiest = take.joints[int(np.argmax((take.torque**2).mean(axis=0)))]
+    return [
+        Picture(body_path(take, others=others), "Path of the body, from above and over time."),
+        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in the last two seconds."),
+        Picture(phase_portrait(busiest, take), f"Speed over angle of {busiest}, the servo with most to do."),
+        Details("Angles asked and reached, torques, attitude", [
+            Picture(joint_grid(take, stance=stance, span=(max(last - 1.5, 0.0), last)),
+                    "Each joint, asked (ramp) and reached; the foot's stance is shaded."),
+            Picture(joint_torques(take.since_start, take.joints, {"on the link": take.torque}, limit=limit),
+                    "Torque of each joint, and the servo's at full duty."),
+            Picture(body_attitude(take, others=others))])]
+
+
+def _limits_section(certificate: Certificate) -> Section:
+    rows = [[m.name, m.where, f"{m.value:.3g}", f"{m.limit:.3g}", m.unit, f"{100 * m.margin:.0f} %",
+             "advice" if m.advice else "kept" if m.use <= 1 else "broken"] for m in certificate.margins]
+    shown = [rows[certificate.margins.index(m)] for _, m in each(certificate.margins)]
+    header = ["limit", "where", "value", "limit", "unit", "left", ""]
+    return Section("Limits", [
+        Picture(limit_bars(certificate), "The worst joint or place of each limit; beyond one it is broken. Hatched: advice of "
+                "ROBOTIS, which is no limit of this request."),
+        Table(header, shown), Details("Every limit of every joint", [Table(header, rows)])])
+
+
+def _draws_section(certificate: Certificate) -> Section:
+    d, floor = certificate.draws, certificate.floor
+    parts: list[Part] = []
+    if d.get("count"):
+        parts += [Text(f"{d['count']} robots drawn anew, none of which the search saw: friction, supply and its sag, masses, a "
+                       f"load, zero offsets, play and latency all at once. {d['falls'] or 'None'} fell."),
+                  Picture(draw_ranges(certificate), "Thick: 5 to 95 % of the robots; thin: all; circle: the median; green: the "
+                          "nominal robot.")]
+    steps = ", ".join(f"{k} {100 * v:.1f}" for k, v in floor["speed"].items())
+    unit = "0.01 rad/s" if certificate.nominal["unit"] == "rad/s" else "cm/s"
+    parts.append(Text(f"Numerical floor: the speed of the nominal robot by step and contact model is {steps} {unit}; heading "
+                      f"differs by {floor['heading deg/m, all']:.1f} deg/m (standard deviation)."))
+    e = certificate.other_engine
+    parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
+                      f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
+                      "No second engine was at hand: what is said here is one engine's word."))
+    return Section("Robots nobody measured", parts)
+
+
+def _way_section(certificate: Certificate) -> Section:
+    rows = [[name, *(f"{value:.2f}" for value in part.values())] for name, part in certificate.ways.items()
+            if isinstance(part, dict) and name != "at rest"]
+    said = ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
+            "The robot is jerked more than by the gait itself.")
+    return Section("In and out", [
+        Text("`start.csv` leads from neutral through the gait's stance and one cycle of half its size into the gait, `stop.csv` "
+             "back to neutral. " + said),
+        Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows)])
+
+
+def _table_section(table: GaitTable) -> Section:
+    cycle = table.cycle
+    rows = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, goals)] for k, goals in enumerate(cycle.goals)]
+    speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
+    shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
+    return Section("The table", [
+        Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it asks for `certificate.json` beside "
+             "it."),
+        Table(["pose", "dwell [ms]", *cycle.joints], rows, "Goal positions, 512 is neutral."),
+        Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
+
+
+def _provenance(certificate: Certificate, model: RobotModel) -> Provenance:
+    p = certificate.provenance
+    more = {"rollouts": str(p["rollouts"]), "searched in": f"{p['searched in']} s", "certified in": f"{p['certified in']} s",
+            "ensemble": str(p["ensemble_sha256"])[:12], "table": certificate.tables["gait"][:12]}
+    return replace(Provenance.of(model, seed=int(p["seed"])), more=tuple(more.items()))
