@@ -16,7 +16,8 @@ from typing import NoReturn
 import workbench
 
 VERBS = (
-    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "record", "bench",
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
+    "record", "bench",
 )
 
 

@@ -38,6 +38,7 @@ class FrictionAsymmetry(Effect):
     name = "friction_asymmetry"
     layer = "actuator"
     places = ("joint",)
+    family = "friction"
     parameters = (Parameter("ratio", "", 0.1, 10.0, 1.3),)
 
     def sentence(self, spec: EffectSpec) -> str:

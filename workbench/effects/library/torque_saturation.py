@@ -36,6 +36,7 @@ class TorqueSaturation(Effect):
     name = "torque_saturation"
     layer = "actuator"
     places = ("joint",)
+    family = "electrical"
     under_load = True
     parameters = (Parameter("torque", "N m", 0.02, 100.0, 1.0),)
 
