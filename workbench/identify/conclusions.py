@@ -99,7 +99,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
     at = 0
-    for p in c.effect.parameters:
+    for p in c.given:
         if p.vector:
             three = [tuple(float(v) for v in column[at:at + 3]) for column in (values, low, high)]
             out[p.name] = Estimate(three[0], three[1], three[2], p.unit)  # type: ignore[arg-type]
