@@ -49,4 +49,4 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     assert left.where == ("three",)
     assert left.unit == "deg"
     assert left.error > 5 * left.floor > 0.0
-    assert "coulomb_friction(three)" in left.description
+    assert "coulomb_friction(three)" in str(left.description)

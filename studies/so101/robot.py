@@ -10,14 +10,13 @@ Zero and sign of the joints are the URDF's; `zero.py` checks them against the re
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from workbench.recording.formats.sage import URDF_JOINTS
+from workbench.recording.joint_names import URDF_JOINTS
 from workbench.robot import InputError, ServoConstants
 from workbench.robot.yaml_file import yaml_text
 
@@ -117,4 +116,4 @@ def servo(jaw_range: float | None = None) -> ServoConstants:
 
 def servo_yaml(constants: ServoConstants) -> str:
     """servo.yaml (contract, section 4)."""
-    return yaml_text({k: v for k, v in asdict(constants).items() if v is not None})
+    return yaml_text(constants.written())

@@ -12,9 +12,10 @@ from workbench.compare.prediction import Predicted, predict_session
 from workbench.compare.results import Comparison
 from workbench.compare.session import Session, load_session
 from workbench.compare.session_takes import no_progress
+from workbench.experiment.next_experiment import with_next_experiment
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.findings import Diagnosis
-from workbench.identify.take_report import TakeStory
+from workbench.identify.take_report import TakeReport
 from workbench.motion import Motion, save_motion
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
@@ -70,11 +71,11 @@ class DiagnoseOptions:
 @dataclass(frozen=True)
 class DiagnosisResult:
     """Which physics the model left out. diagnosis: verdict, findings, what stays unexplained; its `model` is the robot with
-    what was found. stories: the takes behind it. next_motion: to record next, where two explanations tie."""
+    what was found. takes: those behind it. next_motion: to record next, where two explanations tie."""
 
     diagnosis: Diagnosis
     session: Session
-    stories: tuple[TakeStory, ...]
+    takes: tuple[TakeReport, ...]
     next_motion: Motion | None = None
 
     @property
@@ -88,7 +89,7 @@ class DiagnosisResult:
         simulate the predictions. InputError where they cannot be written."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
-        paths = write_diagnosis(self.diagnosis, self.stories, folder, str(self.session.path), progress)
+        paths = write_diagnosis(self.diagnosis, self.takes, folder, str(self.session.path), progress)
         if self.next_motion is not None and self.diagnosis.next_experiment is not None:
             paths.append(folder / self.diagnosis.next_experiment.motion)
             save_motion(self.next_motion, paths[-1])
@@ -122,8 +123,9 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
     """
     options = options or DiagnoseOptions()
     session = _loaded(session)
-    told = diagnose_session(session, progress, options.jobs, options.resume, options.thorough)
-    return DiagnosisResult(told.diagnosis, session, told.stories, told.motion)
+    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough)
+    diagnosis, motion = with_next_experiment(found, options.jobs, progress)
+    return DiagnosisResult(diagnosis, session, found.takes, motion)
 
 
 def predict(session: Session | str | PathLike[str], folder: str | PathLike[str], model: RobotModel | None = None,

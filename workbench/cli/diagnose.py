@@ -39,14 +39,15 @@ def run(args: argparse.Namespace) -> int:
 
     session = load_session(args.session)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
-        told = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
-        paths = told.save(folder, progress, args.jobs)
-    for name, reason in told.diagnosis.left_out:
+        result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
+        paths = result.save(folder, progress, args.jobs)
+    diagnosis = result.diagnosis
+    for name, reason in diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
-    if told.diagnosis.stopped:
+    if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
-    print(f"verdict: {told.diagnosis.verdict}")
-    for finding in told.diagnosis.findings:
+    print(f"verdict: {diagnosis.verdict}")
+    for finding in diagnosis.findings:
         print(f"  {_line(finding)}")
     print(f"wrote {args.out}: {', '.join(path.name for path in paths if path.parent == folder)}")
     return 0

@@ -22,8 +22,8 @@ from workbench.cli.log import LOGGER, RunLog, speak_up
 from workbench.cli.progress import progress_mode
 
 VERBS = (
-    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "record",
-    "bench", "doctor",
+    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos",
+    "play", "record", "bench", "doctor",
 )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.device.limits import Violation, check_limits
+from workbench.device.limits import Violation, refuse_broken_limits
 from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, InputError, RobotModel
@@ -42,11 +42,7 @@ def export(
     where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
     """
     table = motion.as_table()
-    violations = check_limits(table, model, simulated)
-    broken = [v for v in violations if not v.warning]
-    if broken and not force:
-        more = f" (and {len(broken) - 1} more)" if len(broken) > 1 else ""
-        raise InputError(motion.source, f"{broken[0]}{more}; not exported")
+    violations = refuse_broken_limits(table, model, force, simulated, "not exported")
     return Export(tuple(write_tables(table, out_dir, model.bus_ids or BUS_IDS)), tuple(violations))
 
 

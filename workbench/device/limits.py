@@ -60,6 +60,17 @@ def check_limits(table: PoseTable, model: RobotModel, simulated: Take | None = N
     return sorted(found, key=lambda violation: violation.warning)
 
 
+def refuse_broken_limits(table: PoseTable, model: RobotModel, force: bool, simulated: Take | None = None,
+                         refused: str = "not played") -> list[Violation]:
+    """`check_limits`; InputError where a limit is broken, unless `force`. Warnings never are."""
+    violations = check_limits(table, model, simulated)
+    broken = [v for v in violations if not v.warning]
+    if broken and not force:
+        more = f" (and {len(broken) - 1} more)" if len(broken) > 1 else ""
+        raise InputError(table.source, f"{broken[0]}{more}; {refused}")
+    return violations
+
+
 def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     """Goals beyond the joints' ranges; half a count is granted, as a limit itself may round to that."""
     angles, ranges = table.angles(), joint_ranges(model)

@@ -9,6 +9,10 @@ import numpy as np
 
 from workbench.motion.commands import Commands
 
+LOOP = 2e-3
+"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that, so that every
+model may set out that much sooner or later, and no delay is known better."""
+
 
 def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
     """The commands without some to one joint, which keeps the goal and speed that it had."""
@@ -33,7 +37,11 @@ def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands
     column = np.arange(len(commands.joints))
     waiting = row < 0  # still in neutral
     held = np.maximum(row, 0)
-    return Commands(times, commands.joints, np.where(waiting, 0.0, commands.goals[held, column]),
-                    np.where(waiting, 0.0, commands.speeds[held, column]),
-                    np.where(waiting, True, commands.enabled[held, column]), commands.end + late,
-                    commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)])
+    goals, speeds, enabled = (np.where(waiting, neutral, rows[held, column]) for rows, neutral in (
+        (commands.goals, 0.0), (commands.speeds, 0.0), (commands.enabled, True)))
+    poses = commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)]
+    told = np.isin(times, commands.times)  # else instants would double with each joint that is late by a delay of its own
+    for values in (goals, speeds, enabled):
+        told[1:] |= (values[1:] != values[:-1]).any(axis=1)
+    told[0] |= not waiting[0].all()
+    return Commands(times[told], commands.joints, goals[told], speeds[told], enabled[told], commands.end + late, poses[told])

@@ -21,7 +21,8 @@ class Recording:
     kind: "motive", "joint_log", "bam_log" or "sage". version: of the format, as the file says. rate: [Hz], NaN if irregular.
     frames: (N,) frame numbers. time: (N,) [s] from the first frame. rigid_bodies: asset -> path in the capture's axes
     (Motive: x forward up to a yaw, y up, z right). markers: name -> (N, 3) [m]. channels: joint channel
-    ("goal.J", "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J", "enabled.J") -> (N,).
+    ("goal.J", "speed.J" of moving, "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J",
+    "enabled.J") -> (N,).
     metadata: what the header said. problems: one line each.
     """
 

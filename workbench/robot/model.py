@@ -119,7 +119,7 @@ class RobotModel:
         return {
             "description": self.description,
             "base": self.base,
-            "servos": {j: asdict(s) for j, s in self.servos.items()},
+            "servos": {j: s.constants() for j, s in self.servos.items()},
             "ground": asdict(self.ground),
             "rigid_bodies": dict(self.rigid_bodies),
             "bus_ids": dict(self.bus_ids),

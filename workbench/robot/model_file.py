@@ -69,7 +69,7 @@ def save_model(model: RobotModel, path: str | Path, posterior: Posterior | None 
 def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = None,
                provenance: Mapping[str, Any] | None = None) -> str:
     """The text of a model.yaml that is to lie in `folder`: an SDF inside that is named relative to it, another absolutely."""
-    servos = {j: {k: v for k, v in asdict(model.servo(j)).items() if v is not None} for j in model.joints}
+    servos = {j: model.servo(j).written() for j in model.joints}
     alike = len({repr(s) for s in servos.values()}) == 1
     content: dict[str, Any] = {
         "format": 1,

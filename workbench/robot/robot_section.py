@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from workbench.robot.errors import InputError
@@ -12,7 +12,7 @@ from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import ServoConstants, load_servo_constants, servo_constants
 from workbench.robot.yaml_file import Fields
 
-_CONSTANTS = {f.name for f in fields(ServoConstants)}
+_CONSTANTS = set(ServoConstants().constants())
 
 
 def read_model(top: Fields) -> RobotModel:

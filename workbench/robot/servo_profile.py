@@ -90,7 +90,7 @@ class ServoProfile:
     alarms, refusals: what the bits of an answer's error byte mean, of the servo's state and of the instruction; with protocol
     2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
     control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
-    when the bus falls silent.
+    when the bus falls silent. marker: a register that does nothing to the joint and is forgotten when the servo restarts.
     """
 
     name: str
@@ -115,6 +115,7 @@ class ServoProfile:
     position_mode: Mapping[str, int]
     unlock: Switch | None = None
     watchdog: tuple[str, float] | None = None
+    marker: str | None = None
     source: str = field(default="", compare=False)
 
     @property

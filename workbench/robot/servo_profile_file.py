@@ -42,7 +42,7 @@ def load_profile(path: str | Path) -> ServoProfile:
         law=_law(_needed(top, "law"), registers), nominal=_nominal(_needed(top, "nominal")),
         alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
-        source=str(path))
+        marker=_marker(top, registers), source=str(path))
     if profile.protocol not in (1, 2):
         raise top.error("protocol", f"expected 1 or 2, got {profile.protocol}")
     for f in (position, speed, load, top):
@@ -190,6 +190,13 @@ def _watchdog(f: Fields | None, registers: Mapping[str, Register]) -> tuple[str,
     found = _register_name(f, registers), _number(f, "unit")
     f.done()
     return found
+
+
+def _marker(f: Fields, registers: Mapping[str, Register]) -> str | None:
+    name = f.text("marker")
+    if name is not None and name not in registers:
+        raise f.error("marker", f"no register '{name}'")
+    return name
 
 
 def _register_name(f: Fields, registers: Mapping[str, Register]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -62,6 +63,11 @@ class Bus:
         """Lets time go by."""
         self._guarded(lambda: self.port.pause(seconds))
 
+    def close(self) -> None:
+        """Gives the port back; one that is gone is none."""
+        with suppress(*GONE):
+            self.port.closePort()
+
     # One servo
 
     def read(self, servo: int, *names: str) -> dict[str, int]:
@@ -73,8 +79,8 @@ class Bus:
         count = max(r.address + r.size for r in wanted) - first
 
         def call() -> tuple[bytes, int, int]:
-            data, result, error = self._handler.readTxRx(self.port, servo, first, count)
-            return bytes(data or b""), result, error
+            answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
+            return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
 
         data = self._asked(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
@@ -92,7 +98,7 @@ class Bus:
             if check and self.read(servo, name)[name] != value:
                 found = self.read(servo, name)[name]
                 raise BusError(f"reads {found} after {value} was written", servo, self.joints.get(servo), name)
-        if switch is not None:
+        if switch is not None and "id" not in values:
             self._write(servo, switch.register, switch.closed)
 
     def exists(self, servo: int) -> int | None:
@@ -240,6 +246,18 @@ class Bus:
             return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
         head = b"\xff\xff\xfd\x00" + bytes([servo, 3, 0, 1])
         return head + int(self._handler.updateCRC(0, head, len(head))).to_bytes(2, "little")
+
+    def _read_packet(self, servo: int, address: int, count: int) -> list[int]:
+        """As the SDK's packet handlers want it: header and checksum are theirs to fill in."""
+        if self.profile.protocol == 1:
+            return [0, 0, servo, 4, 2, address, count, 0]
+        return [0, 0, 0, 0, servo, 7, 0, 2, address & 0xFF, address >> 8, count & 0xFF, count >> 8, 0, 0]
+
+    def _parameters(self, answer: list[int]) -> bytes:
+        """Those that the answer itself says it has: the SDK's readTxRx takes the checksum for data where there are fewer."""
+        if self.profile.protocol == 1:
+            return bytes(answer[5:answer[3] + 3])
+        return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
 
     def _raw(self, data: bytes, most: int) -> bytes:
         """What comes back within the time of `most` bytes after a packet, whatever it is."""

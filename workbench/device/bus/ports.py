@@ -90,9 +90,9 @@ def open_port(name: str, rate: int) -> SerialPort:
     return port
 
 
-def serial_ports() -> list[str]:
-    """Serial ports of this machine."""
-    return sorted(str(p.device) for p in list_ports.comports())
+def serial_ports(usb: bool = False) -> list[str]:
+    """Serial ports of this machine, or those on USB alone."""
+    return sorted(str(p.device) for p in list_ports.comports() if p.vid is not None or not usb)
 
 
 def ftdi_latency(name: str) -> float | None:

@@ -47,7 +47,7 @@ class Survey:
         """What has to be mended before anything moves, a line each."""
         out = [f"joint {joint} does not answer" for joint in self.missing]
         out += [f"servo {i}: two servos seem to have this ID, or its cable is bad" for i in self.doubled]
-        low, high = self.profile.supply
+        out += self._supply()
         for servo in self.found.values():
             name = f"servo {servo.id}" + (f" ({servo.joint})" if servo.joint else "")
             if servo.number not in self.profile.models:
@@ -55,13 +55,21 @@ class Survey:
                 continue
             if servo.alarms:
                 out.append(f"{name}: alarm: {', '.join(servo.alarms)}")
-            if not low <= servo.voltage <= high:
-                out.append(f"{name}: {servo.voltage:.1f} V; expected {low:g} to {high:g} V")
             limit = servo.registers.get("temperature_limit", 70)
             if servo.temperature > limit - COOLER:
                 out.append(f"{name}: {servo.temperature} deg C; expected at least {COOLER} below its limit of {limit}")
             out += [f"{name}: {problem}" for problem in _mode(servo, self.profile)]
         return tuple(out)
+
+    def _supply(self) -> list[str]:
+        """One line: the supply is everybody's."""
+        low, high = self.profile.supply
+        off = [s for s in self.found.values() if s.number in self.profile.models and not low <= s.voltage <= high]
+        if not off:
+            return []
+        volts = sorted(s.voltage for s in off)
+        span = f"{volts[0]:.1f} V" if volts[0] == volts[-1] else f"{volts[0]:.1f} to {volts[-1]:.1f} V"
+        return [f"{len(off)} of {len(self.found)} servos read {span}; expected {low:g} to {high:g} V"]
 
     def registers(self) -> ServoRegisters:
         """As evidence of a session."""

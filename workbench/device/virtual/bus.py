@@ -133,6 +133,8 @@ class ServoBus:
         for host in self._hosts:
             if host is not burst.talker:
                 host.hear(ends, values, garbled, burst.rate)
+        if burst.talker in self.servos:  # an answer is no instruction, though its bytes look like one
+            return
         for servo_rate, kind in {(s.rate, id(s.profile.protocol)): s.profile.protocol for s in self.servos}.items():
             self._decode(servo_rate, kind.decoder, burst, ends, values)
 

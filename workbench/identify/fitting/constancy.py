@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import Fit, Search, Slopes
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Slopes
 from workbench.identify.ledger import in_file_units
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
+from workbench.identify.reasons import ParameterDrift
 from workbench.identify.rollouts import Jury
-from workbench.identify.selection.record import LEAST_GAIN
 
 Array = NDArray[np.float64]
 CHANGE = 0.25
@@ -43,8 +43,7 @@ class Drift:
         channel = joint if joint in e.channels else e.joints[0]
         sigma, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
         return Unexplained(() if joint is None else (joint,), self.rms * sigma, self.chance * sigma, unit,
-                           f"{p.name} of {self.effect} would have to go from {self.first:.3g} to {self.last:.3g} {p.unit} within "
-                           "a take: something that changes looks like it")
+                           ParameterDrift(self.effect.name, self.effect.where, p.name, self.first, self.last, p.unit))
 
 
 def drifts(search: Search, fit: Fit) -> list[Drift]:

@@ -11,6 +11,7 @@ from workbench.effects.base import si_values
 from workbench.identify.findings import Unexplained
 from workbench.identify.fitting.fits import Fit
 from workbench.identify.parameters import Candidate
+from workbench.identify.reasons import DownwardPull
 from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
@@ -33,10 +34,7 @@ def hanging(fit: Fit) -> Iterator[Unexplained]:
             down = -float(_pull(c, x)[2])
             slopes = np.array([-_pull(c, x + step)[2] - down for step in STEP * np.eye(len(x))]) / STEP
             deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
-            yield Unexplained((), down, deviation, "N",
-                              f"the {c.name.replace('_', ' ')} is a pull straight down, with the weight of "
-                              f"{1e3 * down / GRAVITY:.0f} g that does not resist being moved as a load does: something that "
-                              "hangs and swings looks like it")
+            yield Unexplained((), down, deviation, "N", DownwardPull(c.name, down / GRAVITY))
 
 
 def _pull(c: Candidate, x: Array) -> Array:

@@ -19,8 +19,8 @@ from workbench.robot.files import write_whole
 
 Array = NDArray[np.float64]
 _DEGREES = np.pi / 180
-_SCALE = {"goal": _DEGREES, "position": _DEGREES, "velocity": _DEGREES, "duty": 1.0, "current": 1.0, "temperature": 1.0,
-          "enabled": 1.0}
+_SCALE = {"goal": _DEGREES, "speed": _DEGREES, "position": _DEGREES, "velocity": _DEGREES, "duty": 1.0, "current": 1.0,
+          "temperature": 1.0, "enabled": 1.0}
 _TRUE, _FALSE = {"1", "1.0", "true"}, {"0", "0.0", "false"}
 
 
@@ -59,8 +59,10 @@ def read_joint_log(path: str | Path) -> Recording:
     on = np.ones(len(time))
     enabled = np.column_stack([channels.get(f"enabled.{j}", on) for j in joints]) != 0
     initial = np.array([channels.get(f"position.{j}", [np.nan])[0] for j in joints])
+    at_once = np.zeros(len(time))
+    speeds = np.column_stack([np.nan_to_num(channels.get(f"speed.{j}", at_once)) for j in joints])
     return Recording(source=source, kind="joint_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
-                     units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial))
+                     units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial, speeds))
 
 
 def _check_names(source: str, names: list[str]) -> None:

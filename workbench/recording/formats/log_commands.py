@@ -11,15 +11,18 @@ Array = NDArray[np.float64]
 
 
 def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_],
-                     initial: Array | None = None) -> Commands:
-    """Rows of goals (N, n) [rad] at times (N,) [s] as commands, zero at the first row, at once (speed 0), only where something
-    changes. A blank goal repeats the last one, or before the first is `initial` (n,) [rad], neutral where that is unknown."""
+                     initial: Array | None = None, speeds: Array | None = None) -> Commands:
+    """Rows of goals (N, n) [rad] at times (N,) [s] as commands, zero at the first row, only where something changes.
+
+    speeds (N, n) [rad/s]: moving speeds; left out, or 0: at once. A blank goal repeats the last one, or before the first is
+    `initial` (n,) [rad], neutral where that is unknown."""
     at = np.where(np.isfinite(goals), np.arange(len(goals))[:, None], -1)
     at = np.maximum.accumulate(at, axis=0)
     first = np.zeros(len(joints)) if initial is None else np.nan_to_num(initial)
     held = np.where(at >= 0, np.take_along_axis(goals, np.maximum(at, 0), axis=0), first)
-    state = np.concatenate([held, enabled], axis=1)
+    speeds = np.zeros(goals.shape) if speeds is None else speeds
+    state = np.concatenate([held, enabled, speeds], axis=1)
     change = np.concatenate([[True], np.any(state[1:] != state[:-1], axis=1)])
     rows = np.flatnonzero(change)
-    return Commands(times=time[rows] - time[0], joints=joints, goals=held[rows], speeds=np.zeros((len(rows), len(joints))),
+    return Commands(times=time[rows] - time[0], joints=joints, goals=held[rows], speeds=speeds[rows],
                     enabled=enabled[rows], end=float(time[-1] - time[0]), poses=np.full(len(rows), -1))

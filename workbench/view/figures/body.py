@@ -15,7 +15,7 @@ from workbench.compare.metrics import heading, travelled, turned
 from workbench.recording.take import Take
 from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import OTHERS, RECORDED, SIMULATED, legend_above, new_figure, styled
-from workbench.view.scene.playback import names_of, since_start
+from workbench.view.playback import names_of, since_start
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from workbench.view.figures.style import (
     panels,
     styled,
 )
-from workbench.view.scene.playback import names_of, since_start
+from workbench.view.playback import names_of, since_start
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from workbench.compare.footfalls import FootPhases
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, legs
-from workbench.view.scene.playback import since_start
+from workbench.view.playback import since_start
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,8 @@ from workbench.view.figures import (
     unseen_of,
 )
 from workbench.view.figures.errors import LIMIT
+from workbench.view.playback import common_span
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.scene.playback import common_span
 from workbench.view.scene.replay import write_replay
 
 SHOWN = 3

@@ -18,8 +18,8 @@ from workbench.compare.session_takes import Progress, no_progress, read_takes, r
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
-from workbench.view.scene.playback import Playback, common_span, play
-from workbench.view.scene.shapes import RobotShapes, robot_shapes
+from workbench.view.playback import Playback, common_span, play
+from workbench.view.shapes import RobotShapes, robot_shapes
 
 FRAME_RATE = 30.0
 GHOST = Rgba(0.85, 0.37, 0.0, 0.4)

@@ -1,0 +1,64 @@
+"""Arguments of the verbs that talk to servos, and the bus that they stand for."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import AbstractContextManager, closing
+from typing import TYPE_CHECKING
+
+from workbench.cli.options import load_model
+
+if TYPE_CHECKING:
+    from workbench.device.bus import Bus
+    from workbench.robot import RobotModel
+    from workbench.simulation.virtual_robot import VirtualRobot
+
+VIRTUAL = "virtual"
+
+
+def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None:
+    """--port, --rate, --echo, --robot."""
+    said = default or "the only USB adapter"
+    parser.add_argument("--port", metavar="PORT", default=default,
+                        help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {said})")
+    parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S", help="of the servos' bus (default: 1000000)")
+    parser.add_argument("--echo", action="store_true", help="the adapter is known to hear what it sends itself")
+    parser.add_argument("--robot", metavar="FILE",
+                        help=f"with --port {VIRTUAL}: the robot as it really is, a model.yaml with effects (default: the model)")
+    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="the robot stands on its feet, or is held")
+
+
+def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | None:
+    """The emulated robot of `--port virtual`, else None."""
+    if args.port != VIRTUAL:
+        return None
+    from workbench.simulation.virtual_robot import VirtualRobot
+
+    real = load_model(args.robot) if args.robot else model
+    base = "fixed" if model.kinematics.fixed_to_world else args.base
+    return VirtualRobot(real, base, args.rate)
+
+
+def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> AbstractContextManager[Bus]:
+    """The bus, whose port is closed at the end; BusError in one line where there is none."""
+    from workbench.device.bus import Bus, BusError, open_port, serial_ports
+    from workbench.device.bus.survey import bus_ids, family_of
+
+    profile = family_of(model)
+    joints = {i: joint for joint, i in bus_ids(model).items()}
+    if virtual is not None:
+        return closing(Bus(virtual.port, profile, joints, strip_echo=args.echo))
+    name = args.port
+    if name is None:
+        ports = serial_ports(usb=True)
+        if len(ports) != 1:
+            raise BusError(f"{len(ports)} USB adapters with a serial port{': ' if ports else ''}{', '.join(ports)}; say which "
+                           f"with --port, of {', '.join(serial_ports()) or 'none'}")
+        name = ports[0]
+    port = open_port(name, args.rate)
+    try:
+        return closing(Bus(port, profile, joints, strip_echo=args.echo))
+    except BaseException:
+        port.closePort()
+        raise
+

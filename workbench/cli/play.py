@@ -1,0 +1,70 @@
+"""`workbench play MOTION`: a motion on the robot, from this computer."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from workbench.cli.bus_options import add_bus, make_virtual, open_bus
+from workbench.cli.options import add_model, add_out, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "play",
+        help="play a motion on the robot and log its joints",
+        description="Checks all servos, ramps from where the robot is to neutral, plays the motion, ramps back and releases. "
+        "Writes a joint log with the times really sent, and registers.yaml. Ctrl-C, heat, low voltage or a silent servo end it "
+        "with a ramp to neutral; docs/robot-host.md says what else can happen.")
+    parser.add_argument("motion", metavar="MOTION", nargs="?")
+    add_bus(parser)
+    add_model(parser)
+    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="how often the motion is played (default: 3)")
+    parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
+    add_out(parser, default="runs/play")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
+    from workbench.cli.progress import Progress
+    from workbench.device.bus.survey import survey
+    from workbench.device.limits import refuse_broken_limits
+    from workbench.device.play import PlayOptions, finish_log, perform, preflight
+    from workbench.device.stop import stop_on_signals
+    from workbench.motion import load_motion
+    from workbench.robot import InputError
+    from workbench.robot.servo_registers import save_registers
+
+    if (args.motion is None) == (args.finish is None):
+        raise InputError(None, "expected either MOTION or --finish JOURNAL")
+    if args.finish is not None:
+        journal = Path(args.finish)
+        print(f"wrote {finish_log(journal, args.out / f'{journal.stem}.csv')}")
+        return 0
+    model = load_model(args.model)
+    motion = load_motion(args.motion, model)
+    refuse_broken_limits(motion.as_table(), model, args.force)
+    log = args.out / f"{motion.name}.csv"
+    virtual = make_virtual(args, model)
+    with Progress("play") as progress, open_bus(args, model, virtual) as bus, stop_on_signals() as stop:
+        found = survey(bus, model, ids=(), progress=progress)
+        preflight(found)
+        registers = found.registers()
+        save_registers(registers, args.out / "registers.yaml")
+        commands = motion.commands(args.cycles)
+        played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
+                         PlayOptions(hold=args.hold), progress=progress)
+    for departure in registers.departures(model):
+        print(f"workbench play: warning: {departure}", file=sys.stderr)
+    if bus.retries:
+        print(f"workbench play: warning: {bus.retries.total()} answers had to be asked for again", file=sys.stderr)
+    print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late; torque is "
+          f"{'off' if played.released else 'on'}")
+    if played.stopped:
+        print(f"workbench play: stopped: {played.stopped}; torque is off", file=sys.stderr)
+    return 0 if not played.stopped else 130 if played.stopped == "Ctrl-C" else 2

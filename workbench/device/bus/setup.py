@@ -1,0 +1,63 @@
+"""Setting servos as the model has them: IDs, return delay, angle limits; nothing else, and read back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from workbench.device.bus.bus import Bus
+from workbench.device.bus.errors import BusError
+from workbench.device.bus.survey import Survey, bus_ids
+from workbench.robot import InputError, RobotModel
+from workbench.robot.servo_profile import ServoProfile
+
+
+def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> dict[str, int]:
+    """What `set_up` writes into a joint's servo: no return delay, and the model's range of the joint."""
+    frame = model.kinematics.frames[joint]
+    lowest, highest = _limit(frame.lower, profile), _limit(frame.upper, profile)
+    return {"return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
+
+
+def set_up(bus: Bus, model: RobotModel, found: Survey) -> Iterator[str]:
+    """Writes what differs, servo by servo, and yields a line for each register. BusError where a servo has its torque on, as its
+    EEPROM cannot be written then or the robot may move, or where a register does not keep what was written."""
+    on = [servo for servo in found.found.values() if servo.joint and servo.registers.get("torque_enable")]
+    if on:
+        raise BusError("its torque is on; switch the robot off and on before its registers are written", on[0].id, on[0].joint)
+    for servo in found.found.values():
+        if servo.joint is None or servo.number not in bus.profile.models:
+            continue
+        for name, value in wanted_registers(model, servo.joint, bus.profile).items():
+            if servo.registers[name] != value:
+                bus.write(servo.id, {name: value})
+                yield f"servo {servo.id} ({servo.joint}): {name} {servo.registers[name]} -> {value}"
+
+
+def set_id(bus: Bus, model: RobotModel, found: Survey, joint: str) -> str:
+    """Gives the one servo on the bus the ID of a joint; InputError where there are several."""
+    ids = bus_ids(model)
+    if joint not in ids:
+        raise InputError(model.description, f"the robot has no joint '{joint}'; its joints: {' '.join(model.joints)}")
+    if len(found.found) != 1 or found.doubled:
+        count = len(found.found) + len(found.doubled)
+        raise BusError(f"{count} IDs answer; expected one servo alone on the bus to give it the ID of {joint}")
+    (old,) = found.found
+    new = ids[joint]
+    if new == old:
+        return f"servo {old}: has the ID of {joint} already"
+    bus.write(old, {"id": new}, check=False)
+    bus.pause(0.05)
+    if bus.exists(new) is None:
+        raise BusError(f"does not answer to {new} after its ID was written", old)
+    lock = bus.profile.unlock
+    if lock is not None:
+        bus.write(new, {lock.register: lock.closed})
+    return f"servo {old} is now {new} ({joint})"
+
+
+def _limit(angle: float, profile: ServoProfile) -> int:
+    """Nearest count of a joint's limit that the register holds."""
+    if math.isinf(angle):
+        return 0 if angle < 0 else profile.largest_position
+    return min(max(profile.centre + round(angle / profile.count), 0), profile.largest_position)

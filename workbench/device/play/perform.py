@@ -1,0 +1,45 @@
+"""A whole playing: journal, motion, joint log; whatever ends it, the log of what was done is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from workbench.device.bus.bus import Bus
+from workbench.device.bus.survey import Survey
+from workbench.device.play.journal import PlayJournal
+from workbench.device.play.log import finish_log
+from workbench.device.play.player import Played, PlayOptions, play
+from workbench.device.play.watch import WatchOptions
+from workbench.motion.commands import Commands
+from workbench.robot import InputError
+
+
+def preflight(found: Survey) -> None:
+    """InputError where something has to be mended before anything moves: the first problem, and how many there are."""
+    problems = found.problems()
+    if problems:
+        more = f" (and {len(problems) - 1} more; `workbench servos` shows all)" if len(problems) > 1 else ""
+        raise InputError(None, f"{problems[0]}{more}; nothing was moved")
+
+
+def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callable[[], str], options: PlayOptions | None = None,
+            watching: WatchOptions | None = None, progress: Callable[[str, float | None], None] | None = None) -> Played:
+    """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds what was done; it
+    goes when the log is on the disk. BusError, or InputError, where it could not be played to an end that is in order."""
+    preflight(found)
+    joints = [servo.joint for servo in found.found.values() if servo.joint is not None]
+    path = log.with_suffix(".play")
+    with PlayJournal(path, {"joints": joints, "family": bus.profile.name}) as journal:
+        try:
+            played = play(bus, found, commands, journal, stop, options, watching, progress)
+        except BaseException:
+            journal.close()
+            with suppress(InputError):
+                finish_log(path, log)
+                path.unlink()
+            raise
+    finish_log(path, log)
+    path.unlink()
+    return played

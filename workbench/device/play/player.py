@@ -1,0 +1,233 @@
+"""From where the robot is to neutral, through the motion, and back; whatever happens, it ends in good order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from workbench.device.bus.bus import Bus, BusOptions
+from workbench.device.bus.errors import BusError
+from workbench.device.bus.survey import Survey
+from workbench.device.play.journal import PlayJournal
+from workbench.device.play.rig import Rig
+from workbench.device.play.watch import Reaction, Watch, WatchOptions
+from workbench.motion.commands import Commands
+from workbench.robot import InputError
+
+Progress = Callable[[str, float | None], None]
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """How a motion is played.
+
+    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of a
+    ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within: how
+    long it may take beyond the ramp [s]. rest: how long the robot stands in neutral before the first pose and after the last [s];
+    a recording needs half a second of it. watchdog: silence after which servos that can stop by themselves [s]. hold: torque
+    stays on at the end.
+    """
+
+    ramp_speed: float = 0.6
+    step: float = 0.02
+    arrive: float = math.radians(12)
+    within: float = 1.0
+    rest: float = 1.0
+    watchdog: float = 0.5
+    hold: bool = False
+
+
+@dataclass(frozen=True)
+class Played:
+    """How it went. started: when the first pose was sent, on the bus's clock [s]. worst_late: by which a pose was late [s].
+    stopped: why it ended early, "" where it did not. released: whether torque is off."""
+
+    journal: Path
+    started: float
+    poses: int
+    worst_late: float
+    stopped: str
+    released: bool
+
+
+class _StopError(Exception):
+    """Ends the motion; carries the reaction."""
+
+    def __init__(self, reaction: Reaction) -> None:
+        super().__init__(reaction.reason)
+        self.reaction = reaction
+
+
+def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop: Callable[[], str],
+         options: PlayOptions | None = None, watching: WatchOptions | None = None, progress: Progress | None = None) -> Played:
+    """Plays commands on the servos of a survey that had no problems.
+
+    stop(): why it should end, "" as long as it should not (a signal). BusError where the bus fails before anything moved, or for
+    good; then what is left of the bus has been told to release.
+    """
+    ids = {servo.joint: servo.id for servo in found.found.values() if servo.joint is not None}
+    unknown = [joint for joint in commands.joints if joint not in ids]
+    if unknown:
+        raise InputError(None, f"the motion moves joint {unknown[0]}, which is not on the bus")
+    limits = {servo.id: servo.registers.get("temperature_limit", 70) for servo in found.found.values()}
+    watch = Watch(bus.profile, {i: j for j, i in ids.items()}, limits, watching)
+    rig = Rig(bus, ids, watch, journal)
+    return _Performance(rig, stop, options or PlayOptions(), progress or (lambda what, done: None)).run(commands)
+
+
+class _Performance:
+    """One playing of one motion."""
+
+    def __init__(self, rig: Rig, stop: Callable[[], str], options: PlayOptions, progress: Progress) -> None:
+        self.rig, self.stop, self.options, self.progress = rig, stop, options, progress
+        self.started, self.poses, self.worst_late = math.nan, 0, 0.0
+        self.goals: dict[str, float] = {}
+
+    def run(self, commands: Commands) -> Played:
+        rig, bus = self.rig, self.rig.bus
+        neutral = dict.fromkeys(rig.ids, 0.0)
+        kept, bus.options = bus.options, BusOptions(tries=1, settle=bus.options.settle)
+        stopped = ""
+        released = False
+        try:
+            self._take_hold(kept)
+            try:
+                self._ramp(neutral, "to neutral")
+                self._arrived(neutral)
+                self._rest()
+                self._poses(commands)
+                self._ramp(neutral, "back to neutral")
+                self._rest()
+            except _StopError as e:
+                stopped = self._stopped(e.reaction, neutral)
+            if not self.options.hold or stopped:
+                bus.release(rig.ids.values())
+                rig.journal.write(t=bus.now(), torque=dict.fromkeys(rig.ids, False))
+                released = True
+            self._watchdog(0)
+            rig.mark(False)
+            bus.pause(0.002)
+        except BaseException as e:
+            rig.journal.write(t=_time(bus), stopped=str(e) or type(e).__name__)
+            self._let_go()
+            raise
+        finally:
+            bus.options = kept
+        return Played(rig.journal.path, self.started, self.poses, self.worst_late, stopped, released)
+
+    def _take_hold(self, careful: BusOptions) -> None:
+        """Torque on, each joint where it is: reads before it writes anything, with as many tries as it takes."""
+        rig, bus = self.rig, self.rig.bus
+        bus.options = careful
+        self.progress("reading where each joint is", None)
+        self.goals = rig.measure()
+        self._keep_in_range()
+        slow = dict.fromkeys(rig.ids, self.options.ramp_speed)
+        rig.send(self.goals, slow)
+        rig.torque(True)
+        rig.send(self.goals, slow)  # families that forget a goal while torque is off
+        self._watchdog(self.options.watchdog)
+        rig.mark(True)
+        bus.options = BusOptions(tries=1, settle=careful.settle)
+
+    def _keep_in_range(self) -> None:
+        profile = self.rig.bus.profile
+        low, high = profile.angle(0), profile.angle(profile.largest_position)
+        for joint, angle in self.goals.items():
+            if not low <= angle <= high:
+                raise BusError(f"stands at {math.degrees(angle):.0f} deg, beyond what it can be told; turn it back by hand",
+                               self.rig.ids[joint], joint)
+
+    def _ramp(self, target: Mapping[str, float], what: str) -> None:
+        """All joints to a pose, smoothly, the farthest at the ramp's speed."""
+        start, options = dict(self.goals), self.options
+        duration = max(max(abs(target[j] - start[j]) for j in start) / options.ramp_speed, 0.3)
+        bus, begin = self.rig.bus, self.rig.bus.now()
+        speeds = dict.fromkeys(start, 2 * options.ramp_speed)
+        while True:
+            s = min((bus.now() - begin) / duration, 1.0)
+            weight = s * s * (3 - 2 * s)
+            self.progress(what, s)
+            self.goals = {j: start[j] + weight * (target[j] - start[j]) for j in start}
+            self.rig.send(self.goals, speeds)
+            if s >= 1:
+                return
+            self._read_until(bus.now() + options.step)
+
+    def _arrived(self, target: Mapping[str, float]) -> None:
+        """Waits until every joint is near its goal; a joint that never is ends it: something holds it, or it has no strength."""
+        bus, end = self.rig.bus, self.rig.bus.now() + self.options.within
+        while True:
+            self._read_until(bus.now() + 0.1)
+            far = {j: a for j, a in self.rig.angles.items() if abs(a - target[j]) > self.options.arrive}
+            if not far:
+                return
+            if bus.now() >= end:
+                joint, angle = next(iter(far.items()))
+                stands, wanted = math.degrees(angle), math.degrees(target[joint])
+                raise _StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): stands at {stands:.0f} deg and not "
+                                                     f"at {wanted:.0f}; what holds it?"))
+
+    def _rest(self) -> None:
+        self.progress("resting in neutral", None)
+        self._read_until(self.rig.bus.now() + self.options.rest)
+
+    def _poses(self, commands: Commands) -> None:
+        """Each pose at its time after the first, however late the one before it was."""
+        bus = self.rig.bus
+        self.started = bus.now()
+        for k, time in enumerate(commands.times.tolist()):
+            due = self.started + time
+            self._read_until(due)
+            self.progress("playing", time / commands.end)
+            goals = dict(zip(commands.joints, commands.goals[k].tolist()))
+            sent = self.rig.send(goals, dict(zip(commands.joints, commands.speeds[k].tolist())))
+            self.goals |= goals
+            self.poses += 1
+            if not k:
+                self.started = sent
+            self.worst_late = max(self.worst_late, sent - self.started - time)
+        self._read_until(self.started + commands.end)
+
+    def _read_until(self, due: float) -> None:
+        self.rig.read_until(due, lambda: bool(self.stop()))
+        if self.rig.watch.reaction is not None:
+            raise _StopError(self.rig.watch.reaction)
+        if self.stop():
+            raise _StopError(Reaction("neutral", self.stop()))
+
+    def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
+        """Does what the reaction says. On the way to neutral nothing but time and a lost port ends it any more."""
+        rig = self.rig
+        rig.journal.write(t=rig.bus.now(), stopped=reaction.reason)
+        if reaction.how == "neutral":
+            rig.watch = Watch(rig.bus.profile, {}, {}, WatchOptions(confirm=10**9, silent=math.inf))
+            self.stop = lambda: ""
+            known = {j: a for j, a in rig.angles.items() if math.isfinite(a)}
+            self.goals = {j: known.get(j, g) if abs(known.get(j, g) - g) > 0.5 else g for j, g in self.goals.items()}
+            self._keep_in_range()
+            self._ramp(neutral, f"stopping ({reaction.reason})")
+        return reaction.reason
+
+    def _watchdog(self, seconds: float) -> None:
+        """Servos that have one are told to stop by themselves when the bus falls silent; 0 tells them not to."""
+        profile = self.rig.bus.profile
+        if profile.watchdog is not None:
+            name, unit = profile.watchdog
+            self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
+
+    def _let_go(self) -> None:
+        """The last try, on a bus that may be gone."""
+        try:
+            self.rig.bus.release(self.rig.ids.values())
+        except (BusError, InputError):
+            return
+
+
+def _time(bus: Bus) -> float:
+    try:
+        return bus.now()
+    except Exception:  # a port that is gone may not even have a clock
+        return math.nan

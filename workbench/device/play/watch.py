@@ -1,0 +1,91 @@
+"""What ends a motion before its time: the table of reactions. No single reading does."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from workbench.robot.servo_profile import ServoProfile
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """how: "neutral", ramp to neutral and then release; or "release", torque off at once."""
+
+    how: Literal["neutral", "release"]
+    reason: str
+
+
+@dataclass(frozen=True)
+class WatchOptions:
+    """When a reading counts.
+
+    confirm: how many readings in a row of one servo. silent: how long it may say nothing [s]. cooler: how far below the limit at
+    which it shuts itself down it has to stay [deg C], so that there is torque left for the way to neutral. dead: share of the
+    lowest voltage below which a ramp would only brown out again.
+    """
+
+    confirm: int = 2
+    silent: float = 0.3
+    cooler: int = 3
+    dead: float = 0.75
+
+
+SUDDEN = ("electrical shock", "current")
+"""Alarms of a servo that burns what it gets: torque goes at once."""
+
+
+class Watch:
+    """Judges readings as they come; the first that is confirmed is the reaction, and stays."""
+
+    def __init__(self, profile: ServoProfile, joints: Mapping[int, str], limits: Mapping[int, int],
+                 options: WatchOptions | None = None) -> None:
+        self._profile, self._joints, self._limits = profile, dict(joints), dict(limits)
+        self._options = options or WatchOptions()
+        self._seen: Counter[tuple[int, str]] = Counter()
+        self._answered: dict[int, float] = {}
+        self.reaction: Reaction | None = None
+
+    def answered(self, servo: int, time: float, values: Mapping[str, int], alarms: tuple[str, ...]) -> None:
+        """A whole answer at a time [s]: registers in counts, and the alarms of its error byte."""
+        self._answered[servo] = time
+        low = self._profile.supply[0]
+        volts = values["present_voltage"] / 10 if "present_voltage" in values else None
+        heat, limit = values.get("present_temperature"), self._limits.get(servo, 70)
+        sudden = [a for a in alarms if a in SUDDEN]
+        shut = [a for a in alarms if a not in (*SUDDEN, "voltage", "heat")]
+        self._judge(servo, "sudden", bool(sudden), "release", f"alarm: {', '.join(sudden)}")
+        self._judge(servo, "alarm", bool(shut), "neutral", f"alarm: {', '.join(shut)}")
+        if heat is not None:
+            self._judge(servo, "heat", heat > limit - self._options.cooler or "heat" in alarms, "neutral",
+                        f"{heat} deg C, its limit is {limit}")
+        if volts is not None:
+            self._judge(servo, "dead", volts < low * self._options.dead, "release", f"{volts:.1f} V, the supply is gone")
+            self._judge(servo, "low", volts < low, "neutral", f"{volts:.1f} V, below {low:g} V")
+        marker = self._profile.marker
+        if marker and marker in values:
+            self._judge(servo, "restart", not values[marker], "neutral", "it restarted; did its supply break down?")
+        if "torque_enable" in values:
+            self._judge(servo, "limp", not values["torque_enable"], "neutral",
+                        "its torque is off")
+
+    def silent(self, servo: int, time: float) -> None:
+        """No answer, or none that could be read, at a time [s]."""
+        since = time - self._answered.setdefault(servo, time)
+        if since >= self._options.silent:
+            self._react("neutral", servo, f"silent for {since:.1f} s")
+
+    def _judge(self, servo: int, what: str, bad: bool, how: Literal["neutral", "release"], reason: str) -> None:
+        if not bad:
+            self._seen[servo, what] = 0
+            return
+        self._seen[servo, what] += 1
+        if self._seen[servo, what] >= self._options.confirm:
+            self._react(how, servo, reason)
+
+    def _react(self, how: Literal["neutral", "release"], servo: int, reason: str) -> None:
+        if self.reaction is None:
+            joint = self._joints.get(servo)
+            self.reaction = Reaction(how, f"servo {servo}" + (f" ({joint})" if joint else "") + f": {reason}")
