@@ -73,7 +73,7 @@ def test_units_and_frame_numbers_are_the_start_files(arm: Path) -> None:
     (path,) = predict_session(session, session.model, arm / "out", yaw=0.3).paths
     predicted, start = read_recording(path), read_recording(arm / "start.csv")
     assert "Length Units,Millimeters" in path.read_text()
-    assert predicted.rigid_bodies["Trunk"].p[0] == pytest.approx(start.rigid_bodies["Trunk"].p[0], abs=1e-6)
+    assert predicted.rigid_bodies["Trunk"].p[0] == pytest.approx(start.rigid_bodies["Trunk"].p[0], abs=1e-3)
 
 
 def _with_log(folder: Path, rows: str, base: str = "fixed") -> Path:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
 import sys
@@ -41,6 +42,7 @@ def make_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one verb; `argv` without the program's name. Returns the exit code."""
     args = make_parser().parse_args(argv)
+    logging.getLogger("drake").setLevel(logging.ERROR)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     try:
         code: int = args.run(args)
