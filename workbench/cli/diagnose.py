@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from workbench.cli.check import add_yes, check_session
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "the session's predictions and report.html. A run that was stopped goes on where it was.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
+    add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     parser.add_argument("--thorough", action="store_true",
@@ -42,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
+    check_session("diagnose", session, args.yes)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
         result = diagnose_session(session, progress, args.jobs, memory, args.thorough)
         diagnosis, motion = with_next_experiment(result, args.jobs, progress)

@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import NoReturn
 
 import workbench
+from workbench.cli.progress import forget_warnings, show_warnings
 
 VERBS = (
     "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
@@ -42,10 +43,12 @@ def make_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one verb; `argv` without the program's name. Returns the exit code."""
     args = make_parser().parse_args(argv)
-    logging.getLogger("drake").setLevel(logging.ERROR)  # what Drake warns of in a model is told by the workbench
+    logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
+    forget_warnings()
     try:
         code: int = args.run(args)
+        show_warnings()
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -62,6 +65,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     finally:
         signal.signal(signal.SIGTERM, previous)
+
+
+def _only_errors(record: logging.LogRecord) -> bool:
+    return record.levelno >= logging.ERROR
 
 
 def _readable(error: OSError | ValueError) -> str | None:

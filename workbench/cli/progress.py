@@ -5,10 +5,31 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from typing import TextIO
 
+_WAITING: list[str] = []
+"""Warnings that were not shown yet."""
 QUIET = 1.5
 """Runs shorter than this say nothing [s], so that their errors stand alone."""
+
+
+def warn(verb: str, lines: Iterable[str]) -> None:
+    """Lines for stderr, shown once the run turns out to be long, or when it has ended well: where it is refused, the error stands
+    alone."""
+    _WAITING.extend(f"workbench {verb}: warning: {line}" for line in lines)
+
+
+def show_warnings(stream: TextIO | None = None) -> None:
+    """Shows what waits."""
+    for line in _WAITING:
+        print(line, file=stream or sys.stderr)
+    _WAITING.clear()
+
+
+def forget_warnings() -> None:
+    """Of a run that was refused, or has not begun."""
+    _WAITING.clear()
 
 
 class Progress:
@@ -54,6 +75,7 @@ class Progress:
         """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
         with self._lock:
             self._speaks = True
+            show_warnings(self._stream)
             if self._now[0]:
                 self._show()
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,18 +28,51 @@ LONG = 600.0
 _ROUTINE = " unseen in "
 
 
+@dataclass(frozen=True)
+class SessionCheck:
+    """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
+    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves."""
+
+    problems: Mapping[str, Sequence[str]]
+    longest: float
+    longest_name: str
+    damaged: frozenset[str] = frozenset()
+
+    @property
+    def warnings(self) -> list[str]:
+        """A line for each file with problems that are not routine, as gaps of cameras are."""
+        out = []
+        for of, lines in self.problems.items():
+            bad = [] if of in self.damaged else serious(lines)
+            out += [f"{of}: {told(bad)}"] if bad else []
+        return out
+
+
 def session_problems(session: Session) -> list[str]:
-    """A line for each thing that is doubtful in a session: its robot, its servos, each of its takes and predictions, every
-    file of them read and checked against the robot. A damaged take, which the verbs leave out, is one of them."""
-    out = [f"robot: {text}" for text in model_problems_of(session.model)]
-    for take in session.takes:
-        out += [f"take '{take.name}': {text}" for text in _take_problems(take, session)]
-    for entry in session.predict:
-        out += [f"predict '{entry.name}': {text}" for text in _prediction_problems(entry, session)]
+    """A line for each thing that is doubtful in a session."""
+    return [f"{of}: {text}" for of, lines in session_check(session).problems.items() for text in lines]
+
+
+def session_check(session: Session) -> SessionCheck:
+    """What is doubtful in a session: its robot, its servos, each of its takes and predictions, every file of them read and
+    checked against the robot. A damaged take, which the verbs leave out, is one of them."""
+    found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
+    seconds = {"": 0.0}
+    damaged = set()
+    for of, entries in (("take", session.takes), ("predict", session.predict)):
+        for entry in entries:
+            name = f"{of} '{entry.name}'"
+            try:
+                found[name], seconds[name] = (_take_problems(entry, session) if isinstance(entry, TakeSpec)
+                                              else _prediction_problems(entry, session))
+            except InputError as e:
+                found[name] = [str(e)]
+                damaged.add(name)
     if session.predict and not session.takes and any(p.start is not None for p in session.predict):
-        out.append("predict: no take from which the yaw of the capture can be found; expected a captured one under "
-                   "`takes`, or the session's `yaw`")
-    return out
+        found["predict"] = ["no take from which the yaw of the capture can be found; expected a captured one under `takes`, or "
+                            "the session's `yaw`"]
+    longest = max(seconds, key=lambda name: seconds[name])
+    return SessionCheck({of: lines for of, lines in found.items() if lines}, seconds[longest], longest, frozenset(damaged))
 
 
 def model_problems_of(model: RobotModel) -> list[str]:
@@ -73,9 +107,10 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
     return sorted(dict.fromkeys(out), key=lambda text: _ROUTINE in text)
 
 
-def motion_problems(motion: Motion) -> list[str]:
-    """What is doubtful in a motion, a line each."""
-    out = [] if motion.closes else ["the last row differs from the first: played in a loop, the motion jumps"]
+def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
+    """What is doubtful in a motion that is played `cycles` times, a line each."""
+    jumps = cycles > 1 and not motion.closes
+    out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
     if (text := long_work(motion.duration)) is not None:
         out.append(text)
     if np.abs(motion.angles).max() < _SMALL and np.ptp(motion.angles) > 0:
@@ -92,7 +127,12 @@ def long_work(seconds: float) -> str | None:
     """A line where so much is to be simulated that it was probably a slip."""
     if seconds <= LONG:
         return None
-    return f"lasts {seconds:.0f} s ({seconds / 60:.0f} minutes of the robot's time): a slip in times, frames or cycles?"
+    return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: a slip in times, frames or cycles?"
+
+
+def serious(problems: Sequence[str]) -> list[str]:
+    """Those that are not routine, as gaps of cameras are."""
+    return [text for text in problems if _ROUTINE not in text]
 
 
 def told(problems: Sequence[str], most: int = 3) -> str:
@@ -101,16 +141,13 @@ def told(problems: Sequence[str], most: int = 3) -> str:
     return "; ".join(problems[:most]) + more
 
 
-def _take_problems(take: TakeSpec, session: Session) -> list[str]:
+def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     model = session.model_of(take)
-    try:
-        recording = readable(take.recording, model)
-        out = recording_problems(take.recording, recording, model)
-    except InputError as e:
-        return [str(e)]
+    recording = readable(take.recording, model)
+    out = recording_problems(take.recording, recording, model)
     commands = take.commands(model) or recording.commands
     if commands is None:
-        return [*out, "no motion is given, and the recording has no commands"]
+        raise InputError(take.recording, "no motion is given, and the recording has no commands")
     if np.ptp(commands.goals, axis=0).max() == 0 and len(commands.times) > 1:
         out.insert(0, "its commands never change")
     seconds = float(recording.time[-1] - recording.time[0])
@@ -118,26 +155,22 @@ def _take_problems(take: TakeSpec, session: Session) -> list[str]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
     if len(recording.time) < _FEWEST:
         out.insert(0, f"holds {len(recording.time)} frame(s); expected {_FEWEST} or more")
-    return ([text] if (text := long_work(seconds)) else []) + out
+    return ([text] if (text := long_work(seconds)) else []) + out, seconds
 
 
 _FEWEST = 20  # frames of a take
 
 
-def _prediction_problems(entry: PredictSpec, session: Session) -> list[str]:
+def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:
     model = session.model_of(entry)
-    try:
-        if entry.commands is not None:
-            log = named_by_model(read_recording(entry.commands), model)
-            text = long_work(float(log.time[-1] - log.time[0]))
-            return [text] if text else []
-        assert entry.start is not None
-        assert entry.motion is not None
-        start = read_start(entry.start)
-        check_assets(start, model)
-        seconds = (entry.frames or 0) / start.rate
-        load_motion(entry.motion, model).commands(entry.cycles)
-    except InputError as e:
-        return [str(e)]
-    text = long_work(seconds)
-    return [text] if text else []
+    if entry.commands is not None:
+        log = named_by_model(read_recording(entry.commands), model)
+        seconds = float(log.time[-1] - log.time[0])
+        return ([text] if (text := long_work(seconds)) else []), seconds
+    assert entry.start is not None
+    assert entry.motion is not None
+    start = read_start(entry.start)
+    check_assets(start, model)
+    seconds = (entry.frames or 0) / start.rate
+    load_motion(entry.motion, model).commands(entry.cycles)
+    return ([text] if (text := long_work(seconds)) else []), seconds
