@@ -14,6 +14,7 @@ _SHOWN = 6
 """Columns named in one line."""
 _RENAMES = (
     (r"(?i)time|timestamp|t|stamp|__time|%time|secs|time[ _]?\[?\(?s\)?\]?", "time"),
+    (r"(?i)(?:.*/)?(.+?)[._/](?:velocity|vel|speed)", "velocity."),
     (r"(?i)(?:action|command|cmd|target|goal|desired|reference|setpoint|ref)[._/ ](.+?)(?:[._/](?:pos|position|q))?", "goal."),
     (r"(?i)(.+?)[._/](?:goal|target|command|cmd|desired|reference|goal_position|position_cmd|pos_cmd)", "goal."),
     (r"(?i)(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|q|/?joint_states)[._/ ](.+?)"
