@@ -8,6 +8,8 @@ import sys
 from workbench.cli.check import add_yes, check_files, check_session
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
+STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Registers the verb."""
@@ -41,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.report.comparison import write_comparison
 
     config = SimulationConfig(contact=args.contact)
-    with output_directory(args.out) as folder, Progress("compare") as progress:
+    with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:
         if args.b is None:
             session = load_session(args.a)
             if args.model != PUPPY:

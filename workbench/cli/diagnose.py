@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from workbench.identify.findings import Finding
 
 
+STAGES = ("reading", "simulating", "looking anew", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
+"""Of a search that goes back and forth, the last begun."""
+
+
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Registers the verb."""
     parser = subparsers.add_parser(
@@ -45,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
 
     session = load_session(args.session)
     check_session("diagnose", session, args.yes)
-    with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
+    with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
+          rollout_memory(args.out, session) as memory):
         result = diagnose_session(session, progress, args.jobs, memory, args.thorough)
         diagnosis, motion = with_next_experiment(result, args.jobs, progress)
         paths = write_diagnosis(diagnosis, result.takes, folder, str(args.session), progress)

@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     if uncertified is not None and not args.force:
         raise uncertified
     base = "fixed" if model.kinematics.fixed_to_world else "free"
-    with output_directory(args.out) as folder, Progress("export") as progress:
+    with output_directory(args.out) as folder, Progress("export", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, args.cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)

@@ -44,7 +44,8 @@ def run(args: argparse.Namespace) -> int:
     else:
         check_files("inverse-dynamics", (args.input, *([args.motion] if args.motion else [])),
                     load_model(args.model, args.packages), args.cycles, args.yes)
-    with output_directory(args.out) as folder, Progress("inverse-dynamics") as progress:
+    stages = ("simulating", "inverse dynamics", "writing")
+    with output_directory(args.out) as folder, Progress("inverse-dynamics", stages=stages) as progress:
         if args.take:
             other = None if args.model == PUPPY else load_model(args.model, args.packages)
             model, result = forces_of_take(args.input, args.take, progress, other)

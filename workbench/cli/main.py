@@ -10,6 +10,7 @@ import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
@@ -46,6 +47,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     forget_warnings()
+    if argv is None and not sys.warnoptions:  # of the libraries, to those who develop with them
+        warnings.simplefilter("ignore")
+        os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
     try:
         code: int = args.run(args)
         show_warnings()
@@ -57,6 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError as e:
+        print(f"workbench {args.verb}: error: out of memory ({' '.join(str(e).split()) or 'no more is free'})", file=sys.stderr)
+        return 2
     except (OSError, ValueError) as e:
         problem = _readable(e)
         if problem is None:

@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     session = load_session(args.session)
     model = session.model if args.model is None else load_model(args.model, args.packages)
     check_session("predict", session, args.yes)
-    with output_directory(args.out) as folder, Progress("predict") as progress:
+    with output_directory(args.out) as folder, Progress("predict", stages=("finding", "simulating")) as progress:
         predicted = predict_session(session, model, folder, progress, config=SimulationConfig(contact=args.contact),
                                     n_jobs=args.jobs)
     for name, reason in predicted.left_out:

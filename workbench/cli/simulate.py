@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     check_model("simulate", model)
     check_motion("simulate", motion, args.cycles, args.yes)
     config = SimulationConfig(time_step=args.time_step, base=args.base, drive=args.drive, contact=args.contact)
-    with output_directory(args.out) as folder, Progress("simulate") as progress:
+    with output_directory(args.out) as folder, Progress("simulate", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
         progress("writing")
         title = f"{motion.name}, {args.contact} contact, {args.drive} drive"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -224,7 +225,7 @@ class Jury:
         simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
         self._known[key] = simulated
         if self.memory is not None:
-            part = self.memory / f"{key}.part.npy"
+            part = self.memory / f"{key}.{os.getpid()}.part.npy"  # two runs may share the memory
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
 

@@ -58,10 +58,10 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
     goals, positions = np.deg2rad(goals * scales), np.deg2rad(positions * scales)
     channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}
     channels |= {f"position.{j}": positions[:, i] for i, j in enumerate(joints)}
-    return Recording(source=source, kind="lerobot", time=time,
-                     version=str(_info(path).get("codebase_version", "")), frames=np.arange(len(time)), rate=rate_of(time), units="degrees",
-                     channels=channels, problems=tuple(problems),
-                     metadata={"episode": chosen, "robot_type": str(_info(path).get("robot_type") or "")},
+    info = _info(path)
+    return Recording(source=source, kind="lerobot", version=str(info.get("codebase_version", "")), time=time,
+                     frames=np.arange(len(time)), rate=rate_of(time), units="degrees", channels=channels,
+                     problems=tuple(problems), metadata={"episode": chosen, "robot_type": str(info.get("robot_type") or "")},
                      commands=commands_of_rows(time, joints, goals, np.ones(goals.shape, dtype=bool)))
 
 
@@ -86,8 +86,8 @@ def _table(path: Path) -> pa.Table:
             known = parquet.read_schema(regular_file(file, MOST)).names
             missing = [name for name in (_TIME, _ACTION, _STATE) if name not in known]
             if missing:
-                raise InputError(file, f"column '{missing[0]}' is missing (found {', '.join(known[:8])}); expected a LeRobot data "
-                                       f"set with {_TIME}, {_ACTION} and {_STATE}")
+                raise InputError(file, f"column '{missing[0]}' is missing (found {', '.join(known[:8])}); expected a LeRobot "
+                                       f"data set with {_TIME}, {_ACTION} and {_STATE}")
             parts.append(parquet.read_table(file, columns=[_TIME, _ACTION, _STATE, *([_EPISODE] if _EPISODE in known else [])]))
         except (pa.ArrowException, OSError, ValueError) as e:
             if isinstance(e, InputError):
