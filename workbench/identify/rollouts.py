@@ -82,7 +82,7 @@ class RolloutEvaluator:
                 for q, by_take in zip(questions, keys)]
 
     def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
-        """A jury on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
+        """The same on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
         other = RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
         other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
         return other

@@ -80,7 +80,7 @@ class DroppedCommands:
 def with_dropped_commands(
     evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]
 ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
-    """A jury whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
+    """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
     effect, *_ = (*estimated_by("missed poses"), None)
     if effect is None:
         return evaluator, ()

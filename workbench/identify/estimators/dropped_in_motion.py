@@ -33,7 +33,7 @@ MOST, TURNS = 0.5, 12
 
 
 def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], Sequence[int]]) -> RolloutEvaluator:
-    """The jury whose takes are played without some poses, by take and joint."""
+    """The evaluator whose takes are played without some poses, by take and joint."""
     evidence = list(evaluator.evidence)
     for (i, joint), poses in lost.items():
         take = evidence[i].take

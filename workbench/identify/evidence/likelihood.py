@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.read_off_candidates import gammaln
+from scipy.special import gammaln
 
 Array = NDArray[np.float64]
 GRID = 48
