@@ -54,7 +54,7 @@ def pool():
 
 def seen(evidence, monkeypatch, ill=(), model=None):
     monkeypatch.setattr(built, "channel_gaps", lambda e, r: dict.fromkeys(ill, 9.0))
-    return built.build_of(model or puppy_model(), [evidence], {0: None})
+    return built.geometry_of(model or puppy_model(), [evidence], {0: None})
 
 
 def test_what_is_as_drawn_is_not_asked_about_and_what_cameras_do_not_see_is(monkeypatch):
