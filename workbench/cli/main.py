@@ -16,8 +16,8 @@ from typing import NoReturn
 import workbench
 
 VERBS = (
-    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
-    "record", "bench",
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
+    "servos", "play", "record", "bench",
 )
 
 
