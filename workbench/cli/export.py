@@ -19,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "export",
         help="turn a motion into the robot's firmware tables",
-        description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt and motion.h. The motion is "
+        description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt, motion.h and motion.table. "
+        "The motion is "
         "played on the simulated robot first; what breaks a servo's range, speed or torque, or was made by optimize and lacks "
         "its certificate, is refused unless --force.",
     )
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     check_model("export", model)
     check_motion("export", motion, args.cycles, args.yes)
     motion.as_table()  # refused before the simulation
-    uncertified = _uncertified(args.motion, motion, model)
+    uncertified = uncertified_by(args.motion, motion, model)
     if uncertified is not None and not args.force:
         raise uncertified
     base = "fixed" if model.kinematics.fixed_to_world else "free"
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _uncertified(path: str, motion: Motion, model: RobotModel) -> InputError | None:
+def uncertified_by(path: str, motion: Motion, model: RobotModel) -> InputError | None:
     """What is wrong with the certificate of a motion that `optimize` made."""
     from workbench.gait.certificate import check_certificate, has_mark
     from workbench.robot import InputError

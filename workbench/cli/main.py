@@ -19,8 +19,8 @@ import workbench
 from workbench.cli.progress import forget_warnings, show_warnings
 
 VERBS = (
-    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
-    "record", "bench",
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
+    "servos", "play", "record", "bench",
 )
 
 
