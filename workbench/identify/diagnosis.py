@@ -26,6 +26,7 @@ from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.ledger import channel_gaps, ledger
 from workbench.identify.problem import BLOCK, USES, TakeEvidence, gather
 from workbench.identify.proposals import candidates
+from workbench.identify.registers import read_off_registers
 from workbench.identify.rollouts import Jury, Question
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import doubted
@@ -73,6 +74,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     nominal = begun = Search(jury, session.model).evaluated([])
     gap = ledger(evidence, nominal.residuals)
     build = _believed(build_of(session.model, evidence, nominal.residuals), jury, session.model, nominal) if gap else Build()
+    build = replace(build, measured=(*build.measured, *read_off_registers(session)))
     known = session.with_model(build.added_to(session.model))
     if build.measured:  # what steps and contact models leave open is another robot's
         evidence = _seen(known, [replace(t, model=known.model_of(t.spec)) for t in takes], config, n_jobs, progress).evidence

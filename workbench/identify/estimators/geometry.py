@@ -58,12 +58,14 @@ class Told:
 
 @dataclass(frozen=True)
 class Measured:
-    """A link that is not as long as drawn, or a horn that sits turned: value and standard deviation in the contract's unit."""
+    """A link that is not as long as drawn, a horn that sits turned, or what a servo's register says: value and standard deviation
+    in the contract's unit. seen: how that is known, for a person."""
 
     effect: str
     where: str
     mean: float
     sigma: float
+    seen: str = SEEN
 
     @property
     def variance(self) -> float:
@@ -80,7 +82,7 @@ class Measured:
         half = Z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
         return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
-                       evidence=known_effects()[self.effect].sentence(self.spec) + SEEN)
+                       evidence=known_effects()[self.effect].sentence(self.spec) + self.seen)
 
 
 @dataclass(frozen=True)
