@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.recording.take import Take
-from workbench.robot import FEET, RobotModel
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 FALLEN_TILT, FALLEN_HEIGHT, TURNED = np.radians(25), 0.6, np.radians(30)
@@ -62,7 +62,7 @@ def read_gait(take: Take, model: RobotModel, cycle: float, tips: Mapping[str, Ar
     cycles = [(take.time >= k * cycle) & (take.time < (k + 1) * cycle) for k in range(1, int(take.time[end] / cycle + 1e-9))]
     walking = np.any(cycles, axis=0)
     ahead = np.column_stack([np.cos(heading), np.sin(heading)])[walking]
-    pull = {foot: float(np.nanmean(np.sum(take.contact[foot][walking, :2] * ahead, axis=1))) for foot in FEET}
+    pull = {foot: float(np.nanmean(np.sum(take.contact[foot][walking, :2] * ahead, axis=1))) for foot in tips}
     goals = dict(zip(take.commands.joints, np.ptp(take.commands.goals, axis=0)))
 
     def share(*joints: str) -> float:
@@ -87,8 +87,8 @@ def _slip(take: Take, model: RobotModel, tips: Mapping[str, Array]) -> float:
     poses = model.kinematics.forward(take.q, take.joints)
     base = Rotation.from_quat(take.quat_WB, scalar_first=True)
     total = load = 0.0
-    for foot in FEET:
-        p, R = poses[f"{foot}_link"]
+    for foot in tips:
+        p, R = poses[model.foot_links[foot]]
         p_W = take.p_WB + base.apply(p + R @ tips[foot])
         speed = np.linalg.norm(np.gradient(p_W[:, :2], take.time, axis=0), axis=1)
         f = np.nan_to_num(take.contact[foot][:, 2])

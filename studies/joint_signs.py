@@ -56,7 +56,7 @@ from studies.joint_signs_report import write_report
 from studies.joint_signs_rule import FREE, Choice, Verdict, knees_alike, label
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
-from workbench.robot import FEET, JOINTS, Ground, data_file, puppy_model
+from workbench.robot import JOINTS, Ground, data_file, puppy_model
 from workbench.robot.files import write_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
@@ -149,7 +149,7 @@ def try_choices(choices: Sequence[Choice], condition: Condition, seconds: float,
     in_model = {j: int(frame.axis.sum()) for j, frame in model.kinematics.frames.items()}
     d = read_parts(parts).length
     tips = {foot: np.array([0, 0, -d["front_shank"]] if foot[0] == "f" else [d["back_foot_offset"], 0, -d["back_shank"]])
-            for foot in FEET}
+            for foot in model.foot_links}
     jobs = []
     for choice in choices:
         signs = signs_of(choice, relations, in_model)

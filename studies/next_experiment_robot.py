@@ -18,7 +18,7 @@ from studies.other_engine.motive_file import write_motive_csv
 from workbench.compare.comparison import noise_of
 from workbench.compare.session import Session, load_session
 from workbench.compare.session_takes import RegisteredTake, read_takes, register_takes
-from workbench.experiment.design import Sight
+from workbench.experiment.design import ObservationModel
 from workbench.experiment.projection import Shown, left_open
 from workbench.motion import Motion
 from workbench.recording.take import Take
@@ -92,7 +92,7 @@ class Jury:
         self.takes, left = register_takes(session, read, rollouts)
         assert not left, left
         noise = noise_of([t.recorded for t in self.takes]).joints
-        self.sight = Sight({j: float(np.hypot(s, FLOOR)) for j, s in noise.items()}, captured=True, rate=120.0)
+        self.sight = ObservationModel({j: float(np.hypot(s, FLOOR)) for j, s in noise.items()}, captured=True, rate=120.0)
 
     def fit(self, name: str, where: tuple[str, ...], parameter: str, values: Sequence[float]) -> Fitted:
         """The number, between the first and the last of `values`, at which an effect fits all takes best: on a grid, then between

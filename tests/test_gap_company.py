@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants
-from workbench.identify.selection.record import LEAST_GAIN
 
 
 def seen(name, signature, size=1.0):

@@ -32,7 +32,7 @@ from workbench.identify.selection.model_comparison import (
     contest,
 )
 from workbench.identify.selection.record import Chosen, Round
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import Trial, tried
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
@@ -40,12 +40,12 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
     nominal = search.evaluated([])
     pool = [c for c in candidates(session.model, search.jury.evidence)
             if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
-    trials = [t for c in pool for t in search.tried(nominal, [[c]], {0: (0,)}, lambda share: None)]  # apart: none is given up
+    trials = [t for c in pool for t in tried(search, nominal, [[c]], {0: (0,)}, lambda share: None)]  # apart: none is given up
     trials.sort(key=lambda t: -t.gain["choose"])
     assert [t.candidate.name for t in trials] == ["coulomb_friction", "viscous_friction"]
     wrong = trials[1]
     first = search.refitted(search.evaluated([(wrong.candidate, wrong.x)]), (0,), 1)
-    chosen = Chosen(first, (Round(nominal, tuple(trials), (wrong,)),))
+    chosen = Chosen(search, first, (Round(nominal, tuple(trials), (wrong,)),))
     fit, standings = contest(search, chosen, lambda what, share: None)
     assert [str(c) for c in fit.effects] == ["coulomb_friction(three)"]
     assert NOMINAL + fit.model(session.model).effects[0].parameters["torque"] == pytest.approx(HIDDEN, rel=0.06)
@@ -222,7 +222,7 @@ def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
 def test_where_nothing_stays_nothing_is_contested(worn):
     _, search, _ = worn
     nominal = search.evaluated([])
-    fit, standings = contest(search, Chosen(nominal, ()), lambda what, share: None)
+    fit, standings = contest(search, Chosen(search, nominal, ()), lambda what, share: None)
     assert fit is nominal
     assert standings == []
 
@@ -247,7 +247,7 @@ def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
 
 def test_twins_name_each_other():
     known = known_effects()
-    assert all(known[e.twin].twin == e.name for e in known.values() if e.twin)
+    assert all(e.name in known[other].equivalent_to for e in known.values() for other in e.equivalent_to)
 
 
 def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):

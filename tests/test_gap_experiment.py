@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import write_session
-from workbench.compare.footfalls import foot_points
 from workbench.compare.session import load_session
 from workbench.device.limits import check_limits
-from workbench.experiment.design import Experiment, Separation, Sight, design_experiment
+from workbench.experiment.design import Experiment, ObservationModel, Separation, design_experiment
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, Path, gravity_torque, long_runs
 from workbench.experiment.projection import Shown
@@ -15,7 +14,7 @@ from workbench.experiment.rivals import Pair
 from workbench.experiment.segment import joined
 from workbench.experiment.stance import BodyMoves
 from workbench.motion import Motion, load_motion, save_motion
-from workbench.robot import EffectSpec, puppy_model
+from workbench.robot import EffectSpec, foot_points, puppy_model
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +80,10 @@ def test_the_body_goes_down_and_the_feet_stay(puppy, arm):
     moves = BodyMoves(model, reach)
     pose = moves._pose((0.0, 0.0, -0.15, 0.0, 0.0, 0.0))
     k = model.kinematics
-    assert set(foot_points(model.path)) <= set(pose)
-    for foot in foot_points(model.path):
-        link = k.frames[foot].child
-        point = foot_points(model.path)[foot][0].mean(axis=0)
+    assert set(foot_points(model)) <= set(pose)
+    for foot in foot_points(model):
+        link = model.foot_links[foot]
+        point = foot_points(model)[foot][0].mean(axis=0)
         at = []
         for q in ({}, pose):
             p, R = k.forward(np.array([[q.get(j, 0.0) for j in model.joints]]), model.joints)[link]
@@ -129,9 +128,9 @@ def test_only_what_differs_adapts(arm):
 def test_a_flatter_law_and_a_softer_joint_are_told_apart(arm, tmp_path):
     rivals = [(arm.with_effect(EffectSpec("servo_gain", ("two",), {"ratio": 0.5})),
                arm.with_effect(EffectSpec("joint_compliance", ("two",), {"stiffness": 6.0})))]
-    sights = {"fixed": Sight(dict.fromkeys(arm.joints, np.radians(0.2)), captured=True, rate=60.0)}
+    observations = {"fixed": ObservationModel(dict.fromkeys(arm.joints, np.radians(0.2)), captured=True, rate=60.0)}
     said: list[str] = []
-    experiment = design_experiment(arm, rivals, sights, n_jobs=1, progress=lambda what, share: said.append(what))
+    experiment = design_experiment(arm, rivals, observations, n_jobs=1, progress=lambda what, share: said.append(what))
     (found,) = experiment.separations
     assert found.effects == ("servo_gain", "joint_compliance")
     assert found.separated
@@ -151,12 +150,12 @@ def test_a_flatter_law_and_a_softer_joint_are_told_apart(arm, tmp_path):
 def test_what_a_held_base_carries_shows_nowhere(arm):
     rivals = [(arm.with_effect(EffectSpec("payload", ("trunk",), {"mass": 0.2, "position": (0.0, 0.0, 0.05)})),
                arm.with_effect(EffectSpec("com_shift", ("trunk",), {"offset": (0.02, 0.0, 0.0)})))]
-    sights = {"fixed": Sight(dict.fromkeys(arm.joints, np.radians(0.2)), captured=False, rate=60.0)}
-    experiment = design_experiment(arm, rivals, sights, n_jobs=1)
+    observations = {"fixed": ObservationModel(dict.fromkeys(arm.joints, np.radians(0.2)), captured=False, rate=60.0)}
+    experiment = design_experiment(arm, rivals, observations, n_jobs=1)
     assert not experiment.separations[0].separated
     assert experiment.entry() is None
     with pytest.raises(ValueError, match="at least one pair"):
-        design_experiment(arm, [], sights)
+        design_experiment(arm, [], observations)
 
 
 def test_an_entry_names_only_what_is_separated(arm):

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from workbench.compare.footfalls import foot_heights, foot_phases, foot_points, force_phases
+from workbench.compare.footfalls import foot_heights, foot_phases, force_phases
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, foot_points
 
 FOOT = '<collision name="{}"><pose>0 0 {} 0 0 0</pose><geometry>{}</geometry></collision>'
 SDF = """<?xml version="1.0"?><sdf version="1.7"><model name="hopper">
@@ -90,7 +90,7 @@ def test_phases_from_forces(model):
 def test_points_of_a_box(tmp_path):
     path = tmp_path / "box.sdf"
     path.write_text(SDF.format(feet=FOOT.format("pad", -0.1, "<box><size>0.04 0.02 0.01</size></box>")))
-    points, radii = foot_points(path)["flb"]
+    points, radii = foot_points(RobotModel(str(path)))["flb"]
     np.testing.assert_allclose(points.min(axis=0), [-0.02, -0.01, -0.105], atol=1e-12)
     np.testing.assert_allclose(points.max(axis=0), [0.02, 0.01, -0.095], atol=1e-12)
     assert not radii.any()

@@ -34,8 +34,9 @@ class TwoWorlds:
         return Fit(tuple(c for c, _ in sizes), x, np.eye(len(x)), {}, left)
 
     def resettled(self, current, *more):
-        self.settled = self.evaluated([(c, np.array([self.tells])) for c in more])
-        return self.evaluated([(c, np.array([self.tells]) if c in more else x) for c, x in current.sizes()])
+        other = TwoWorlds(*self.leaves, self.tells)
+        other.settled = self.evaluated([(c, np.array([self.tells])) for c in more])
+        return other, self.evaluated([(c, np.array([self.tells]) if c in more else x) for c, x in current.sizes()])
 
 
 def held(size):
@@ -47,7 +48,7 @@ def held(size):
                          ids=["walks hardly mind", "walks show less of it"])
 def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(there, size, settled):
     search = TwoWorlds(held, lambda x: {None: 49000.0, 1.42: 25600.0, 1.15: there}[x], 1.15)
-    fit = heard(search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING])
+    search, fit = heard(search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING])
     assert fit.x.tolist() == [0.3, size]
     assert search.is_settled(CEILING) is settled
     assert not search.is_settled(FLOOR)
@@ -55,7 +56,8 @@ def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(ther
 
 def test_what_held_takes_do_not_gainsay_or_would_rather_not_have_stays():
     near = TwoWorlds(held, lambda x: {None: 49000.0, 1.2: 25600.0}[x], 1.15)
-    assert heard(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING]).x.tolist() == [1.2]
+    assert heard(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
     never = TwoWorlds(lambda x: 26400.0 if x is None else 26800.0, lambda x: 49000.0 if x is None else 25600.0, 1.15)
-    assert heard(never, never.evaluated([(CEILING, np.array([1.42]))]), [CEILING]).x.tolist() == [1.42]
-    assert never.settled is None
+    same, fit = heard(never, never.evaluated([(CEILING, np.array([1.42]))]), [CEILING])
+    assert fit.x.tolist() == [1.42]
+    assert same.settled is None

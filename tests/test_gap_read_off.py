@@ -88,7 +88,7 @@ def test_a_peak_of_few_frames_is_no_stop(stop, asked):
     said = np.deg2rad(np.concatenate([np.zeros(2000), peak, np.zeros(2000)]))[:, None]
     seen = np.minimum(said, np.deg2rad(stop)) + np.deg2rad(0.05)
     e = SimpleNamespace(joints=("knee",), recorded=seen, sigma=np.array([1e-3]), zero=lambda joint: 0.0)
-    assert len(_stop("knee", [e], {0: (seen - said) / e.sigma})) == asked
+    assert len(_stop(known_effects()["joint_stop"], "knee", [e], {0: (seen - said) / e.sigma})) == asked
 
 
 @pytest.mark.parametrize("upper", [18.0, 1.0])
@@ -130,10 +130,11 @@ def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet)
     slow = Candidate.of(known_effects()["command_delay"], ("one",), (0.0,))
     x = np.array([6.0])
     jury = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
-    wrong = Missed("one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
+    wrong = Missed("dropped_command", "one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
     search = Search(played_without(jury, {(0, "one"): (1,)}), quiet[0])
     current = search.evaluated([(slow, x)])
-    assert read_anew(search, current, Played(jury, (wrong,))).missed == ()
+    search, played = read_anew(search, current, Played(jury, (wrong,)))
+    assert played.missed == ()
     assert search.jury.cost(search.evaluated([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
     assert search.jury.evidence[0].take.commands is jury.evidence[0].take.commands
 

@@ -18,6 +18,7 @@ from workbench.identify.problem import ratios, smoothed
 from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import Jury, Question
 from workbench.identify.selection import forward as selection
+from workbench.identify.selection.screening import tried
 
 
 def test_residuals_are_as_large_as_noise_where_nothing_is_hidden(tmp_path):
@@ -101,7 +102,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     pool = [c for c in candidates(session.model, search.jury.evidence) if c.name in names]
     groups = [[c for c in pool if c.name == name] for name in sorted(names)]
     assert all(len(g) == 3 for g in groups)
-    trials = search.tried(nominal, groups, dict.fromkeys(range(len(groups)), (0,)), lambda share: None)
+    trials = tried(search, nominal, groups, dict.fromkeys(range(len(groups)), (0,)), lambda share: None)
     best = max(trials, key=lambda t: t.gain["choose"])
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)
@@ -199,7 +200,8 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
     search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
     pool = {c.key: c for c in candidates(session.model, evidence)}
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
-    told = search.settled = search.refitted(search.evaluated([(first, np.array([1.0]))]), (0,), 2)
+    told = search.refitted(search.evaluated([(first, np.array([1.0]))]), (0,), 2)
+    search = search.with_settled(told)
     both = search.refitted(search.evaluated([(second, np.array([0.3])), *told.sizes()]), (0,), 2)
     assert both.x[1] == told.x[0]
     assert both.covariance[1, 1] == told.covariance[0, 0]
@@ -207,7 +209,7 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
     assert both.x[0] != 0.3
     assert [s.numbers.tolist() for s in both.slopes] == [[0], [1]]
     np.testing.assert_array_equal(both.slopes[1].J, told.slopes[0].J)
-    alone = search.resettled(search.evaluated([(second, np.array([0.1]))]), second)
+    search, alone = search.resettled(search.evaluated([(second, np.array([0.1]))]), second)
     assert [c.key for c in search.settled.effects] == [second.key]
     assert alone.x == pytest.approx(search.settled.x)
 

@@ -102,9 +102,9 @@ def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter
     assert (found.effect, found.where) == ("coulomb_friction", ("three",))
     assert told.diagnosis.verdict == "explained"
     assert sum(told.diagnosis.provenance["searched"].values()) <= 3.0
-    for story in told.stories:  # of both takes, all is judged
-        assert np.isfinite(story.after[story.time > 2.0]).any()
-        assert max(story.ratios(story.after).values()) < 1.6
+    for take in told.takes:  # of both takes, all is judged
+        assert np.isfinite(take.after[take.time > 2.0]).any()
+        assert max(take.ratios(take.after).values()) < 1.6
 
 
 def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two):

@@ -36,7 +36,7 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
     residual = nominal.residuals[0].copy()
     residual[:, n] *= 30
     before = replace(nominal, residuals={0: residual})
-    search.settled = replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals)
+    search = search.with_settled(replace(search.evaluated([(taken, np.array([2.6]))]), residuals=nominal.residuals))
     first = Round(before, (), (Trial(taken, np.array([2.6]), {"fit": 1e6, "choose": 1e6}, "three"),))
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
 
@@ -97,11 +97,11 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = partial(leaving, worn)
     first = Round(fit(three=100.0, two=15.0), (), (Trial(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
-    search.settled = replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals)
+    search = search.with_settled(replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals))
     monkeypatch.setattr(whole.jury, "walks", lambda takes: True)
     assert not worth.too_little_left(search, fit(two=13.0), (0,), [first])
     assert worth.too_little_left(search, fit(three=13.0), (0,), [first])
-    search.settled = None
+    search = search.with_settled(None)
     assert worth.too_little_left(search, fit(two=13.0), (0,), [first])
 
 

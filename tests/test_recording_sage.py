@@ -11,8 +11,9 @@ from tests.gap_sessions import session_content, write_session
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.recording.formats.read import read_recording, recording_of_take
-from workbench.recording.formats.sage import JOINTS, URDF_JOINTS, sage_programmes
-from workbench.recording.take_from import named_by_model
+from workbench.recording.formats.sage import sage_programmes
+from workbench.recording.joint_names import SO101_JOINTS as JOINTS
+from workbench.recording.joint_names import URDF_JOINTS, named_by_model
 from workbench.robot import InputError, RobotModel
 
 

@@ -1,7 +1,6 @@
 """A robot's file that is written anew in one process, as studies and other projects do, is read anew."""
 
-from workbench.compare.footfalls import foot_points
-from workbench.robot import Kinematics
+from workbench.robot import Kinematics, RobotModel, foot_points
 
 
 def test_a_file_that_changed_is_not_taken_for_what_it_was(tmp_path):
@@ -28,6 +27,6 @@ def test_nor_are_its_feet(tmp_path):
             <joint name="flb" type="revolute"><parent>body_link</parent><child>flb_link</child>
             <axis><xyz>0 1 0</xyz></axis></joint>
             </model></sdf>""", encoding="utf-8")
-        points, radii = foot_points(path)["flb"]
+        points, radii = foot_points(RobotModel(str(path)))["flb"]
         lowest.append(float((points[:, 2] - radii).min()))
     assert lowest == [-0.11, -0.13]

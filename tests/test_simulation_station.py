@@ -7,7 +7,7 @@ import pytest
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from workbench.motion import load_motion
-from workbench.robot import EffectSpec, Ground, InputError, RobotModel, ServoConstants, data_file, puppy_model
+from workbench.robot import EffectSpec, Ground, InputError, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, MakePuppyStation, Simulation, SimulationConfig, simulate_batch
 
 GRAVITY = 9.81
@@ -191,9 +191,9 @@ def test_refuses_what_it_cannot_do(puppy):
     with pytest.raises(InputError, match="soft_rain"):
         Simulation(puppy.with_effect(EffectSpec("soft_rain")))
     with pytest.raises(InputError, match="no link 'trunk'"):
-        Simulation(RobotModel(base="trunk"))
+        Simulation(puppy_model(base="trunk"))
     with pytest.raises(InputError, match="cannot float"):
-        Simulation(RobotModel(base="tail_link"))
+        Simulation(puppy_model(base="tail_link"))
     with pytest.raises(ValueError, match="contact: expected one of point, hydroelastic"):
         SimulationConfig(contact="magic")
 

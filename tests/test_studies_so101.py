@@ -21,7 +21,8 @@ from studies.so101.session import write_session
 from studies.so101.zero import Zero
 from tests.shared_data import shared
 from workbench.compare.session import load_session
-from workbench.recording.formats.sage import JOINTS, URDF_JOINTS
+from workbench.recording.joint_names import SO101_JOINTS as JOINTS
+from workbench.recording.joint_names import URDF_JOINTS
 from workbench.robot import Kinematics
 from workbench.servo import ServoLaw
 

@@ -25,7 +25,7 @@ from workbench.identify.findings import (
     Unexplained,
     Verdict,
 )
-from workbench.identify.take_report import TakeStory
+from workbench.identify.take_report import TakeReport
 from workbench.robot import EffectSpec, RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
@@ -41,7 +41,7 @@ def model(tmp_path: Path) -> RobotModel:
 
 
 @pytest.fixture
-def story(model: RobotModel) -> TakeStory:
+def take(model: RobotModel) -> TakeReport:
     """Two degrees are missing at flm in the nominal model from 0.5 s on, nothing in the fitted one; some frames were not seen."""
     fitted = swing(model).resampled(np.arange(-0.3, 1.19, 0.01))
     rng = np.random.default_rng(0)
@@ -52,7 +52,7 @@ def story(model: RobotModel) -> TakeStory:
     nominal = replace(fitted, q=fitted.q - away)
     moving = np.where(fitted.time[:, None] > 0, 1.0, np.nan)
     before, after = ((q - take.q) / SIGMA * moving for take in (nominal, fitted))
-    return TakeStory(recorded, nominal, fitted, model.joints, np.full(len(model.joints), SIGMA), before, after,
+    return TakeReport(recorded, nominal, fitted, model.joints, np.full(len(model.joints), SIGMA), before, after,
                      (fitted.time > 0.7) & (fitted.time < 0.9))
 
 
@@ -73,42 +73,42 @@ def diagnosis(model: RobotModel, verdict: Verdict = "explained") -> Diagnosis:
         provenance={"seed": 7, "seconds": 94.0}, left_out=(("trot", "line 9: the file is cut"),))
 
 
-def test_ratios_are_of_unseen_frames(story: TakeStory) -> None:
-    before, after = story.ratios(story.before), story.ratios(story.after)
+def test_ratios_are_of_unseen_frames(take: TakeReport) -> None:
+    before, after = take.ratios(take.before), take.ratios(take.after)
     assert before["flm"] == pytest.approx(20, rel=0.05)
     assert after["flm"] == pytest.approx(1, abs=0.3)
     assert before["frb"] == after["frb"]
-    assert story.sigma("flm") == pytest.approx(SIGMA)
-    nowhere = replace(story, before=np.full_like(story.before, np.nan))
+    assert take.sigma("flm") == pytest.approx(SIGMA)
+    nowhere = replace(take, before=np.full_like(take.before, np.nan))
     assert np.isnan(nowhere.ratios(nowhere.before)["flm"])
     assert np.isnan(nowhere.sigma("flm"))
 
 
-def test_a_story_on_other_frames_is_refused(story: TakeStory) -> None:
+def test_a_story_on_other_frames_is_refused(take: TakeReport) -> None:
     with pytest.raises(ValueError, match="before: expected residuals of shape"):
-        replace(story, before=story.before[:-1])
+        replace(take, before=take.before[:-1])
     with pytest.raises(ValueError, match="on the recording's frames"):
-        replace(story, unseen=story.unseen[:-1])
+        replace(take, unseen=take.unseen[:-1])
 
 
-def test_the_map_is_dark_where_and_when_the_gap_is(story: TakeStory) -> None:
-    figure = gap_map(story)
+def test_the_map_is_dark_where_and_when_the_gap_is(take: TakeReport) -> None:
+    figure = gap_map(take)
     left, right = (axes.collections[0].get_array() for axes in figure.axes[:2])
-    row = story.channels.index("flm")
+    row = take.channels.index("flm")
     assert left[row, 8] == pytest.approx(20, rel=0.1)  # 0.8 to 0.9 s
     assert left[row, 2] < 2
     assert right.max() < 3
     others = np.delete(left, row, axis=0)
     assert others.max() < 3
-    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == list(story.channels)
+    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == list(take.channels)
     assert left.shape == (4, 12)
-    assert len(gap_map(replace(story, after=story.before)).axes) == 2  # one map and its scale
+    assert len(gap_map(replace(take, after=take.before)).axes) == 2  # one map and its scale
 
 
-def test_a_time_that_nobody_saw_is_grey(story: TakeStory) -> None:
-    before = story.before.copy()
-    before[(story.time > 0.3) & (story.time < 0.45)] = np.nan
-    cells = gap_map(replace(story, before=before)).axes[0].collections[0].get_array()
+def test_a_time_that_nobody_saw_is_grey(take: TakeReport) -> None:
+    before = take.before.copy()
+    before[(take.time > 0.3) & (take.time < 0.45)] = np.nan
+    cells = gap_map(replace(take, before=before)).axes[0].collections[0].get_array()
     assert np.ma.getmaskarray(cells)[:, 3].all()
     assert not np.ma.getmaskarray(cells)[:, 5].any()
 
@@ -129,8 +129,8 @@ def test_names_of_joints_in_one_line_stand_apart(tmp_path: Path) -> None:
     assert x.min() > max(t.xy[0] for t in texts)
 
 
-def test_before_and_after_shows_the_worst_unseen_stretch(story: TakeStory) -> None:
-    figure = before_after(story, "flm")
+def test_before_and_after_shows_the_worst_unseen_stretch(take: TakeReport) -> None:
+    figure = before_after(take, "flm")
     top, strip = figure.axes
     low, high = strip.get_xlim()
     assert low <= 0.7
@@ -141,16 +141,16 @@ def test_before_and_after_shows_the_worst_unseen_stretch(story: TakeStory) -> No
     assert [line.get_label() for line in top.get_lines()] == ["recorded", "nominal", "fitted"]
 
 
-def test_before_and_after_shows_what_was_judged_not_a_take_that_starts_when_another_model_would_have_it(story: TakeStory) -> None:
-    late = replace(story.fitted, q=np.roll(story.fitted.q, 5, axis=0))
-    _, fitted = before_after(replace(story, fitted=late), "flm").axes[1].get_lines()
+def test_before_and_after_shows_what_was_judged_not_a_take_that_starts_when_another_model_would_have_it(take: TakeReport) -> None:
+    late = replace(take.fitted, q=np.roll(take.fitted.q, 5, axis=0))
+    _, fitted = before_after(replace(take, fitted=late), "flm").axes[1].get_lines()
     assert np.nanmax(np.abs(fitted.get_ydata())) < 0.5
 
 
 @pytest.mark.parametrize("draw", [gap_map, lambda s: unseen_errors([s]), lambda s: before_after(s, "flb")])
-def test_figures_can_be_written_even_where_nothing_was_seen(story: TakeStory, draw) -> None:
-    nothing = np.full_like(story.before, np.nan)
-    figure = draw(replace(story, before=nothing, after=nothing, unseen=np.zeros(len(story.unseen), dtype=bool)))
+def test_figures_can_be_written_even_where_nothing_was_seen(take: TakeReport, draw) -> None:
+    nothing = np.full_like(take.before, np.nan)
+    figure = draw(replace(take, before=nothing, after=nothing, unseen=np.zeros(len(take.unseen), dtype=bool)))
     assert isinstance(figure, Figure)
     assert len(encode(figure).content) > 1000
 
@@ -192,10 +192,10 @@ def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str])
     assert left_row(entry) == row
 
 
-def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(model: RobotModel, story: TakeStory) -> None:
+def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(model: RobotModel, take: TakeReport) -> None:
     hangs = Unexplained((), 0.75, 0.12, "N", "the tether force is a pull straight down, with the weight of 76 g")
     off = Unexplained(("brm",), 0.567, 0.206, "deg", "sway: goes with nothing tried")
-    told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [story], "Session small").html()
+    told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
     assert all("The tether force is a pull straight down, with the weight of 76 g." in page for page in told.values())
     assert ["still off by more than noise" in page for page in told.values()] == [False, True]
@@ -216,25 +216,25 @@ def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
     assert "odds" not in next_said(NextExperiment("n.csv", "fixed", (("a", "b"),)))
 
 
-def test_a_tie_is_seen_wherever_the_finding_is(model: RobotModel, story: TakeStory) -> None:
+def test_a_tie_is_seen_wherever_the_finding_is(model: RobotModel, take: TakeReport) -> None:
     tied = replace(finding(confidence=0.86), alternatives=(Alternative("joint_compliance", ("flm",), 0.12),))
-    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [story], "Session small").html()
+    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
     assert "<h1>Backlash at flm (or joint compliance at flm) explains all" in page
     assert "86 % sure; or joint compliance at flm: 12 %" in page
     assert "<b>Or joint compliance at flm: 12 %.</b>" in page
 
 
-def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, story: TakeStory) -> None:
+def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeReport) -> None:
     tied = replace(finding(confidence=0.5), alternatives=(Alternative("joint_compliance", ("flm",), 0.46),))
-    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [story], "Session small").html()
+    page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
     assert "96 % sure that it is this or joint compliance at flm" in page
     assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
     assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings do not tell" in _line(tied)
 
 
-def test_a_sentence_is_said_once_in_its_section(model: RobotModel, story: TakeStory) -> None:
+def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeReport) -> None:
     told = finding()
-    page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [story], "S").html()
+    page = diagnosis_report(replace(diagnosis(model), findings=(replace(told, evidence=sentence_of(told)),)), [take], "S").html()
     assert page.count(sentence_of(told)) == 2  # in the summary and in the section
     assert "structure, 8 of 8 entries" in page
     assert '<a href="next_experiment.csv">next_experiment.csv</a>' in page
@@ -256,8 +256,8 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
     assert "nothing that the workbench knows" in headline(replace(nothing, verdict="unexplained"))
 
 
-def test_the_page_reads_from_top_to_bottom(model: RobotModel, story: TakeStory, tmp_path: Path) -> None:
-    paths = write_diagnosis(diagnosis(model), [story], tmp_path / "out", "Session small")
+def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, tmp_path: Path) -> None:
+    paths = write_diagnosis(diagnosis(model), [take], tmp_path / "out", "Session small")
     assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
     page = (tmp_path / "out/report.html").read_text()
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
@@ -271,8 +271,8 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, story: TakeStory, 
     assert places == sorted(places)
 
 
-def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, story: TakeStory) -> None:
-    quiet = replace(story, before=story.after, nominal=story.fitted, unseen=story.time > 0.2)
+def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeReport) -> None:
+    quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
     assert "Nowhere do the recordings leave the nominal model by more than chance." in page
     assert "Afterwards all is within" in page
@@ -280,10 +280,10 @@ def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, story: TakeSt
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()
 
 
-def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, story: TakeStory) -> None:
+def test_a_search_that_came_to_its_limit_says_so(model: RobotModel, take: TakeReport) -> None:
     whole, stopped = diagnosis(model), replace(diagnosis(model), stopped=True)
-    assert "limit of work" not in diagnosis_report(whole, [story], "Session small").html()
-    assert "limit of work" in diagnosis_report(stopped, [story], "Session small").html()
+    assert "limit of work" not in diagnosis_report(whole, [take], "Session small").html()
+    assert "limit of work" in diagnosis_report(stopped, [take], "Session small").html()
     assert "stopped" not in whole.to_json()
     assert stopped.to_json()["stopped"] is True
 
@@ -295,16 +295,16 @@ def test_places_that_tie_are_said_as_a_choice(model: RobotModel) -> None:
     assert sentence_of(replace(told, where=("flm",))) in sentence_of(told)
 
 
-def test_the_card_shows_the_number_that_the_data_tell(model: RobotModel, story: TakeStory) -> None:
+def test_the_card_shows_the_number_that_the_data_tell(model: RobotModel, take: TakeReport) -> None:
     stop = replace(finding("joint_stop"), parameters={
         "lower": Estimate(-180.0, -inf, inf, "deg"), "upper": Estimate(12.6, 11.9, 13.2, "deg")})
-    page = diagnosis_report(replace(diagnosis(model), findings=(stop,)), [story], "Session small").html()
+    page = diagnosis_report(replace(diagnosis(model), findings=(stop,)), [take], "Session small").html()
     card = page[page.lower().index("joint stop at flm<"):]
     assert card.index("12.6 deg") < card.index("-180 deg")
 
 
-def test_a_finding_of_the_whole_robot_is_shown_where_no_other_finding_is(model: RobotModel, story: TakeStory) -> None:
+def test_a_finding_of_the_whole_robot_is_shown_where_no_other_finding_is(model: RobotModel, take: TakeReport) -> None:
     floor = replace(finding("ground_friction"), where=(), parameters={"friction": Estimate(0.3, 0.2, 0.4, "1")})
-    pages = [diagnosis_report(replace(diagnosis(model), findings=found), [story], "Session small").html()
+    pages = [diagnosis_report(replace(diagnosis(model), findings=found), [take], "Session small").html()
              for found in ((floor,), (finding(), floor), (floor, finding()))]
     assert len({page.count("flm in walk: what") for page in pages}) == 1

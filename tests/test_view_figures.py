@@ -36,9 +36,10 @@ def everything(model: RobotModel, simulated: Take, recorded: Take) -> dict[str, 
     channels = compare_takes(recorded, simulated, model).joints
     wrench = np.outer(np.sin(simulated.time), np.arange(1, 7))
     return {
-        "joint_overlay": figures.joint_overlay("flm", simulated, recorded, noise=1e-3, floor=5e-4, stance=stance),
+        "joint_overlay": figures.joint_overlay("flm", simulated, recorded, noise=1e-3, floor=5e-4,
+                                                stance=figures.by_joint(stance, model)),
         "joint_overlay, alone": figures.joint_overlay("flm", simulated),
-        "joint_grid": figures.joint_grid(simulated, recorded, noise={"flm": 1e-3}, stance=stance),
+        "joint_grid": figures.joint_grid(simulated, recorded, noise={"flm": 1e-3}, stance=figures.by_joint(stance, model)),
         "phase_portrait": figures.phase_portrait("flm", simulated, recorded),
         "body_path": figures.body_path(simulated, recorded, {"other": simulated}),
         "body_attitude": figures.body_attitude(simulated, recorded),
@@ -107,7 +108,7 @@ def test_the_error_strip_is_measured_less_simulated(model: RobotModel, takes: tu
 def test_stance_is_shaded_where_the_joints_foot_stands(model: RobotModel, takes: tuple[Take, Take]) -> None:
     simulated, _ = takes
     stance = figures.stance_of(force_phases(simulated), simulated)
-    (axes,) = figures.joint_overlay("flm", simulated, stance=stance).axes
+    (axes,) = figures.joint_overlay("flm", simulated, stance=figures.by_joint(stance, model)).axes
     shaded = [p for p in axes.patches if mpl.colors.to_hex(p.get_facecolor()).upper() == STANCE]
     np.testing.assert_allclose([[p.get_x(), p.get_x() + p.get_width()] for p in shaded], stance["flb"])
     half = np.pi / 8

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.view_takes import capture, small_robot, swing
 from workbench.robot import RobotModel
-from workbench.view.scene.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
+from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
 
 
 @pytest.fixture

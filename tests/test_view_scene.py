@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from tests.view_takes import capture, small_robot, swing
 from workbench.robot import InputError, RobotModel, puppy_model
+from workbench.view.playback import play
 from workbench.view.scene.keyframes import kept_keys
-from workbench.view.scene.playback import play
 from workbench.view.scene.replay import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, _Scene, write_replay
-from workbench.view.scene.shapes import robot_shapes
+from workbench.view.shapes import robot_shapes
 
 
 @pytest.fixture

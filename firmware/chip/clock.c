@@ -2,7 +2,7 @@
 #include "chip.h"
 #include "registers.h"
 
-static void wait(volatile uint32_t *where, uint32_t mask, uint32_t value) {
+static void wait(const volatile uint32_t *where, uint32_t mask, uint32_t value) {
     while ((*where & mask) != value) { /* a crystal that does not start: the watchdog runs already */
     }
 }

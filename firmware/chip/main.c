@@ -5,7 +5,8 @@
 struct robot robot;
 volatile uint32_t milliseconds;
 
-extern const uint8_t built_in_table[], built_in_table_end[];
+extern const uint8_t built_in_table[];
+extern const uint32_t built_in_table_bytes;
 
 void systick_interrupt(void) { milliseconds++; }
 
@@ -42,7 +43,7 @@ void run(void) {
     bus_begin();
     links_begin();
     battery_begin();
-    robot_init(&robot, built_in_table, (uint32_t)(built_in_table_end - built_in_table), cause);
+    robot_init(&robot, built_in_table, built_in_table_bytes, cause);
     systick_begin();
     uint32_t seen = 0;
     for (;;) {

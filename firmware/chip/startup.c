@@ -3,7 +3,8 @@
 #include "chip.h"
 #include "registers.h"
 
-extern uint32_t data_load, data_start, data_end, bss_start, bss_end, stack_top;
+/* The linker script's; sizes in bytes are symbols' addresses. */
+extern uint8_t data_load[], data_start[], data_size[], bss_start[], bss_size[], stack_top[];
 
 void *memcpy(void *to, const void *from, size_t n) {
     uint8_t *d = to;
@@ -20,8 +21,8 @@ void *memset(void *to, int value, size_t n) {
 
 static void reset(void) {
     SCB_VTOR = 0x08003000;
-    for (uint32_t *s = &data_load, *d = &data_start; d < &data_end;) *d++ = *s++;
-    for (uint32_t *d = &bss_start; d < &bss_end;) *d++ = 0;
+    memcpy(data_start, data_load, (size_t)data_size);
+    memset(bss_start, 0, (size_t)bss_size);
     run();
 }
 
@@ -32,7 +33,7 @@ static void stop(void) {
 }
 
 __attribute__((section(".vectors"), used)) static void (*const vectors[16 + 60])(void) = {
-    (void (*)(void))(uintptr_t)&stack_top, reset, stop, stop, stop, stop, stop, 0, 0, 0, 0, stop, stop, 0, stop, systick_interrupt,
+    (void (*)(void))(uintptr_t)stack_top, reset, stop, stop, stop, stop, stop, 0, 0, 0, 0, stop, stop, 0, stop, systick_interrupt,
     [16 + IRQ_DMA1_CHANNEL5] = bus_received_interrupt,
     [16 + IRQ_USART1] = bus_interrupt,
     [16 + IRQ_USART3] = pc_interrupt,

@@ -55,14 +55,14 @@ static void upload(struct robot *r, uint8_t link) {
     if (!later && !quiet) result(r, link, code);
 }
 
-static void frame(struct robot *r, uint8_t link) {
-    const struct frame_reader *f = &r->link[link].reader;
-    switch (f->type) {
-    case FRAME_BEGIN:
-    case FRAME_DATA:
-    case FRAME_END:
-        upload(r, link);
-        return;
+static void bridge_wanted(struct robot *r, uint8_t link) {
+    bool may = link == LINK_PC && !torque_on(r) && r->joints;
+    result(r, link, may ? UPLOAD_OK : UPLOAD_BUSY);
+    if (may) bridge_begin(r);
+}
+
+static void order(struct robot *r, uint8_t link, uint8_t type) {
+    switch (type) {
     case FRAME_ASK:
         r->state_told = false;
         break;
@@ -75,14 +75,6 @@ static void frame(struct robot *r, uint8_t link) {
     case FRAME_RELEASE:
         if (r->state != STATE_BRIDGE && r->joints) enter(r, STATE_LIMP, REASON_LINK, 0xFF);
         break;
-    case FRAME_BRIDGE:
-        if (link != LINK_PC || torque_on(r) || r->joints == 0) {
-            result(r, link, UPLOAD_BUSY);
-            return;
-        }
-        result(r, link, UPLOAD_OK);
-        bridge_begin(r);
-        return;
     case FRAME_BRIDGE_END:
         if (r->state == STATE_BRIDGE) bridge_end(r, REASON_LINK);
         break;
@@ -90,6 +82,16 @@ static void frame(struct robot *r, uint8_t link) {
         return;
     }
     result(r, link, UPLOAD_OK);
+}
+
+static void frame(struct robot *r, uint8_t link) {
+    uint8_t type = r->link[link].reader.type;
+    if (type == FRAME_BEGIN || type == FRAME_DATA || type == FRAME_END)
+        upload(r, link);
+    else if (type == FRAME_BRIDGE)
+        bridge_wanted(r, link);
+    else
+        order(r, link, type);
 }
 
 static void remote(struct robot *r, uint8_t byte) {

@@ -31,6 +31,7 @@
 #define RESENDS 6u            /* of one pose; a servo that does not take it then never will */
 
 #define RAMP_SPEED 45u        /* 30 degrees a second: slow enough to step back from */
+#define RAMP_SLOWEST 10u      /* 7 degrees a second: below, a servo sticks; 0 would mean at once */
 #define RAMP_SPARE_MS 2000u   /* beyond the time that a ramp should take */
 #define RAMP_TOLERANCE 30u    /* counts, 9 degrees: droop under the robot's own weight is 2 degrees */
 #define RELEASE_PAUSE_MS 5u   /* between torque-off broadcasts, until every servo is read to be off */

@@ -23,7 +23,8 @@ void ramp_to(struct robot *r, const uint16_t *goals, uint8_t state, uint8_t afte
     for (uint32_t j = 0; j < r->joints; j++) {
         uint32_t way = distance(goals[j], r->servo[j].position);
         r->goals[j] = goals[j];
-        r->speeds[j] = (uint16_t)(1u + way * (RAMP_SPEED - 1u) / longest); /* never 0, which would mean at once */
+        uint32_t speed = way * RAMP_SPEED / longest;
+        r->speeds[j] = (uint16_t)(speed > RAMP_SLOWEST ? speed : RAMP_SLOWEST);
     }
     r->state = state;
     r->after = after;

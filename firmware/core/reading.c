@@ -155,7 +155,10 @@ static void bad(struct robot *r, uint32_t j, bool noise) {
 /* After a round: no pause before every goal is known to be there; torque off is told again to whoever is not known to be. */
 static void look_again(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
-        if (torque_on(r) && !r->servo[j].verified && r->servo[j].missed == 0) r->round_over = false;
+        if (r->round_over && torque_on(r) && !r->servo[j].verified && r->servo[j].missed == 0) {
+            r->round_over = false;
+            r->sweep_started = r->now;
+        }
         if (r->state == STATE_LIMP && !r->servo[j].off) r->send_release = true;
     }
 }

@@ -11,15 +11,21 @@ static enum table_fault check_joint(const uint8_t *t, uint32_t j) {
     return TABLE_OK;
 }
 
-enum table_fault table_check_head(const uint8_t *t, uint32_t size) {
-    if (size < TABLE_HEAD) return TABLE_SHORT;
-    if (t[0] != 'W' || t[1] != 'B' || t[2] != 'T' || t[3] != 'B') return TABLE_MAGIC;
-    if (t[4] != 1) return TABLE_VERSION;
-    uint32_t n = table_joints(t), poses = table_poses(t);
-    if (n == 0 || n > MAX_JOINTS) return TABLE_JOINTS;
-    if (poses == 0) return TABLE_POSES;
+static enum table_fault check_counts(const uint8_t *t) {
+    if (table_joints(t) == 0 || table_joints(t) > MAX_JOINTS) return TABLE_JOINTS;
+    if (table_poses(t) == 0) return TABLE_POSES;
     if (table_flags(t) & ~TABLE_STOPS) return TABLE_FLAGS;
     if ((table_flags(t) & TABLE_STOPS) && table_cycles(t) == 0) return TABLE_FLAGS;
+    return TABLE_OK;
+}
+
+enum table_fault table_check_head(const uint8_t *t, uint32_t size) {
+    if (size < TABLE_HEAD) return TABLE_SHORT;
+    if (get32(t) != TABLE_MAGIC_WORD) return TABLE_MAGIC;
+    if (t[4] != 1) return TABLE_VERSION;
+    enum table_fault counts = check_counts(t);
+    if (counts) return counts;
+    uint32_t n = table_joints(t), poses = table_poses(t);
     if (table_size(t) != size || size != TABLE_HEAD + TABLE_JOINT * n + (4u + 4u * n) * poses + 4u) return TABLE_SIZE;
     for (uint32_t j = 0; j < n; j++) {
         enum table_fault fault = check_joint(t, j);

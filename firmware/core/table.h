@@ -5,6 +5,7 @@
 #include "bytes.h"
 #include "limits.h"
 
+#define TABLE_MAGIC_WORD 0x42544257u /* "WBTB" */
 #define TABLE_HEAD 16u
 #define TABLE_JOINT 12u
 #define TABLE_STOPS 1u /* flag: stops after its cycles where no other table has come; else it goes on */

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from studies.common import COORDINATES, body_track
 from studies.riddles.cameras import record
 from studies.riddles.hypotheses import LEAD, Hypothesis, Progress, Setting, run_all, walk
-from workbench.compare.footfalls import foot_points
 from workbench.motion import Commands, Motion
 from workbench.recording.take import Take
-from workbench.robot import FEET, RobotModel
+from workbench.robot import RobotModel, foot_points
 from workbench.simulation import Job, SimulationConfig
 from workbench.simulation.batch import run_job
 
@@ -84,10 +83,10 @@ def geometric_lean(model: RobotModel) -> float:
     """Nose up [deg] of the neutral pose with rigid joints on four feet: the slope between the lowest points of hind and front."""
     poses = model.kinematics.forward(np.zeros((1, len(model.joints))))
     low = {}
-    for foot, (points, radii) in foot_points(model.path).items():
-        p, R = poses[model.kinematics.frames[foot].child]
+    for foot, (points, radii) in foot_points(model).items():
+        p, R = poses[model.foot_links[foot]]
         world = p[0] + points @ R[0].T
         i = int(np.argmin(world[:, 2] - radii))
         low[foot] = world[i, 0], world[i, 2] - radii[i]
-    front, hind = (np.mean([low[f] for f in FEET if f[0] == end], axis=0) for end in "fb")
+    front, hind = (np.mean([low[f] for f in low if f[0] == end], axis=0) for end in "fb")
     return float(np.degrees(np.arctan2(hind[1] - front[1], front[0] - hind[0])))

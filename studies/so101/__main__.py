@@ -92,14 +92,16 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
 
 def _diagnosed(session: Session, out: Path, n_jobs: int, progress: Say) -> RobotModel:
     """The workbench's diagnosis of the training session; its files go into OUT/diagnosis."""
+    from workbench.experiment.next_experiment import with_next_experiment
     from workbench.identify.diagnosis import diagnose_session
     from workbench.view.report.diagnosis import write_diagnosis
 
     with rollout_memory(out / "diagnosis", session) as memory:
-        told = diagnose_session(session, progress, n_jobs, memory)
+        result = diagnose_session(session, progress, n_jobs, memory)
+        diagnosis, _ = with_next_experiment(result, n_jobs, progress)
     (out / "diagnosis").mkdir(parents=True, exist_ok=True)
-    write_diagnosis(told.diagnosis, told.stories, out / "diagnosis", str(session.path), progress)
-    return told.diagnosis.model
+    write_diagnosis(diagnosis, result.takes, out / "diagnosis", str(session.path), progress)
+    return diagnosis.model
 
 
 def _headline(joint: Mapping[str, Array]) -> str:

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from workbench.recording.formats.sage import URDF_JOINTS
+from workbench.recording.joint_names import URDF_JOINTS
 from workbench.robot import InputError, ServoConstants
 from workbench.robot.yaml_file import yaml_text
 

@@ -24,7 +24,7 @@ NONE = 2**64 - 1
 class CellRun(ctypes.Structure):
     """struct cell_run."""
 
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         ("table", ctypes.c_char_p), ("size", ctypes.c_uint32), ("fault", ctypes.c_uint32), ("watch_ms", ctypes.c_uint32),
         ("seed", ctypes.c_uint64), ("servo", ctypes.c_uint32), ("servo_id", ctypes.c_uint32), ("state", ctypes.c_uint32),
         ("reason", ctypes.c_uint32), ("servo_named", ctypes.c_uint32), ("poses", ctypes.c_uint32), ("limp", ctypes.c_uint32),

@@ -14,6 +14,7 @@ from workbench.bench.arm import arm, frictions, goals, measured, played, session
 from workbench.bench.figure import Figure
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes
+from workbench.experiment.next_experiment import with_next_experiment
 from workbench.identify.diagnosis import STEP, diagnose_session
 from workbench.identify.rollouts import REST
 from workbench.simulation import SimulationConfig
@@ -62,7 +63,7 @@ def diagnose_time(duration: float | None, seed: int) -> Figure:
         log = measured(told, played(model, told, frictions()[:1]), seed)
         mine = session(Path(place), log)
         stages, began = Stages(), time.perf_counter()
-        diagnosed = diagnose_session(mine, stages, n_jobs=1).diagnosis
+        diagnosed, _ = with_next_experiment(diagnose_session(mine, stages, n_jobs=1), 1, stages)
         seconds, wall = stages.ended(), time.perf_counter() - began
         one = _one_rollout(mine, duration)
     total, rollouts = sum(seconds.values()), int(diagnosed.provenance["rollouts"])

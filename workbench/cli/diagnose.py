@@ -36,26 +36,28 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.compare.prediction import predict_session
     from workbench.compare.session import load_session
+    from workbench.experiment.next_experiment import with_next_experiment
     from workbench.identify.diagnosis import diagnose_session
     from workbench.motion import save_motion
     from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
     with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
-        told = diagnose_session(session, progress, args.jobs, memory, args.thorough)
-        paths = write_diagnosis(told.diagnosis, told.stories, folder, str(args.session), progress)
-        if told.motion is not None and told.diagnosis.next_experiment is not None:
-            paths.append(folder / told.diagnosis.next_experiment.motion)
-            save_motion(told.motion, paths[-1])
+        result = diagnose_session(session, progress, args.jobs, memory, args.thorough)
+        diagnosis, motion = with_next_experiment(result, args.jobs, progress)
+        paths = write_diagnosis(diagnosis, result.takes, folder, str(args.session), progress)
+        if motion is not None and diagnosis.next_experiment is not None:
+            paths.append(folder / diagnosis.next_experiment.motion)
+            save_motion(motion, paths[-1])
         if session.predict:
             (folder / "predict").mkdir()
-            predict_session(session, told.diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
-    for name, reason in told.diagnosis.left_out:
+            predict_session(session, diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
+    for name, reason in diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
-    if told.diagnosis.stopped:
+    if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
-    print(f"verdict: {told.diagnosis.verdict}")
-    for finding in told.diagnosis.findings:
+    print(f"verdict: {diagnosis.verdict}")
+    for finding in diagnosis.findings:
         print(f"  {_line(finding)}")
     print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
     return 0

@@ -17,7 +17,7 @@ import workbench
 
 VERBS = (
     "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
-    "record", "bench",
+    "record", "run", "bench",
 )
 
 

@@ -55,8 +55,7 @@ def load_model(name: str) -> RobotModel:
         except InputError as e:
             raise InputError(name, f"effects: {e.problem}") from None
         return model
-    model = RobotModel(description=name)
-    return RobotModel(description=name, base=model.kinematics.root)
+    return RobotModel(name)
 
 
 def positive(text: str) -> int:

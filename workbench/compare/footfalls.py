@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.recording.take import Take
-from workbench.robot import FEET, RobotModel
-from workbench.robot.files import cached_by_content
+from workbench.robot import RobotModel, foot_points
 
 Array = NDArray[np.float64]
 
@@ -77,58 +75,14 @@ def foot_heights(take: Take, model: RobotModel) -> dict[str, Array]:
     poses = kinematics.forward(take.q, take.joints)
     p_RB, R_RB = poses[model.base]
     out = {}
-    for foot, (points, radii) in foot_points(model.path).items():
-        link = kinematics.frames[foot].child
+    for foot, (points, radii) in foot_points(model).items():
+        link = model.foot_links[foot]
         if not set(kinematics.chain(link)) & set(kinematics.joints) <= set(take.joints):
             continue
         p, R = poses[link]
         p_B = np.einsum("nji,nmj->nmi", R_RB, (p - p_RB)[:, None] + np.einsum("nij,mj->nmi", R, points))
         out[foot] = take.p_WB[:, 2] + (np.einsum("ni,nmi->nm", z_axis, p_B) - radii).min(axis=1)
     return out
-
-
-@cached_by_content(maxsize=16)
-def foot_points(path: Path) -> dict[str, tuple[Array, Array]]:
-    """Points (M, 3) [m] on each foot's link that may touch the ground, with radii (M,), by the knee's joint.
-
-    From the link's collision shapes: a sphere is its centre with its radius, any other shape the corners of its box. A
-    robot without the puppy's knee joints has no feet here.
-    """
-    from pydrake.geometry import Role, SceneGraph, Sphere
-    from pydrake.multibody.parsing import Parser
-    from pydrake.multibody.plant import MultibodyPlant
-
-    from workbench.robot import ConfigureParser
-
-    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
-    plant.RegisterAsSourceForSceneGraph(scene_graph)
-    parser = Parser(plant)
-    ConfigureParser(parser)
-    (instance,) = parser.AddModels(path)
-    plant.Finalize()
-    inspector = scene_graph.model_inspector()
-    feet: dict[str, tuple[Array, Array]] = {}
-    for foot in FEET:
-        if not plant.HasJointNamed(foot, instance):
-            continue
-        body = plant.GetJointByName(foot, instance).child_body()
-        frame = plant.GetBodyFrameIdOrThrow(body.index())
-        points, radii = [], []
-        for geometry in inspector.GetGeometries(frame, Role.kProximity):
-            X_BG, shape = inspector.GetPoseInFrame(geometry), inspector.GetShape(geometry)
-            if isinstance(shape, Sphere):
-                points.append(X_BG.translation()[None])
-                radii.append(np.array([shape.radius()]))
-                continue
-            box = inspector.GetObbInGeometryFrame(geometry)
-            if box is None:  # a half space
-                continue
-            corners = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, 8) * box.half_width()[:, None]
-            points.append((X_BG.multiply(box.pose()).multiply(corners)).T)
-            radii.append(np.zeros(8))
-        if points:
-            feet[foot] = np.vstack(points), np.concatenate(radii)
-    return feet
 
 
 def _rest_height(take: Take, heights: dict[str, Array]) -> float:

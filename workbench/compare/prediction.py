@@ -15,12 +15,12 @@ from workbench.motion import load_motion
 from workbench.recording.formats.joint_log import write_joint_log
 from workbench.recording.formats.motive_write import write_motive
 from workbench.recording.formats.read import read_recording
+from workbench.recording.joint_names import named_by_model
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.recording import Recording
 from workbench.recording.take import Take
-from workbench.recording.take_from import named_by_model
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import Simulation, SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch

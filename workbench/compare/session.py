@@ -59,8 +59,8 @@ class PredictSpec:
 
 @dataclass(frozen=True)
 class Session:
-    """One robot, one day of recordings. model: the nominal robot. registers: what its servos' registers say, where they were read.
-    All files named exist; all names fit the model."""
+    """One robot, one day of recordings. model: the nominal robot. registers: what its servos' registers say, where they were
+    read. All files named exist; all names fit the model."""
 
     path: Path
     model: RobotModel

@@ -11,6 +11,7 @@ from workbench.compare.session import Session, TakeSpec
 from workbench.effects.apply import seen
 from workbench.motion.commands import Commands
 from workbench.recording.formats.read import read_recording
+from workbench.recording.joint_names import named_by_model
 from workbench.recording.log_state import first_command, state_at
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
@@ -18,7 +19,7 @@ from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.mocap.yaw import session_yaw
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
-from workbench.recording.take_from import named_by_model, take_from_recording
+from workbench.recording.take_from import take_from_recording
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import Start
 

@@ -45,7 +45,8 @@ class ControllerState(IntEnum):
 
 
 REASONS = (
-    "none", "power on", "reset button", "watchdog: the program hung", "reset by program", "brown-out", "button", "remote", "PC link",
+    "none", "power on", "reset button", "watchdog: the program hung", "reset by program", "brown-out", "button", "remote",
+    "PC link",
     "the table came to its end", "a servo is silent", "a servo's answers are garbled (two with one ID, or a bad line)",
     "a servo of another model", "a servo is overloaded", "a servo is hot", "the battery is low", "the servos' supply is dead",
     "somebody babbles on the bus", "a joint did not arrive", "a servo does not take its goal",
@@ -58,8 +59,8 @@ TABLE_FAULTS = (
     "none", "too short", "not a table", "another version", "number of joints", "no poses", "flags", "size", "bus IDs", "bounds",
     "a dwell", "a goal out of bounds", "a speed out of bounds", "CRC", "for another robot", "its first pose is out of reach",
 )
-UPLOAD_RESULTS = ("taken", "another upload is under way", "no upload is under way", "bytes are missing", "its number was there before",
-                  "too big", "malformed")
+UPLOAD_RESULTS = ("taken", "another upload is under way", "no upload is under way", "bytes are missing",
+                  "its number was there before", "too big", "malformed")
 UPLOAD_FAULT = 0x10
 
 
@@ -89,7 +90,8 @@ class StateMessage:
 
 @dataclass(frozen=True)
 class AnswerMessage:
-    """What became of a frame of ours: its type and number, result in words, how many bytes of a table have come, whether all is well."""
+    """What became of a frame of ours: its type and number, result in words, how many bytes of a table have come, whether
+    all is well."""
 
     type: int
     number: int
@@ -231,8 +233,6 @@ def upload_frames(table: bytes, sequence: int, ramps: bool = False) -> list[byte
     """Frames that bring a table over: BEGIN, DATA in order, END. sequence: one more than the last taken, modulo 256. ramps: where
     its first pose is out of reach, ramp there instead of refusing."""
     begin = struct.pack("<IIBB", len(table), binascii.crc32(table), sequence, int(ramps))
-    frames = [frame(FrameType.BEGIN, begin)]
     step = PAYLOAD - 4
-    for at in range(0, len(table), step):
-        frames.append(frame(FrameType.DATA, struct.pack("<H", at) + table[at:at + step]))
-    return [*frames, frame(FrameType.END)]
+    data = [frame(FrameType.DATA, struct.pack("<H", at) + table[at:at + step]) for at in range(0, len(table), step)]
+    return [frame(FrameType.BEGIN, begin), *data, frame(FrameType.END)]

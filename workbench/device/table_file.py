@@ -29,7 +29,7 @@ _JOINT = struct.Struct("<BBHHHHH")
 
 @dataclass(frozen=True)
 class JointBounds:
-    """What the controller holds a joint to: bus ID, model number (0 to 65535) of its servo, goals from `low` to `high`, moving speed up to
+    """What the controller holds a joint to: bus ID, model number of its servo, goals from `low` to `high`, moving speed up to
     `fastest`, and where neutral is [all in the servo's own counts]."""
 
     bus_id: int
@@ -152,8 +152,9 @@ def _poses(data: bytes, joints: Sequence[JointBounds], poses: int, names: Mappin
         if not SHORTEST_MS <= dwell <= LONGEST_MS:
             raise InputError(source, f"pose {k + 1}: dwell of {dwell} ms; the controller plays {SHORTEST_MS} to {LONGEST_MS} ms")
         for i, joint in enumerate(joints):
-            if not joint.low <= goals[k, i] <= joint.high:
-                raise InputError(source, f"pose {k + 1}, bus ID {joint.bus_id}: goal {goals[k, i]} is outside {joint.low} to {joint.high}")
-            if speeds[k, i] > joint.fastest:
-                raise InputError(source, f"pose {k + 1}, bus ID {joint.bus_id}: speed {speeds[k, i]} is above {joint.fastest}")
+            place, goal, speed = f"pose {k + 1}, bus ID {joint.bus_id}", goals[k, i], speeds[k, i]
+            if not joint.low <= goal <= joint.high:
+                raise InputError(source, f"{place}: goal {goal} is outside {joint.low} to {joint.high}")
+            if speed > joint.fastest:
+                raise InputError(source, f"{place}: speed {speed} is above {joint.fastest}")
     return PoseTable(tuple(names.get(j.bus_id, f"id{j.bus_id}") for j in joints), goals, speeds, dwells, source)

@@ -17,7 +17,7 @@ from pydrake.multibody.tree import MultibodyForces
 from workbench.dynamics.trajectory import RobotTrajectory
 from workbench.effects.apply import physics_of, resolved
 from workbench.recording.mocap import quaternions
-from workbench.robot import FEET, GRAVITY, ConfigureParser, InputError, RobotModel
+from workbench.robot import GRAVITY, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import rotation_about
 
 Array = NDArray[np.float64]
@@ -162,18 +162,13 @@ def _unmount(plant: MultibodyPlant, base: str) -> tuple[Array, Array]:
 
 
 def _foot_points(plant: MultibodyPlant, inspector: SceneGraphInspector, model: RobotModel) -> FootPoints:
-    """Of the links that carry feet by name and have collision shapes; without any, of the tree's ends that have them."""
-    kinematics = model.kinematics
-    carriers = {f.parent for f in kinematics.frames.values()}
-    touching = [link for link in kinematics.links if plant.GetCollisionGeometriesForBody(plant.GetBodyByName(link))]
-    named = [link for link in touching if kinematics.joint_of(link) in FEET]
-    feet = {kinematics.joint_of(link) or link: link for link in named or touching if named or link not in carriers}
-    feet = dict(sorted(feet.items()))
-    rows = [(f, *point) for f, link in enumerate(feet.values()) for point in _spheres(plant, inspector, link)]
+    """Of the links that are the model's feet."""
+    feet = tuple(model.foot_links.values())
+    rows = [(f, *point) for f, link in enumerate(feet) for point in _spheres(plant, inspector, link)]
     table = np.array(rows).reshape(-1, 6)
     foot = table[:, 0].astype(int)
-    links = tuple(list(feet.values())[f] for f in foot)
-    return FootPoints(tuple(feet), foot, links, table[:, 1:4], table[:, 4], table[:, 5])
+    links = tuple(feet[f] for f in foot)
+    return FootPoints(tuple(model.foot_links), foot, links, table[:, 1:4], table[:, 4], table[:, 5])
 
 
 def _spheres(plant: MultibodyPlant, inspector: SceneGraphInspector, link: str) -> list[tuple[float, ...]]:

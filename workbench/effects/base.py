@@ -9,7 +9,7 @@ Effect instance.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
@@ -23,11 +23,17 @@ from workbench.servo import ServoLaw, ServoTerm
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
+    from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
+Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
+"""Effects that do nearly the same until data tell them apart: where no member is sure, the family may be."""
+Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
+                    "turn about an axis"]
+"""Ways to read an effect off the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
 NEAR, BEYOND = 0.08, 0.8
@@ -39,7 +45,8 @@ class Parameter:
     """A number of an effect, in the contract's unit; `si` times it is SI. low, high: what is physically possible. typical: where
     it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them. shapes: it
     only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it takes the place of a
-    value that the nominal robot has, which is then neutral."""
+    value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording goes below, as
+    every model leaves so much open."""
 
     name: str
     unit: str
@@ -50,6 +57,7 @@ class Parameter:
     vector: bool = False
     shapes: bool = False
     replaces: bool = False
+    resolution: float = 0.0
 
     def typical_beside(self, neutral: float) -> float:
         """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
@@ -59,21 +67,54 @@ class Parameter:
 
 
 class Effect:
-    """Base of all effects; hooks do nothing unless overridden. `values` are in SI, by parameter name."""
+    """Base of all effects; hooks do nothing unless overridden. `values` are in SI, by parameter name.
+
+    What an effect must say: name, layer, places, parameters and `sentence`. What it may say of itself to the search, which knows
+    no effect by its name: the class variables from `under_load` on, `as_other`, `could_act` and `reach`.
+    """
 
     name: ClassVar[str]
     layer: ClassVar[Layer]
     places: ClassVar[tuple[Place, ...]]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
+    title: ClassVar[str] = ""
+    """For a person, where that is not the name with blanks for underscores."""
+    family: ClassVar[Family | None] = None
+    """The effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
-    limit: ClassVar[str] = ""
-    """The effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none does,
-    where it is small."""
-    twin: ClassVar[str] = ""
-    """The effect from which no walk tells it: both move the robot alike, by less apart than engines are."""
+    observable_when_fixed: ClassVar[bool] = True
+    """Whether a robot whose base is held can show it; not what only the floor does to feet."""
+    hidden_by_zeroing: ClassVar[bool] = False
+    """Whether it leaves no trace in the angles of its own joint where these are zeroed in neutral, only in what gravity and
+    ground make of it."""
+    like_a_late_start: ClassVar[bool] = False
+    """Whether, of the whole robot, it does what a later first command does: only a known start tells it."""
+    reduces_to: ClassVar[str] = ""
+    """The nested effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none
+    does, where it is small."""
+    equivalent_to: ClassVar[tuple[str, ...]] = ()
+    """Observationally equivalent effects: no walk tells it from them, as both move the robot alike, by less apart than engines
+    are."""
+    includes: ClassVar[tuple[str, ...]] = ()
+    """Effects at the same place whose freedom it has, so that these say nothing beside it."""
+    steady_pull: ClassVar[bool] = False
+    """Whether it pulls at the robot with a steady force: of several such, beside the one the others only make up for how roughly
+    that was fitted."""
+    point_mass: ClassVar[bool] = False
+    """Whether its numbers are a mass and where it sits on a link, which are fitted as mass and moments."""
+    moves_center: ClassVar[bool] = False
+    """Whether all that it does is to move a link's centre of mass, which tips a robot as much wherever that link hangs."""
+    moves_feet: ClassVar[bool] = False
+    """Whether it makes feet stand elsewhere than drawn, much as a centre of mass does that lies elsewhere."""
     free_play: ClassVar[str] = ""
     """The parameter that says how far a link turns freely against its servo, if it does [rad in SI]."""
+    estimator: ClassVar[Estimator | None] = None
+    """How it is read off the recordings without a search, if it is. Parameters that this takes: of an end of travel the lower and
+    the upper end, of play across the axis the play and its axis, of a turn of an asset a rotation vector, else one number."""
+    from_neutral: ClassVar[bool] = True
+    """Whether a search from neutral finds it: a stop shows nothing until the joint meets it, and of loose screws the axis has to
+    be known first. If not, it needs an estimator."""
 
     def sentence(self, spec: EffectSpec) -> str:
         """For a person: what is different about this robot."""
@@ -85,9 +126,17 @@ class Effect:
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        """The values at which the effect `name` (`limit` or `twin`) does nearly the same at the same place, in the contract's
-        units; empty where that is not known."""
+        """The values at which the effect `name` (`reduces_to`, or of `equivalent_to`) does nearly the same at the same place, in
+        the contract's units; empty where that is not known."""
         return ()
+
+    def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
+        """Whether this robot, playing these commands, could show it at all."""
+        return True
+
+    def reach(self, sdf: SdfRobot, kinematics: Kinematics, where: tuple[str, ...]) -> float:
+        """How far a search moves its numbers from neutral at most, in the contract's units."""
+        return math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         """Changes the robot's SDF."""
@@ -170,9 +219,9 @@ def vector(values: Mapping[str, float], name: str) -> Array:
 def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
     """InputError unless `where` names what the model has and the effect can act on."""
     k = model.kinematics
-    feet = tuple(j for j in model.joints if j in k.frames and not any(f.parent == k.frames[j].child for f in k.frames.values()))
     known: dict[str, tuple[str, ...]] = {
-        "joint": model.joints, "foot": feet, "link": k.links, "rigid_body": tuple(model.rigid_bodies), "robot": ()}
+        "joint": model.joints, "foot": tuple(model.foot_links), "link": k.links, "rigid_body": tuple(model.rigid_bodies),
+        "robot": ()}
     if not spec.where:
         if "robot" not in effect.places:
             raise InputError(None, f"effect '{spec.effect}': where is empty; expected one {' or '.join(effect.places)}")

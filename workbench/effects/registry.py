@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from pkgutil import iter_modules
 
-from workbench.effects.base import Effect
+from workbench.effects.base import Effect, Estimator
 from workbench.robot import InputError
 
 ENTRY_POINT_GROUP = "workbench.effects"
@@ -31,6 +31,11 @@ def known_effects() -> dict[str, Effect]:
             raise InputError(entry.value, f"effect '{effect.name}' is known already")
         found[effect.name] = effect
     return found
+
+
+def estimated_by(estimator: Estimator) -> tuple[Effect, ...]:
+    """The effects that are read off the recordings in this way."""
+    return tuple(effect for effect in known_effects().values() if effect.estimator == estimator)
 
 
 def effect_named(name: str) -> Effect:

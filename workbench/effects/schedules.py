@@ -9,6 +9,10 @@ import numpy as np
 
 from workbench.motion.commands import Commands
 
+LOOP = 2e-3
+"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that, so that every
+model may set out that much sooner or later, and no delay is known better."""
+
 
 def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
     """The commands without some to one joint, which keeps the goal and speed that it had."""

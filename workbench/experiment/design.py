@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, long_runs
-from workbench.experiment.projection import Shown, Sight, channels, fitted_to_each_other, reshown, seen, shown
+from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, reshown, seen, shown
 from workbench.experiment.rivals import Pair
 from workbench.experiment.runs import TIME_STEP, Progress, Runs, spans
 from workbench.experiment.segment import Segment
@@ -28,9 +28,9 @@ from workbench.experiment.stance import BodyMoves
 from workbench.identify.findings import NextExperiment
 from workbench.motion import Motion
 from workbench.recording.take import Take
-from workbench.robot import FEET, RobotModel
+from workbench.robot import RobotModel, legs
 
-__all__ = ["Experiment", "Separation", "Sight", "design_experiment"]
+__all__ = ["Experiment", "ObservationModel", "Separation", "design_experiment"]
 
 Array = NDArray[np.float64]
 Base = Literal["free", "fixed"]
@@ -81,20 +81,21 @@ def no_progress(what: str, done: float | None = None) -> None:
     """Says nothing."""
 
 
-def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]], sights: Mapping[Base, Sight],
-                      n_jobs: int = 2, progress: Progress = no_progress) -> Experiment:
+def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]],
+                      observations: Mapping[Base, ObservationModel], n_jobs: int = 2, progress: Progress = no_progress
+                      ) -> Experiment:
     """The motion that best separates rivals.
 
     nominal: the robot without effects. rivals: pairs of fitted models (nominal and effects) that a session cannot tell apart, the
-    most urgent first; effects that only one of a pair has may adapt their numbers. sights: how the next recording will see the
-    robot on each base that is allowed. ValueError without rivals or bases. The same call gives the same motion.
+    most urgent first; effects that only one of a pair has may adapt their numbers. observations: how the next recording will
+    see the robot on each base that is allowed. ValueError without rivals or bases. The same call gives the same motion.
     """
-    if not rivals or not sights:
+    if not rivals or not observations:
         raise ValueError("expected at least one pair of rivals, and one base")
     pairs = [Pair.of(a, b) for a, b in rivals]
     best: Experiment | None = None
-    for base in sorted(sights, key=lambda b: b != _better_base(pairs[0], nominal)):
-        experiment = _Bench(nominal, base, sights[base], n_jobs, progress).design(pairs)
+    for base in sorted(observations, key=lambda b: b != _better_base(pairs[0], nominal)):
+        experiment = _Bench(nominal, base, observations[base], n_jobs, progress).design(pairs)
         if best is None or _worth(experiment.separations) > _worth(best.separations):
             best = experiment
         if all(s.separated for s in best.separations):
@@ -115,10 +116,8 @@ def _better_base(pair: Pair, nominal: RobotModel) -> Base:
 
 
 def _trunk(model: RobotModel) -> list[str]:
-    """Links that carry feet's legs: those from which the legs' last three joints hang."""
-    k = model.kinematics
-    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints] for f in FEET if f in k.frames]
-    return [k.frames[leg[-3]].parent for leg in legs if len(leg) >= 3]
+    """Links from which the legs hang."""
+    return [model.kinematics.frames[leg[0]].parent for leg in legs(model).values() if leg]
 
 
 def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
@@ -128,14 +127,13 @@ def _focus(pair: Pair, model: RobotModel) -> tuple[str, ...]:
     joints = tuple(dict.fromkeys(j for j in named if j in model.joints))
     if joints:
         return joints
-    legs = [[j for j in k.chain(k.frames[f].child) if j in model.joints][-2:] for f in FEET if f in model.joints]
-    return tuple(j for leg in legs for j in leg) or model.joints
+    return tuple(j for leg in legs(model).values() for j in leg[-2:]) or model.joints
 
 
 class _Bench:
     """Tries pieces on one base, puts them together and proves the whole."""
 
-    def __init__(self, nominal: RobotModel, base: Base, sight: Sight, n_jobs: int, progress: Progress) -> None:
+    def __init__(self, nominal: RobotModel, base: Base, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.nominal, self.base, self.sight, self.progress = nominal, base, sight, progress
         self.reach = Reach(nominal)
         self.runs = Runs(self.reach, base, sight, n_jobs, progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Literal
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from workbench.compare.channels import BODY, GAIN_SPAN, body_channels
 from workbench.experiment.rivals import Pair, Rival
 from workbench.identify.problem import LEAST_BODY_SIGMA
+from workbench.identify.ties import ObservationModel
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 
@@ -27,20 +28,6 @@ ZERO = np.deg2rad(0.3)
 START = 0.01
 """How far the first command's time may be off where cameras see the robot [s]."""
 Imitator = Literal["a", "b"]
-
-
-@dataclass(frozen=True)
-class Sight:
-    """How the next recording will see the robot, on one base.
-
-    sigma: joint -> what a frame's angle may err by, noise and numerical floor [rad]; joints not named are not seen.
-    captured: by cameras, which see the links' angles, zeroed at rest, and not the first command's time; else the servos' own log.
-    rate: frames a second.
-    """
-
-    sigma: Mapping[str, float]
-    captured: bool = True
-    rate: float = 120.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +85,12 @@ class Closest:
     cost: float
 
 
-def channels(sight: Sight, base: str) -> tuple[str, ...]:
+def channels(sight: ObservationModel, base: str) -> tuple[str, ...]:
     """Seen: the joints that have a sigma, and on the ground the body, where cameras see it."""
     return (*sight.sigma, *(BODY if base == "free" and sight.captured else ()))
 
 
-def seen(take: Take, sight: Sight) -> Array:
+def seen(take: Take, sight: ObservationModel) -> Array:
     """Channels (N, c) of a simulated take over their sigma, rests left out."""
     take = take.zeroed_at_rest() if sight.captured else take.as_logged()
     q = take.q[:, [take.column(j) for j in sight.sigma]] / np.array(list(sight.sigma.values()))
@@ -112,7 +99,7 @@ def seen(take: Take, sight: Sight) -> Array:
     return np.asarray(np.nan_to_num(q[~take.resting]))
 
 
-def shown(pair: Pair, takes: Sequence[Take], sight: Sight, finer: Take | None = None) -> Shown:
+def shown(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Take | None = None) -> Shown:
     """What takes of the pair's cast show. finer: the first rival's with the step halved, whose difference counts as error."""
     a, b, *others = (seen(t, sight) for t in takes)
     floor = np.zeros(a.shape[1]) if finer is None else np.sqrt(np.mean(np.square(seen(finer, sight) - a), axis=0))
@@ -126,7 +113,7 @@ def shown(pair: Pair, takes: Sequence[Take], sight: Sight, finer: Take | None = 
                  _flat(left_open(a, sight), weight, n), np.tile(np.arange(c), n), np.tile(weight, n), np.tile(counts, n))
 
 
-def left_open(y: Array, sight: Sight) -> list[Array]:
+def left_open(y: Array, sight: ObservationModel) -> list[Array]:
     """What a recording leaves open of channels (N, c) over sigma, each (N, c) by one standard deviation: before cameras, when the
     first command came, and where each joint stood when its angle was called zero."""
     if not sight.captured:
@@ -144,7 +131,7 @@ def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
     return replace(known, a=known.weight * y) if imitator == "a" else replace(known, b=known.weight * y)
 
 
-def _counts(sight: Sight, count: int) -> Array:
+def _counts(sight: ObservationModel, count: int) -> Array:
     """Of each channel (c,): the root of one over the number of frames that err alike; the body's are gains over a span."""
     counts = np.full(count, 1 / np.sqrt(max(1.0, TOGETHER * sight.rate)))
     counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, GAIN_SPAN * sight.rate))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.experiment.limits import Reach
-from workbench.experiment.projection import Sight
+from workbench.experiment.projection import ObservationModel
 from workbench.experiment.segment import Segment, joined
 from workbench.motion import Motion
 from workbench.recording.take import Take
@@ -32,7 +32,7 @@ NEAR = 0.5
 class Runs:
     """Rollouts at 2 ms on one base, seen at the rate of the recording to come."""
 
-    def __init__(self, reach: Reach, base: str, sight: Sight, n_jobs: int, progress: Progress) -> None:
+    def __init__(self, reach: Reach, base: str, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.reach, self.base, self.sight, self.n_jobs, self.progress = reach, base, sight, n_jobs, progress
         self.config = SimulationConfig(time_step=TIME_STEP, base=base, settle=0.6, contact_period=0)
 

@@ -11,23 +11,21 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from workbench.compare.footfalls import foot_points
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import Path
 from workbench.experiment.segment import Segment
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, foot_points, legs
 
 Array = NDArray[np.float64]
 Body = tuple[float, float, float, float, float, float]
 """Displacement of the base: forward, left, up as shares of the legs' length; roll, pitch, yaw [deg]."""
 CALM, BRISK = math.radians(90), math.radians(200)
-LEG_JOINTS = 3
 MISSED = 0.05
 """Share of the legs' length by which a foot may miss its place."""
 
 
 class BodyMoves:
-    """Segments for a robot on its feet; none for a robot without feet (of the puppy's names)."""
+    """Segments for a robot on its feet; none for a robot without feet, or with a leg of fewer than two joints."""
 
     def __init__(self, model: RobotModel, reach: Reach) -> None:
         self.model, self.reach = model, reach
@@ -61,7 +59,7 @@ class BodyMoves:
                 path.to(pose, speed, least=0.12).hold(0.2)
             yield path.home(CALM).segment(name, "free")
         k = self.model.kinematics
-        carrying = {j for foot in self._legs for j in k.chain(k.frames[foot].child)}
+        carrying = {j for foot in self._legs for j in k.chain(self.model.foot_links[foot])}
         counterweights = [j for j in self.model.joints if j not in carrying]
         deep = self._pose(down)
         if counterweights and deep is not None:
@@ -72,10 +70,9 @@ class BodyMoves:
 
     @cached_property
     def _legs(self) -> Mapping[str, tuple[str, ...]]:
-        """Foot -> the last joints of its leg, from the trunk on."""
-        k = self.model.kinematics
-        return {foot: tuple(j for j in k.chain(k.frames[foot].child) if j in self.model.joints)[-LEG_JOINTS:]
-                for foot in foot_points(self.model.path)}
+        """Foot -> the joints of its leg, from the trunk on."""
+        of = legs(self.model)
+        return of if all(len(joints) >= 2 for joints in of.values()) else {}
 
     def _pose(self, body: Body) -> dict[str, float] | None:
         """Angles of the legs' joints that move the base so, its feet where they stand in neutral; None where they cannot."""
@@ -114,13 +111,14 @@ class BodyMoves:
     def _foot(self, foot: str, joints: tuple[str, ...], x: Array) -> Array:
         """Middle of the foot's points (3,) [m] in the root link's frame."""
         k = self.model.kinematics
-        p, R = k.forward(x[None], joints)[k.frames[foot].child]
-        return np.asarray(p[0] + R[0] @ foot_points(self.model.path)[foot][0].mean(axis=0))
+        p, R = k.forward(x[None], joints)[self.model.foot_links[foot]]
+        return np.asarray(p[0] + R[0] @ foot_points(self.model)[foot][0].mean(axis=0))
 
     def _knee(self, foot: str, x: Array) -> float:
         """How far forward the knee is [m]."""
         k = self.model.kinematics
-        return float(k.forward(x[None], self._legs[foot])[k.frames[foot].child][0][0, 0])
+        joints = self._legs[foot]
+        return float(k.forward(x[None], joints)[k.frames[joints[-1]].child][0][0, 0])
 
     @cached_property
     def _length(self) -> float:

@@ -15,18 +15,19 @@ from workbench.identify.fitting.fits import Fit
 from workbench.identify.ledger import GAP_RATIO, in_file_units
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
-from workbench.identify.problem import LOOP, TakeEvidence, joint_error, ratios
+from workbench.identify.problem import TakeEvidence, joint_error, ratios
 from workbench.identify.selection.model_comparison import Rival, Standing
 from workbench.identify.selection.record import Round
-from workbench.robot import EffectSpec
+from workbench.identify.ties import Tie
+from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 LEAST_RELATIVE = 0.005
 """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
-LEAST_OF = {"command_delay": LOOP / np.sqrt(3.0)}
-"""The same in the contract's unit: every model may set out by LOOP sooner or later, so that no delay is known better [s]."""
+WORTH_AN_EXPERIMENT = 0.05
+"""Probability from which on the likeliest rival of a finding is worth an experiment."""
 SAME_ELSEWHERE = 0.1
 """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
@@ -89,7 +90,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
         unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
-    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), LEAST_OF.get(c.name, 0.0))
+    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), [p.resolution for p in c.parameters])
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
@@ -176,6 +177,12 @@ def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
     best = max(found, key=lambda k: found[k]) if found else ""
     told = best and found[best] > 0.3
     return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
+
+
+def ties(nominal: RobotModel, fit: Fit, standings: Sequence[Standing]) -> tuple[Tie, ...]:
+    """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
+    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in standings
+                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > WORTH_AN_EXPERIMENT)
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:

@@ -129,8 +129,6 @@ def _phase(e: TakeEvidence, residual: Array, channel: str) -> str:
 
 def _foot_of(e: TakeEvidence, joint: str) -> str:
     """The one foot that a joint carries, by its knee's joint; empty for joints that carry none or several."""
-    from workbench.compare.footfalls import foot_points
-
     k = e.take.model.kinematics
-    feet = [f for f in foot_points(e.take.model.path) if joint in k.chain(k.frames[f].child)]
+    feet = [foot for foot, link in e.take.model.foot_links.items() if joint in k.chain(link)]
     return feet[0] if len(feet) == 1 else ""

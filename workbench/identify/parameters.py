@@ -16,11 +16,6 @@ from workbench.robot import EffectSpec, RobotModel
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 """What an effect is, and where."""
-ASKED_APART = ("loose_mount", "joint_stop", "marker_frame", "dropped_command")
-"""What a search from neutral cannot find: a stop shows nothing until the joint meets it, a mount's axis has to be known first;
-`special` reads them off the recordings."""
-
-
 LEAST_SIZE, OF_VECTOR = 0.3, 0.5
 """What a move for a slope is at least a share of: of the typical size, and of its length for one of a vector's numbers."""
 
@@ -62,7 +57,7 @@ class Candidate:
     @property
     def read_off(self) -> bool:
         """Whether its sizes were read off the recordings, 1 being what they say."""
-        return self.effect.name in ASKED_APART
+        return not self.effect.from_neutral
 
     @property
     def parameters(self) -> list[Parameter]:

@@ -15,6 +15,7 @@ from workbench.compare.metrics import rms
 from workbench.compare.session_takes import RegisteredTake
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
+from workbench.effects.schedules import LOOP
 from workbench.identify.shooting import unsettled
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
@@ -34,8 +35,6 @@ LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
 LATE, SHIFTS = 0.1, 4
 """By how much every model may shift an estimated start [s], and in how many steps: a robot whose servos got each other's speeds
 sets out so unlike the nominal one that its start was estimated 62 ms early."""
-LOOP = 2e-3
-"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that."""
 SMOOTHED = 0.065
 """Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
 

@@ -6,13 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from workbench.compare.footfalls import foot_points
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.parameters import ASKED_APART, Candidate
+from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import point_mass
 from workbench.identify.problem import TakeEvidence
 from workbench.robot import RobotModel
@@ -20,8 +17,6 @@ from workbench.robot import RobotModel
 HEAVY, HEAVY_APART = 0.15, 0.09
 """Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows. The latter of
 links that are no part of one leg, as a trunk's: what they carry tips the robot, while their own joint hardly feels it."""
-LENGTH = 0.5
-"""Share of a link's length by which the search changes it at most."""
 
 
 def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
@@ -31,32 +26,21 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
     start_known = not any(e.start_is_free for e in evidence)
     sdf = SdfRobot(model.path)
     out: list[Candidate] = []
+    sent = [e.take.commands for e in evidence if e.take.commands is not None]
     for effect in known_effects().values():
-        if effect.layer == "measurement" or (effect.layer == "ground" and not free and effect.name != "ground_tilt"):
+        if effect.layer == "measurement" or not effect.from_neutral or not effect.could_act(model, sent):
             continue
-        if effect.name in ASKED_APART or (effect.name == "zero_offset" and not free and _zeroed(evidence)):
-            continue
-        if effect.name == "speed_order" and (set(model.bus_ids) < set(model.joints) or len(model.joints) < 2):
-            continue
-        if effect.name == "speed_order" and not _speeds_are_set(evidence):
+        if not free and (not effect.observable_when_fixed or (effect.hidden_by_zeroing and _zeroed(evidence))):
             continue
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
-            if effect.name == "command_delay" and not where and not start_known:
-                continue  # a late start and a delay of all joints are the same
-            if effect.name == "payload":
-                out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))
+            if effect.like_a_late_start and not where and not start_known:
                 continue
-            candidate = Candidate.of(effect, where, neutral)
-            if effect.name == "link_length":
-                candidate = replace(candidate, reach=LENGTH * float(np.linalg.norm(sdf.way(model.kinematics, where[0]))))
-            out.append(candidate)
+            if effect.point_mass:
+                out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))
+            else:
+                out.append(replace(Candidate.of(effect, where, neutral), reach=effect.reach(sdf, model.kinematics, where)))
     return out
-
-
-def _speeds_are_set(evidence: Sequence[TakeEvidence]) -> bool:
-    """Whether moving speeds went out on the bus in any take."""
-    return any(e.take.commands is not None and np.any(e.take.commands.speeds > 0) for e in evidence)
 
 
 def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
@@ -66,19 +50,19 @@ def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
 def heavy_links(model: RobotModel) -> list[str]:
     """Links with at least the share HEAVY of the robot's mass, HEAVY_APART where they are no part of one leg."""
     k = model.kinematics
-    feet = [k.frames[f].child for f in foot_points(model.path) if f in k.frames]
+    feet = list(model.foot_links.values())
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
     return [link for link in k.links if k.masses[link] >= k.mass * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:
-    if effect.layer == "inertia" and all(p.vector for p in effect.parameters):
+    if effect.moves_center:
         yield from ((link,) for link in heavy_links(model))
         return
-    frames, feet = model.kinematics.frames, [f for f in foot_points(model.path) if f in seen]
+    frames, feet = model.kinematics.frames, [f for f in model.foot_links if f in seen]
     links: Sequence[str] = model.kinematics.links
     if effect.layer == "structure":  # what hangs on a joint and carries the next, or a foot
-        carrying = {f.parent for f in frames.values()} | {frames[f].child for f in feet}
+        carrying = {f.parent for f in frames.values()} | {model.foot_links[f] for f in feet}
         links = [f.child for f in frames.values() if f.child in carrying]
     names = {"joint": seen, "foot": feet, "link": links, "rigid_body": list(model.rigid_bodies)}
     for place in effect.places:

@@ -236,4 +236,4 @@ def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
 
 def _of_the_floor(e: EffectSpec) -> bool:
     effect = known_effects().get(e.effect)
-    return effect is not None and effect.layer == "ground" and effect.name != "ground_tilt"
+    return effect is not None and not effect.observable_when_fixed

@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class TakeStory:
+class TakeReport:
     """One take against the nominal and the fitted model.
 
     channels: (c) joints, and on the ground what the body does. noise: (c,) what noise, numerics and contact models alone make

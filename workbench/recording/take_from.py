@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.body_track import BodyTrack
-from workbench.recording.formats.sage import URDF_JOINTS
+from workbench.recording.joint_names import named_by_model
 from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.angles import angle_sigma, base_row, in_world, joint_angles
 from workbench.recording.mocap.mending import mend
@@ -75,30 +74,3 @@ def _take_of_log(recording: Recording, measurement: Measurement, model: RobotMod
     return Take(name=name, source="recording", time=recording.time, joints=joints, q=q, v=v, starts_at=measurement.starts_at,
                 base=base, q_sigma=np.where(np.isfinite(q), sigma, np.nan), commands=commands.reordered(model.joints),
                 problems=recording.problems)
-
-
-def named_by_model(recording: Recording, model: RobotModel) -> Recording:
-    """A log with the model's joint names: a BAM log's one joint is the model's one, a SAGE programme's six are those of the arm's
-    URDF where the model has these; others must be the model's by name."""
-    joints = tuple(dict.fromkeys(c.partition(".")[2] for c in recording.channels if "." in c))
-    if recording.kind == "bam_log":
-        if len(model.joints) != 1:
-            raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
-        return _renamed(recording, {joints[0]: model.joints[0]})
-    if recording.kind == "sage" and set(joints) == set(URDF_JOINTS) and set(URDF_JOINTS.values()) <= set(model.joints):
-        return _renamed(recording, URDF_JOINTS)
-    unknown = [j for j in joints if j not in model.joints]
-    if unknown:
-        raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
-    return recording
-
-
-def _renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
-    """With joints called otherwise, `names` by those of the recording."""
-    channels = {}
-    for channel, values in recording.channels.items():
-        what, dot, joint = channel.partition(".")
-        channels[f"{what}{dot}{names.get(joint, joint)}"] = values
-    sent = recording.commands
-    commands = sent and replace(sent, joints=tuple(names.get(j, j) for j in sent.joints))
-    return replace(recording, channels=channels, commands=commands)

@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from workbench.robot.errors import InputError
+from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.resources import resolve_model
@@ -54,17 +55,24 @@ class EffectSpec:
 class RobotModel:
     """The nominal robot and the effects added to it; plain data that knows no simulator code.
 
-    description: SDF path or package:// URL. base: link that floats. servos: constants by joint. rigid_bodies: Motive
-    asset -> link. bus_ids: Dynamixel ID by joint.
+    description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
+    constants by joint. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID by joint. feet: links that stand on the ground;
+    None: the last link with a collision shape on each branch (robot/feet.py). InputError where the description is wanted for the
+    base's default and cannot be read.
     """
 
-    description: str = PUPPY
-    base: str = "body_link"
+    description: str
+    base: str = ""
     servos: Mapping[str, ServoConstants] = field(default_factory=dict)
     ground: Ground = field(default_factory=Ground)
     rigid_bodies: Mapping[str, str] = field(default_factory=dict)
     bus_ids: Mapping[str, int] = field(default_factory=dict)
     effects: tuple[EffectSpec, ...] = ()
+    feet: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.base:
+            object.__setattr__(self, "base", self.kinematics.root)
 
     @cached_property
     def path(self) -> Path:
@@ -80,6 +88,11 @@ class RobotModel:
     def joints(self) -> tuple[str, ...]:
         """Names of the actuated joints, alphabetical (the thesis's order)."""
         return self.kinematics.joints
+
+    @cached_property
+    def foot_links(self) -> Mapping[str, str]:
+        """Foot -> its link. A foot has the name of the last joint that moves it (the knee's)."""
+        return feet_of(self.kinematics, self.feet)
 
     def servo(self, joint: str) -> ServoConstants:
         """Constants of one joint's servo (default AX-12A where none are given)."""
@@ -110,6 +123,7 @@ class RobotModel:
             "ground": asdict(self.ground),
             "rigid_bodies": dict(self.rigid_bodies),
             "bus_ids": dict(self.bus_ids),
+            "feet": None if self.feet is None else list(self.feet),
             "effects": [
                 {"effect": e.effect, "where": list(e.where),
                  "parameters": {k: list(v) if isinstance(v, tuple) else v for k, v in e.parameters.items()}}
@@ -133,6 +147,7 @@ class RobotModel:
 
 def puppy_model(**changes: Any) -> RobotModel:
     """The puppy that ships with the workbench, AX-12A at the nominal constants, the thesis's names."""
-    model = RobotModel(rigid_bodies=dict(RIGID_BODIES), bus_ids=dict(BUS_IDS), ground=Ground(friction=0.5, stiffness=math.inf))
+    ground = Ground(friction=0.5, stiffness=math.inf)
+    model = RobotModel(PUPPY, rigid_bodies=dict(RIGID_BODIES), bus_ids=dict(BUS_IDS), ground=ground)
     model = replace(model, servos={j: ServoConstants() for j in model.joints})
     return replace(model, **changes) if changes else model

@@ -78,6 +78,8 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
         "ground": {k: v for k, v in asdict(model.ground).items() if v is not None},
         "servos": next(iter(servos.values())) if alike else servos,
     }
+    if model.feet is not None:
+        content["robot"]["feet"] = list(model.feet)
     if model.effects:
         content["effects"] = [_effect_content(e) for e in model.effects]
     if posterior is not None and posterior.names:

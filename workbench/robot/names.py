@@ -22,6 +22,3 @@ RIGID_BODIES = MappingProxyType(
     }
 )
 """Motive asset -> link. Neck and head were not tracked."""
-
-FEET: tuple[str, ...] = ("blb", "brb", "flb", "frb")
-"""A foot is named by its knee's joint."""

@@ -10,6 +10,8 @@ from workbench.robot.errors import InputError
 if TYPE_CHECKING:
     from pydrake.multibody.parsing import PackageMap, Parser
 
+ROBOTS = ("fox", "puppy")
+"""Drake packages that ship in models/sdf."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -25,13 +27,14 @@ def data_file(name: str) -> Path:
 
 
 def ConfigurePackageMap(package_map: PackageMap) -> None:
-    """Makes `package://puppy/...` known to Drake."""
-    if not package_map.Contains("puppy"):
-        package_map.AddPackageXml(str(resource_dir("models") / "puppy" / "package.xml"))
+    """Makes `package://puppy/...` and the other robots that ship known to Drake."""
+    for robot in ROBOTS:
+        if not package_map.Contains(robot):
+            package_map.AddPackageXml(str(resource_dir("models") / robot / "package.xml"))
 
 
 def ConfigureParser(parser: Parser) -> None:
-    """Makes `package://puppy/puppy.sdf` loadable by a caller's parser."""
+    """Makes `package://puppy/puppy.sdf` and `package://fox/fox.sdf` loadable by a caller's parser."""
     ConfigurePackageMap(parser.package_map())
 
 
@@ -45,7 +48,7 @@ def resolve_model(description: str | Path) -> Path:
         package_map = PackageMap()
         ConfigurePackageMap(package_map)
         if not package_map.Contains(package):
-            raise InputError(text, f"no package '{package}' is known; expected package://puppy/… or a path")
+            raise InputError(text, f"no package '{package}' is known; expected one of {', '.join(ROBOTS)}, or a path")
         path = Path(package_map.GetPath(package)) / rest
     else:
         path = Path(text)

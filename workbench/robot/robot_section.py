@@ -21,25 +21,24 @@ def read_model(top: Fields) -> RobotModel:
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
     description = f.text("model", PUPPY) or PUPPY
-    if description == PUPPY:
-        model = puppy_model()
-    else:
-        model = RobotModel(description=description if description.startswith("package://")
-                           else str(f.existing("model", description)))
+    if not description.startswith("package://"):
+        description = str(f.existing("model", description))
     try:
-        kinematics = model.kinematics
+        model = puppy_model() if description == PUPPY else RobotModel(description)
     except InputError as e:
         raise f.error("model", str(e)) from None
+    kinematics = model.kinematics
     links, joints = kinematics.links, model.joints
     base = f.text("base", model.base if model.base in links else kinematics.root) or ""
     if base not in links:
         raise f.error("base", f"the model has no link '{base}'; expected one of {', '.join(links)}")
     bodies = _rigid_bodies(f, links)
     ids = _bus_ids(f, joints)
+    feet = _feet(f, links)
     servos = read_servos(f, joints)
     f.done()
     return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
-                   ground=ground or model.ground)
+                   ground=ground or model.ground, feet=feet)
 
 
 def _ground(f: Fields | None) -> Ground | None:
@@ -62,6 +61,15 @@ def _rigid_bodies(f: Fields, links: tuple[str, ...]) -> dict[str, str]:
     if twice:
         raise f.error("rigid_bodies", f"link '{twice[0]}' carries two assets; expected one each")
     return bodies
+
+
+def _feet(f: Fields, links: tuple[str, ...]) -> tuple[str, ...] | None:
+    given = f.raw("feet")
+    if given is None:
+        return None
+    if not isinstance(given, list) or len({str(link) for link in given}) != len(given):
+        raise f.error("feet", f"expected a list of links, each once, got {given!r}")
+    return tuple(_name(f, "feet", link, "link", links) for link in given)
 
 
 def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:

@@ -13,8 +13,8 @@ from workbench.simulation.contact import model_geometries
 
 
 class FootForces:
-    """Sums the ground's forces on each link that can touch. A foot is named by the joint that carries its link (contract:
-    the knee's joint), the root by its link."""
+    """Sums the ground's forces on each link that can touch, by the name of the foot (`RobotModel.foot_links`), of any other link
+    by the joint that carries it, of the root by its link. Links of one name (shank and foot of one knee) are summed."""
 
     def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, model: RobotModel) -> None:
         self._plant = plant
@@ -22,8 +22,10 @@ class FootForces:
         inspector = scene_graph.model_inspector()
         links = dict.fromkeys(link for g, link in model_geometries(plant, instance).items()
                               if inspector.GetProximityProperties(g) is not None)
-        self.feet = tuple(model.kinematics.parent_joint[link] or link for link in links)
-        row = {link: i for i, link in enumerate(links)}
+        foot = {link: name for name, link in model.foot_links.items()}
+        named = {link: foot.get(link) or model.kinematics.parent_joint[link] or link for link in links}
+        self.feet = tuple(dict.fromkeys(named.values()))
+        row = {link: self.feet.index(name) for link, name in named.items()}
         self._row_of_body = {int(plant.GetBodyByName(link, instance).index()): i for link, i in row.items()}
         self._row_of_geometry = {g: row[link] for g, link in model_geometries(plant, instance).items() if link in row}
         self._world = int(plant.world_body().index())

@@ -102,7 +102,7 @@ def _add_model(builder: RobotDiagramBuilder, model: RobotModel, physics: Physics
 
 def _feet(model: RobotModel, friction: Mapping[str, float]) -> dict[str, float]:
     """Pair friction by the foot's link."""
-    return {model.kinematics.frames[foot].child: value for foot, value in friction.items()}
+    return {model.foot_links[foot]: value for foot, value in friction.items()}
 
 
 def _add_tether(builder: RobotDiagramBuilder, plant: MultibodyPlant, base: str, force: np.ndarray) -> None:

@@ -22,7 +22,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
-from workbench.view.figures import body_attitude, body_path, film_strip, footfalls, joint_grid, joint_torques, stance_of
+from workbench.view.figures import body_attitude, body_path, by_joint, film_strip, footfalls, joint_grid, joint_torques, stance_of
 from workbench.view.report.comparison import headline, take_section
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay
@@ -124,7 +124,8 @@ def _walk_section(rows: list[Row], takes: Mapping[str, Take], model: RobotModel,
         Replay(replay, f"{label}, with the ground's forces.", film_strip(model, main)),
         Picture(footfalls(stance, span=(0.0, SECONDS)), f"When each foot stands: {label}."),
         Details("Angles, torques, attitude", [
-            Picture(joint_grid(main, stance=stance), "Each joint, commanded and simulated; the foot's stance is shaded."),
+            Picture(joint_grid(main, stance=by_joint(stance, model)),
+                    "Each joint, commanded and simulated; the foot's stance is shaded."),
             Picture(torques, "Torque of each joint, and the servo's at full duty."), Picture(body_attitude(main))])])
 
 

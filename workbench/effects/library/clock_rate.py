@@ -16,6 +16,7 @@ class ClockRate(Effect):
     name = "clock_rate"
     layer = "timing"
     places = ("robot",)
+    family = "timing"
     parameters = (Parameter("ratio", "1", 0.5, 2.0, 1.01),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -13,6 +13,9 @@ class ComShift(Effect):
     name = "com_shift"
     layer = "inertia"
     places = ("link",)
+    title = "centre of mass shift"
+    family = "mass"
+    moves_center = True
     parameters = (Parameter("offset", "m", -0.2, 0.2, 0.005, vector=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

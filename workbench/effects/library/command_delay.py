@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from workbench.effects.base import Effect, Parameter, scalar
-from workbench.effects.schedules import delayed
+from workbench.effects.schedules import LOOP, delayed
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
 
@@ -16,7 +17,9 @@ class CommandDelay(Effect):
     name = "command_delay"
     layer = "timing"
     places = ("joint", "robot",)
-    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01),)
+    family = "timing"
+    like_a_late_start = True
+    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0)),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * scalar(spec, 'delay'):.1f} ms late."

@@ -19,6 +19,7 @@ class CoulombFriction(Effect):
     name = "coulomb_friction"
     layer = "actuator"
     places = ("joint",)
+    family = "friction"
     parameters = (Parameter("torque", "N m", 0.0, 1.5, 0.03),)
 
     def sentence(self, spec: EffectSpec) -> str:

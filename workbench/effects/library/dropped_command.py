@@ -21,6 +21,8 @@ class DroppedCommand(Effect):
     name = "dropped_command"
     layer = "timing"
     places = ("joint",)
+    estimator = "missed poses"
+    from_neutral = False
     parameters = (Parameter("probability", "1", 0.0, 1.0, 0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:

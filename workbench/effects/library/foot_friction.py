@@ -14,6 +14,7 @@ class FootFriction(Effect):
     name = "foot_friction"
     layer = "ground"
     places = ("foot",)
+    observable_when_fixed = False
     parameters = (Parameter("friction", "1", 0.02, 1.5, 0.3, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -15,6 +15,7 @@ class GroundFriction(Effect):
     name = "ground_friction"
     layer = "ground"
     places = ("robot",)
+    observable_when_fixed = False
     parameters = (Parameter("friction", "1", 0.02, 1.5, 0.4, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -17,7 +17,9 @@ class GroundTilt(Effect):
     name = "ground_tilt"
     layer = "ground"
     places = ("robot",)
-    twin = "tether_force"
+    family = "ground pull"
+    steady_pull = True
+    equivalent_to = ("tether_force",)
     parameters = (
         Parameter("forward", "deg", -30.0, 30.0, 1.0, si=DEGREE),
         Parameter("left", "deg", -30.0, 30.0, 1.0, si=DEGREE),)
@@ -27,7 +29,7 @@ class GroundTilt(Effect):
         return f"Gravity leans {forward:.1f} deg forward and {left:.1f} deg to the left of the floor's normal."
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        if name != self.twin:
+        if name not in self.equivalent_to:
             return ()
         values, weight = si_values(self, spec), GRAVITY * model.kinematics.mass
         return weight * math.tan(values["forward"]), weight * math.tan(values["left"]), 0.0

@@ -21,6 +21,8 @@ class JointStop(Effect):
     name = "joint_stop"
     layer = "structure"
     places = ("joint",)
+    estimator = "end of travel"
+    from_neutral = False
     parameters = (
         Parameter("lower", "deg", -WHOLE, WHOLE, -30.0, si=DEGREE),
         Parameter("upper", "deg", -WHOLE, WHOLE, 30.0, si=DEGREE),

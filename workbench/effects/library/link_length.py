@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from workbench.effects.base import Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
+from workbench.robot.kinematics import Kinematics
+
+SHARE = 0.5
+"""Of a link's length, by which a search changes it at most."""
 
 
 class LinkLength(Effect):
@@ -17,7 +23,13 @@ class LinkLength(Effect):
     name = "link_length"
     layer = "structure"
     places = ("link",)
+    moves_feet = True
+    estimator = "length between axes"
     parameters = (Parameter("change", "m", -0.2, 0.2, 0.003),)
+
+    def reach(self, sdf: SdfRobot, kinematics: Kinematics, where: tuple[str, ...]) -> float:
+        (link,) = where
+        return SHARE * float(np.linalg.norm(sdf.way(kinematics, link)))
 
     def sentence(self, spec: EffectSpec) -> str:
         change = scalar(spec, "change")

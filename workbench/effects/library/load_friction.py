@@ -44,6 +44,7 @@ class LoadFriction(Effect):
     name = "load_friction"
     layer = "actuator"
     places = ("joint",)
+    family = "friction"
     under_load = True
     parameters = (Parameter("coefficient", "", 0.0, 1.0, 0.15),)
 

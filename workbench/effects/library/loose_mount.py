@@ -17,6 +17,8 @@ class LooseMount(Effect):
     name = "loose_mount"
     layer = "structure"
     places = ("joint",)
+    estimator = "play across the axis"
+    from_neutral = False
     free_play = "play"
     parameters = (
         Parameter("play", "deg", 0.0, 30.0, 1.0, si=DEGREE),

@@ -24,6 +24,8 @@ class MarkerFrame(Effect):
     name = "marker_frame"
     layer = "measurement"
     places = ("rigid_body",)
+    estimator = "turn of an asset at rest"
+    from_neutral = False
     parameters = (Parameter("rotation", "deg", -180.0, 180.0, 3.0, si=DEGREE, vector=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -15,7 +15,10 @@ class Payload(Effect):
     name = "payload"
     layer = "inertia"
     places = ("link",)
-    limit = "com_shift"
+    family = "mass"
+    point_mass = True
+    includes = ("com_shift",)
+    reduces_to = "com_shift"
     parameters = (
         Parameter("mass", "kg", 0.0, 5.0, 0.05),
         Parameter("position", "m", -0.5, 0.5, 0.02, vector=True),
@@ -27,7 +30,7 @@ class Payload(Effect):
                 f"{1000 * z:.0f}) mm in its frame.")
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        if name != self.limit:
+        if name != self.reduces_to:
             return ()
         (link,), mass = spec.where, scalar(spec, "mass")
         k = model.kinematics

@@ -19,6 +19,7 @@ class ServoGain(Effect):
     name = "servo_gain"
     layer = "actuator"
     places = ("joint",)
+    family = "electrical"
     parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -15,6 +15,7 @@ class SoftGround(Effect):
     name = "soft_ground"
     layer = "ground"
     places = ("robot",)
+    observable_when_fixed = False
     parameters = (Parameter("stiffness", "N/m", 200.0, 1e7, 5e3),)
 
     def sentence(self, spec: EffectSpec) -> str:

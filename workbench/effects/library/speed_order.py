@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
@@ -19,6 +21,11 @@ class SpeedOrder(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return "Every servo runs at another servo's speed: goals went out in the order of bus IDs, speeds in the order of names."
+
+    def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
+        """Where all servos, of which there are several, have bus IDs, and moving speeds went out."""
+        known = not set(model.bus_ids) < set(model.joints) and len(model.joints) > 1
+        return known and any(bool(np.any(c.speeds > 0)) for c in sent)
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
         missing = [j for j in commands.joints if j not in model.bus_ids]

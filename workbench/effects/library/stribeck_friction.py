@@ -38,7 +38,8 @@ class StribeckFriction(Effect):
     name = "stribeck_friction"
     layer = "actuator"
     places = ("joint",)
-    limit = "coulomb_friction"
+    family = "friction"
+    reduces_to = "coulomb_friction"
     parameters = (
         Parameter("torque", "N m", 0.0, 1.5, 0.05),
         Parameter("speed", "deg/s", 0.5, 400.0, 20.0, si=DEGREE, shapes=True))

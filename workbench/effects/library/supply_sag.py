@@ -35,6 +35,7 @@ class SupplySag(Effect):
     name = "supply_sag"
     layer = "actuator"
     places = ("robot",)
+    family = "electrical"
     under_load = True
     parameters = (Parameter("drop", "V", 0.0, 5.0, 0.3),)
 

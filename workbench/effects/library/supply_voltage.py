@@ -19,6 +19,7 @@ class SupplyVoltage(Effect):
     name = "supply_voltage"
     layer = "actuator"
     places = ("robot",)
+    family = "electrical"
     parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:

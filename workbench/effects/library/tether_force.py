@@ -15,14 +15,17 @@ class TetherForce(Effect):
     name = "tether_force"
     layer = "ground"
     places = ("robot",)
-    twin = "ground_tilt"
+    family = "ground pull"
+    observable_when_fixed = False
+    steady_pull = True
+    equivalent_to = ("ground_tilt",)
     parameters = (Parameter("force", "N", -20.0, 20.0, 0.3, vector=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return "Something pulls at the base with ({:.2f}, {:.2f}, {:.2f}) N.".format(*spec.parameters["force"])  # type: ignore[misc]
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
-        if name != self.twin:
+        if name not in self.equivalent_to:
             return ()
         x, y, _ = vector(si_values(self, spec), "force")
         weight = GRAVITY * model.kinematics.mass

@@ -33,6 +33,7 @@ class ThermalFade(Effect):
     name = "thermal_fade"
     layer = "actuator"
     places = ("robot",)
+    family = "electrical"
     under_load = True
     parameters = (Parameter("rate", "1/s", 0.0, 1.0, 0.01),)
 

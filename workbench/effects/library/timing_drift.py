@@ -18,6 +18,7 @@ class TimingDrift(Effect):
     name = "timing_drift"
     layer = "timing"
     places = ("robot",)
+    family = "timing"
     parameters = (Parameter("per_pose", "s", -0.05, 0.2, 0.003),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -35,6 +35,7 @@ class TorqueCeiling(Effect):
     name = "torque_ceiling"
     layer = "actuator"
     places = ("joint",)
+    family = "electrical"
     under_load = True
     parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
 

@@ -19,6 +19,7 @@ class ViscousFriction(Effect):
     name = "viscous_friction"
     layer = "actuator"
     places = ("joint",)
+    family = "friction"
     parameters = (Parameter("coefficient", "N m s/rad", 0.0, 2.0, 0.03),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -14,6 +14,9 @@ class ZeroOffset(Effect):
     name = "zero_offset"
     layer = "structure"
     places = ("joint",)
+    hidden_by_zeroing = True
+    moves_feet = True
+    estimator = "turn about an axis"
     parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -11,10 +11,6 @@ from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts import Jury, Question
-from workbench.identify.selection.record import Round
-
-STEPS = 4
-"""Of a fit to takes that are played otherwise."""
 
 
 @dataclass(frozen=True)
@@ -25,25 +21,15 @@ class Played:
     missed: tuple[Missed, ...] = ()
 
 
-def played_anew(search: Search, current: Fit, rounds: list[Round], played: Played) -> tuple[Fit, Played]:
-    """What was found with the base held, fitted to takes that are played without what servos missed as it tells that; `rounds`
-    as these takes judge them."""
-    jury = search.jury
-    played = read_anew(search, current, played)
-    if search.jury is not jury:
-        rounds[:] = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
-        current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, STEPS)
-    return current, played
-
-
-def read_anew(search: Search, current: Fit, played: Played) -> Played:
-    """Missed poses as the robot with these effects tells them; the search's takes are played without these instead."""
+def read_anew(search: Search, current: Fit, played: Played) -> tuple[Search, Played]:
+    """Missed poses as the robot with these effects tells them, and the search on takes that are played without these; the same
+    search where they are those that were known."""
     model, sent = with_effects(search.nominal, current.sizes()), played.sent
     residuals = sent.residuals([Question(model, tuple(range(len(sent.evidence))))])[0]
     jury, missed = with_missed(sent, model, residuals)
     if _poses(missed) != _poses(played.missed):
-        search.jury = search.jury.on(played_as(search.jury.evidence, jury.evidence))
-    return replace(played, missed=missed)
+        search = search.on(search.jury.on(played_as(search.jury.evidence, jury.evidence)))
+    return search, replace(played, missed=missed)
 
 
 def played_as(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from workbench.effects.registry import known_effects
+from workbench.effects.registry import effect_named, estimated_by
 from workbench.identify.estimators.dropped_in_motion import LEAST_STEP, TURNS, end_of, passed_over, played_without, steps
 from workbench.identify.estimators.stops_and_mounts import AT_STOP
 from workbench.identify.findings import Change, Estimate, Finding
@@ -27,11 +27,16 @@ LEAST_CLOSED, SURELY = 0.5, 0.8
 """Share of a joint's gap that the poses taken for missed must explain; the second where none was missed with the base held: on
 the ground a joint may be kept from going."""
 
+SURE = 0.95
+"""Probability that poses were missed, where they explain that much."""
+
 
 @dataclass(frozen=True)
 class Missed:
-    """One joint's missed poses, by take. of: how many would have moved it, in all takes."""
+    """One joint's missed poses, by take. effect: the name of what misses them; of: how many would have moved the joint, in all
+    takes."""
 
+    effect: str
     joint: str
     poses: Mapping[int, tuple[int, ...]]
     of: int
@@ -57,20 +62,25 @@ class Missed:
     @property
     def spec(self) -> EffectSpec:
         """The effect, for a model."""
-        return EffectSpec("dropped_command", (self.joint,), {"probability": self.probability})
+        return EffectSpec(self.effect, (self.joint,), {self._parameter: self.probability})
+
+    @property
+    def _parameter(self) -> str:
+        return effect_named(self.effect).parameters[0].name
 
     def finding(self) -> Finding:
         """With the 90 % interval of a share (Clopper and Pearson 1934)."""
         low = float(beta.ppf(0.05, self.count, self.of - self.count + 1))
         high = 1.0 if self.count == self.of else float(beta.ppf(0.95, self.count + 1, self.of - self.count))
-        return Finding("dropped_command", (self.joint,), 0.95, {"probability": Estimate(self.probability, low, high, "1")},
+        return Finding(self.effect, (self.joint,), SURE, {self._parameter: Estimate(self.probability, low, high, "1")},
                        self.fit, self.validation,
-                       evidence=known_effects()["dropped_command"].sentence(self.spec) + f" ({self.count} of {self.of} here.)")
+                       evidence=effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)")
 
 
 def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> tuple[Jury, tuple[Missed, ...]]:
     """A jury whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
-    if "dropped_command" not in known_effects():
+    effect, *_ = (*estimated_by("missed poses"), None)
+    if effect is None:
         return jury, ()
     found: list[Missed] = []
     moving = passed_over(jury, nominal, residuals)
@@ -90,7 +100,7 @@ def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array])
         if was - now > least * (was - frames) and was - now > 100:
             fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
                                   joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
-            found.append(Missed(joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
+            found.append(Missed(effect.name, joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
             jury, residuals = played_without(jury, {(i, joint): k for i, k in lost.items() if k}), after
     return jury, tuple(found)
 

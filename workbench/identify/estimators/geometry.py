@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.effects.registry import known_effects
+from workbench.effects.registry import effect_named, estimated_by
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.findings import Change, Estimate, Finding
+from workbench.identify.findings import SUREST, Change, Estimate, Finding
 from workbench.identify.fitting.covariance import Z90
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.selection.model_comparison import SUREST
 from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
 from workbench.recording.mocap.mending import mend
@@ -74,15 +73,15 @@ class Measured:
     @property
     def spec(self) -> EffectSpec:
         """The effect, for a model."""
-        return EffectSpec(self.effect, (self.where,), {known_effects()[self.effect].parameters[0].name: self.mean})
+        return EffectSpec(self.effect, (self.where,), {effect_named(self.effect).parameters[0].name: self.mean})
 
     def finding(self, fit: Change, validation: Change) -> Finding:
         """With the 90 % interval of what was measured."""
-        p = known_effects()[self.effect].parameters[0]
+        p = effect_named(self.effect).parameters[0]
         half = Z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
         return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
-                       evidence=known_effects()[self.effect].sentence(self.spec) + self.seen)
+                       evidence=effect_named(self.effect).sentence(self.spec) + self.seen)
 
 
 @dataclass(frozen=True)
@@ -106,23 +105,24 @@ class Build:
 
 def build_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> Build:
     """What the bodies show of a robot whose model has no lengths or zeros of its own. residuals: of the model, by take."""
-    own = {"link_length", "zero_offset"}
-    if {e.effect for e in model.effects} & own or not own <= set(known_effects()):
+    lengths, turns = estimated_by("length between axes"), estimated_by("turn about an axis")
+    if not lengths or not turns or {e.effect for e in model.effects} & {e.name for e in (*lengths, *turns)}:
         return Build()
     between = {i: _spans(e, model) for i, e in enumerate(evidence) if e.take.recording.rigid_bodies}
     held = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
     ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
     measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
-    for effect, least, told in (("link_length", LEAST_CHANGE, _changes(model, [s for there in between.values() for s in there])),
-                                ("zero_offset", LEAST_TURNED, _turns(model, held))):
-        unit = known_effects()[effect].parameters[0].si
+    for (effect, *_), least, told in (
+            (lengths, LEAST_CHANGE, _changes(model, [s for there in between.values() for s in there])),
+            (turns, LEAST_TURNED, _turns(model, held))):
+        name, unit = effect.name, effect.parameters[0].si
         for where, number in told.items():
             if number.is_nothing(least):
-                as_drawn.add((effect, (where,)))
-            elif number.differs(least) and effect == "zero_offset" and ill & set(model.kinematics.chain(_carried(model, where))):
-                near[effect, (where,)] = number.value / unit
+                as_drawn.add((name, (where,)))
+            elif number.differs(least) and effect.hidden_by_zeroing and ill & set(model.kinematics.chain(_carried(model, where))):
+                near[name, (where,)] = number.value / unit
             elif number.differs(least):
-                measured.append(Measured(effect, where, number.value / unit, number.sigma / unit))
+                measured.append(Measured(name, where, number.value / unit, number.sigma / unit))
     return Build(tuple(measured), near, frozenset(as_drawn))
 
 

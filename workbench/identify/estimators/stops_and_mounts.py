@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.channels import ACROSS
-from workbench.effects.registry import known_effects
+from workbench.effects.base import Effect
+from workbench.effects.registry import estimated_by
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, smoothed
@@ -29,18 +30,17 @@ LEAST_TURN = np.deg2rad(0.3)
 
 def special(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """Those that these takes suggest; residuals: of the nominal robot, by take."""
-    known = known_effects()
     ill = [channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)]
     out: list[Candidate] = []
     for joint in dict.fromkeys(j for e in evidence for j in e.joints):
-        if "joint_stop" in known:
-            out += _stop(joint, evidence, residuals)
-        if "loose_mount" in known:
-            out += _mount(joint, model, evidence, residuals, ill)
-    return out + (_frames(model, evidence) if "marker_frame" in known else [])
+        for stop in estimated_by("end of travel"):
+            out += _stop(stop, joint, evidence, residuals)
+        for mount in estimated_by("play across the axis"):
+            out += _mount(mount, joint, model, evidence, residuals, ill)
+    return out + [c for turned in estimated_by("turn of an asset at rest") for c in _frames(turned, model, evidence)]
 
 
-def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
+def _stop(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """A stop at either side where the recording stands at its end while the model goes on."""
     ends: dict[int, list[tuple[float, float]]] = {1: [], -1: []}
     went: dict[int, float] = {1: -np.inf, -1: -np.inf}
@@ -67,7 +67,6 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     found = {side: told for side, told in found.items() if went[side] - told[0] < LEAST_CUT}  # what it passed is no stop
     if not found:
         return []
-    stop = known_effects()["joint_stop"]
     far = [stop.parameters[0].low, stop.parameters[1].high]
     neutral, typical, held = list(far), list(far), [True, True]
     for side, (end, reach) in found.items():
@@ -79,7 +78,7 @@ def _stop(joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, 
     return [replace(Candidate.of(stop, (joint,), neutral, typical, held), reach=float(np.rad2deg(furthest)))]
 
 
-def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
+def _mount(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
            ill: Sequence[Mapping[str, float]]) -> list[Candidate]:
     """A loose mount where the link turns across its servo's axis: about the link's axis along which it does so most, as far as
     that."""
@@ -105,10 +104,10 @@ def _mount(joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], resi
     play = float(np.rad2deg(max(np.ptp(np.quantile(along, [0.05, 0.95])) - 2 * sigma, 0.5 * sigma)))
     in_link = neutral[frame.child][1][0].T @ axis
     in_link = in_link * np.sign(in_link[np.argmax(np.abs(in_link))])
-    return [Candidate.of(known_effects()["loose_mount"], (joint,), (0.0, *in_link), (play, *in_link), (False, True, True, True))]
+    return [Candidate.of(mount, (joint,), (0.0, *in_link), (play, *in_link), (False, True, True, True))]
 
 
-def _frames(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
+def _frames(turned: Effect, model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
     """Assets that stand turned at rest, where all frames are parallel to the capture's axes."""
     out = []
     for asset in model.rigid_bodies:
@@ -118,5 +117,5 @@ def _frames(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candida
             continue
         turn = np.rad2deg(np.mean(turns, axis=0))
         typical = np.where(np.abs(turn) < 0.2, 1.0, turn)
-        out.append(Candidate.of(known_effects()["marker_frame"], (asset,), (0.0, 0.0, 0.0), typical.tolist()))
+        out.append(Candidate.of(turned, (asset,), (0.0, 0.0, 0.0), typical.tolist()))
     return out

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import Fit, Search, Slopes
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Slopes
 from workbench.identify.ledger import in_file_units
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts import Jury
-from workbench.identify.selection.record import LEAST_GAIN
 
 Array = NDArray[np.float64]
 CHANGE = 0.25

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TypeVar
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from workbench.compare.metrics import rms
 from workbench.identify.fitting.covariance import covariance_of
 from workbench.identify.fitting.levenberg_marquardt import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.identify.fitting.responses import Part, Signatures
 from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.identify.rollouts import FINE, Jury, Question
-from workbench.identify.selection.screening import Part, Race, Signatures, Trial, Trying
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -23,13 +23,13 @@ T = TypeVar("T")
 Sizes = list[tuple[Candidate, Array]]
 """Effects, each with its sizes."""
 Report = Callable[[str, float | None], None]
-SEEN_ELSEWHERE = ("zero_offset",)
-"""What leaves no trace in the angles of its own joint, as they are zeroed, but in what gravity and ground do."""
-
 RESETTLING = 3
 """Steps of a fit of effects that were settled before."""
 AGAINST = 100.0
 """Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number."""
+LEAST_GAIN = 150.0
+"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
+is half its noise: engines, and a robot and its model, differ by as much."""
 FINER, FINER_STEPS = 0.5, 3
 """In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
 does is less than what a coarse step makes of it."""
@@ -101,16 +101,23 @@ class Search:
     """Fits on one session.
 
     settled: effects that showed with the base held, as held takes tell them: these keep their numbers in all fits that follow,
-    as contact bends what walks tell.
+    as contact bends what walks tell. signatures: what was seen of effects so far, a memory that all searches of a session share.
     """
 
-    def __init__(self, jury: Jury, nominal: RobotModel) -> None:
-        self.jury, self.nominal = jury, nominal
+    def __init__(self, jury: Jury, nominal: RobotModel, settled: Fit | None = None, signatures: Signatures | None = None) -> None:
+        self.jury, self.nominal, self.settled = jury, nominal, settled
+        self.signatures: Signatures = {} if signatures is None else signatures
         self.takes = tuple(range(len(jury.evidence)))
         self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
         self.held = tuple(i for i in self.fitted if not jury.walks((i,)))
-        self.settled: Fit | None = None
-        self.signatures: Signatures = {}
+
+    def on(self, jury: Jury) -> Search:
+        """The same search on other takes of the session."""
+        return Search(jury, self.nominal, self.settled, self.signatures)
+
+    def with_settled(self, settled: Fit | None) -> Search:
+        """The same search with other effects settled."""
+        return Search(self.jury, self.nominal, settled, self.signatures)
 
     @property
     def lone(self) -> bool:
@@ -136,13 +143,14 @@ class Search:
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
         return grounded if grounded and alone else takes
 
-    def resettled(self, current: Fit, *more: Candidate) -> Fit:
-        """`current` with those that are settled, and `more`, fitted anew on held takes: for when one went or another came."""
+    def resettled(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
+        """`current` with those that are settled, and `more`, fitted anew on held takes, and the search in which these are
+        settled: for when one went or another came."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
-        self.settled = None
-        self.settled = self.retimed(self.refitted(self.evaluated(there), self.held, RESETTLING, range(len(there))))
-        told = self.settled.sizes_by_key()
-        return self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
+        free = self.with_settled(None)
+        settled = free.retimed(free.refitted(free.evaluated(there), self.held, RESETTLING, range(len(there))))
+        told = settled.sizes_by_key()
+        return self.with_settled(settled), self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
     def retimed(self, current: Fit) -> Fit:
         """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come. As it
@@ -176,19 +184,6 @@ class Search:
         """What several parts return; their rollouts share batches."""
         done = together(dict(enumerate(parts)), lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
         return [done[n] for n in range(len(parts))]
-
-    def tried(self, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-              report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[Trial]:
-        """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
-        at several joints, each judged by its own joint's channels. takes: on which, by group.
-        ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
-        signatures must foretell of one that is fitted."""
-        race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not self.held), []
-        for n, group in enumerate(groups):
-            base = {i: current.residuals[i] for i in takes[n]}
-            asking.append(Trying(self.jury, self.nominal, current.sizes(), base, group, race, self.apart(group[0], takes[n]),
-                                 self.signatures).run())
-        return [trial for trials in self.side_by_side(asking, report) for trial in trials]
 
     def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
         """Effects' sizes fitted together (all that are not settled, or those listed in `free`), with their covariance."""
@@ -237,7 +232,7 @@ class Search:
 
     def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
         """Whether an effect shows in the channels of its own joint alone, on these takes."""
-        return c.joint is not None and c.name not in SEEN_ELSEWHERE and not self.jury.walks(takes)
+        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.jury.walks(takes)
 
     def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
         """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves

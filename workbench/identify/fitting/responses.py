@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from workbench.identify.parameters import Candidate
+from workbench.identify.rollouts import Question
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+Part = Generator[list[Question], list[dict[int, Array]], T]
+"""What a part of a search asks, is answered, and returns."""
+Seen = tuple[list[Array], list[list[Array]], float]
+"""Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
+Signatures = dict[tuple[object, ...], Seen]
+"""By group and takes."""
 SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
 """Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
 at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, unless walks are all there is, and those of

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
 from workbench.identify.ledger import GAP_RATIO, channel_gaps
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.selection.best_subsets import NEARLY_ALL
-from workbench.identify.selection.record import LEAST_GAIN, Round, before_rough, taken
+from workbench.identify.selection.record import Round, before_rough, taken
 from workbench.identify.selection.scheduling import STANDS_OUT, standing_out
 from workbench.identify.selection.screening import Trial
 

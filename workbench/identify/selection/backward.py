@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.fitting.fits import Fit, Search, held_gainsay
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, held_gainsay
 from workbench.identify.selection.acceptance import ALL_CLOSED, LAST_CLOSED, completed
 from workbench.identify.selection.best_subsets import HALF, TOGETHER_STEPS
-from workbench.identify.selection.record import LEAST_GAIN, Round
+from workbench.identify.selection.record import Round
 
 CLEARLY = 5.0
 """Times that gain, from which on an effect is missed whatever the others do in its place."""

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import Fit, Search, Sizes
-from workbench.identify.selection.record import LEAST_GAIN, Round
-from workbench.identify.selection.screening import Part, Trial
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Sizes
+from workbench.identify.fitting.responses import Part
+from workbench.identify.selection.record import Round
+from workbench.identify.selection.screening import Trial
 
 Array = NDArray[np.float64]
 NEARLY_ALL = 0.9

@@ -94,7 +94,7 @@ def _may_hang(c: Candidate, x: Array, s: Standing) -> bool:
 
 def _becomes(c: Candidate, s: Standing) -> bool:
     """Whether what an effect is at its end stands beside it: of a load that weighs nothing, a centre of mass elsewhere."""
-    return any(r.candidate.key == (c.effect.limit, c.where) for r in s.rivals)
+    return any(r.candidate.key == (c.effect.reduces_to, c.where) for r in s.rivals)
 
 
 def _at_its_limit(c: Candidate, x: Array) -> bool:

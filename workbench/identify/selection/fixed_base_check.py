@@ -10,26 +10,24 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.selection.best_subsets import NEARLY_ALL
 
 
-def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> Fit:
-    """The fit with such numbers of effects that walks have just told as held takes tell them, which settles these; as it was
-    where walks then show less of them, or held takes want none at all."""
+def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> tuple[Search, Fit]:
+    """The fit with such numbers of effects that walks have just told as held takes tell them, and the search in which these are
+    settled; as it was where walks then show less of them, or held takes want none at all."""
     if not search.held:
-        return current
+        return search, current
     for c in told:
         if c.where and c.size and not c.read_off and c.effect.layer != "ground" and not search.is_settled(c):
-            current = _heard(search, current, c)
-    return current
+            search, current = _heard(search, current, c)
+    return search, current
 
 
-def _heard(search: Search, current: Fit, c: Candidate) -> Fit:
+def _heard(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
     held, walks = search.held, search.grounded(search.fitted)
     without = search.evaluated(current.sizes_without(c.key))
     if not held_gainsay(search, current, without):
-        return current
-    settled = search.settled
-    fit = search.resettled(current, c)
+        return search, current
+    settled, fit = search.resettled(current, c)
     walking = [gained(search.jury, without, there, walks, "fit") for there in (fit, current)]
     if gained(search.jury, without, fit, held, "fit") > 0 and walking[0] > NEARLY_ALL * walking[1]:
-        return fit
-    search.settled = settled
-    return current
+        return settled, fit
+    return search, current

@@ -12,8 +12,8 @@ from functools import partial
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.estimators.dropped_again import Played, played_anew
-from workbench.identify.fitting.fits import Fit, Report, Search
+from workbench.identify.estimators.dropped_again import Played, read_anew
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Report, Search
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.acceptance import (
@@ -37,10 +37,10 @@ from workbench.identify.selection.best_subsets import (
 )
 from workbench.identify.selection.fixed_base_check import heard
 from workbench.identify.selection.pair_move import in_two
-from workbench.identify.selection.record import LEAST_GAIN, Chosen, Round, before_rough
+from workbench.identify.selection.record import Chosen, Round, before_rough
 from workbench.identify.selection.reevaluation import weighed_anew
 from workbench.identify.selection.scheduling import FEW, TIERS, TIERS_OF_ALL, asked, standing_out
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import Trial, tried
 from workbench.identify.selection.single_joint import lone_round, set_right, together
 
 MOST_ROUNDS = 6
@@ -56,6 +56,8 @@ OWN_GAP = 0.9
 NEARLY_ALL_WALKING = 0.97
 """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
 back, which closes up to 0.93; true effects close more."""
+REPLAYED_STEPS = 4
+"""Of a fit to takes that are played otherwise."""
 LAST_STEPS = 3
 """Of a fit of all effects when one was dropped at the end; it ends where little changes."""
 MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
@@ -68,31 +70,36 @@ ALIKE = 0.25
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: Played | None = None
            ) -> Chosen:
     """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
-    left out of what is played; read anew by what held takes told, which may change the search's jury."""
+    left out of what is played; read anew by what held takes told."""
     current = nominal = search.evaluated([])
     rounds: list[Round] = []
     work = MOST_WORK_LONE if search.lone else MOST_WORK
     most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.jury.seconds)
     if search.held:
-        current = _phase(search, pool, current, search.held, rounds, report, most)
+        search, current, rounds = _phase(search, pool, current, search.held, rounds, report, most)
     if current.effects and played is not None:
         report("looking anew", None)
-        current, played = played_anew(search, current, rounds, played)
+        begun = search
+        search, played = read_anew(search, current, played)
+        if search is not begun:
+            rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
+            current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, REPLAYED_STEPS)
         nominal = search.evaluated([])
     if search.held != search.fitted:
-        search.settled = current = search.retimed(current)
+        current = search.retimed(current)
+        search = search.with_settled(current)
         closed = least_closed(search, nominal, current)
-        current = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
+        search, current, rounds = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
         current, rounds = in_two(search, pool, current, rounds, report)
     kept = without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
         kept = without_idle(search, kept)
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
-            kept = search.resettled(kept)
+            search, kept = search.resettled(kept)
         if kept is not current or _may_go_on(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(kept, tuple(rounds), played.missed if played else ())
+    return Chosen(search, kept, tuple(rounds), played.missed if played else ())
 
 
 def _may_go_on(search: Search, fit: Fit) -> bool:
@@ -101,11 +108,11 @@ def _may_go_on(search: Search, fit: Fit) -> bool:
     return search.lone or any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
 
 
-def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: list[Round], report: Report,
-           most_work: float, closed: float = LEAST_CLOSED) -> Fit:
+def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[Round],
+           report: Report, most_work: float, closed: float = LEAST_CLOSED) -> tuple[Search, Fit, list[Round]]:
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
-    stopped = False
+    stopped, rounds = False, list(rounds)
     least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
     for _ in range(MOST_ROUNDS):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
@@ -126,7 +133,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
                 break
             groups, on = asked(search, likely, current, beyond, takes, tier)
             ahead = max((t.gain["fit"] for t in trials if t.joint is None), default=0.0)
-            trials += search.tried(current, groups, on, say, ahead, least)
+            trials += tried(search, current, groups, on, say, ahead, least)
             trials.sort(key=lambda t: -t.gain["choose"])
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
             said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
@@ -134,7 +141,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
                 if not _tips(search, trials[0], takes, tier):
                     break
-                likely = [c for c in pool if c.name == "com_shift"]
+                likely = [c for c in pool if c.effect.moves_center]
         worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
@@ -152,15 +159,15 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             break
         current = after
         if search.jury.walks(takes):
-            current = heard(search, current, [t.candidate for t in accepted])
+            search, current = heard(search, current, [t.candidate for t in accepted])
         else:
-            current, rounds[:] = weighed_anew(search, current, rounds, takes)
+            current, rounds = weighed_anew(search, current, rounds, takes)
     if search.jury.walks(takes):
-        current, rounds[:] = weighed_anew(search, current, rounds, takes)
+        current, rounds = weighed_anew(search, current, rounds, takes)
     elif search.lone and search.jury.work <= most_work:
         current, seats = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
-        rounds[:] = seats or rounds
-    return current
+        rounds = seats or rounds
+    return search, current, rounds
 
 
 def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:

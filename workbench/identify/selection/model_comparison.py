@@ -9,13 +9,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.findings import SUREST
 from workbench.identify.fitting.covariance import TEMPER_WALKING
 from workbench.identify.fitting.fits import Fit, Report, Search, gained
+from workbench.identify.fitting.responses import Part
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.selection.acceptance import completed
 from workbench.identify.selection.forward import CLOSE, MOST_RIVALS
 from workbench.identify.selection.record import Chosen, Round
-from workbench.identify.selection.screening import Part, Trial
+from workbench.identify.selection.screening import Trial
 
 Array = NDArray[np.float64]
 Seats = dict[Key, tuple[Round, Trial]]
@@ -46,8 +48,6 @@ STEPS = 4
 TWIN = 1.0 / 3.0
 """The least odds of a finding's twin that walks tell, where it came near enough to be put in its place, and of a name that held
 takes find better but for the price of its numbers."""
-SUREST = 0.98
-"""What no finding exceeds: physics that the vocabulary lacks can look like any of it."""
 CLOSED = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
 """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the last.
 True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in part."""
@@ -116,7 +116,7 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
 
 def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
     """Whether a rival moves the robot as effect i does, and held takes do not tell which it is."""
-    if rival.effects[-1].name != fit.effects[i].effect.twin:
+    if rival.effects[-1].name not in fit.effects[i].effect.equivalent_to:
         return False
     return -_better(search, fit, rival, search.held) < BETTER * _misfit(search, fit)
 
@@ -160,7 +160,7 @@ def _outbid(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
     """Whether only the price of more numbers keeps a rival from effect i's place: a load that swings little is nearly a spring.
     Not one that is effect i with something added."""
     more = _told(rival, len(rival.effects) - 1) > _told(fit, i)
-    return more and rival.effects[-1].effect.limit != fit.effects[i].name and _ahead(search, fit, rival, i) > 0
+    return more and rival.effects[-1].effect.reduces_to != fit.effects[i].name and _ahead(search, fit, rival, i) > 0
 
 
 def _better_by_both(fit: Fit, rival: Fit) -> float:
@@ -199,12 +199,12 @@ def _near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candida
     taken = {e.key for e in effects}
     reach = max(NEAR, (CLOSE if trial.joint is None else NEAR_HELD) * trial.gain["choose"])
     there = [t for t in r.rivals(trial) if t.candidate.key not in taken]
-    alike = {(c.effect.twin, c.where)} if trial.joint is None else set()
+    alike = {(name, c.where) for name in c.effect.equivalent_to if trial.joint is None}
     if _at_its_end(c, x):
-        alike.add((c.effect.limit, c.where))
+        alike.add((c.effect.reduces_to, c.where))
     tips = _walked(search, c, trial) and c.effect.layer == "inertia"
     always = [t for t in there if t.candidate.key in alike
-              or (tips and not t.foretold and t.candidate.name == "com_shift" and t.candidate.where != c.where)]
+              or (tips and not t.foretold and t.candidate.effect.moves_center and t.candidate.where != c.where)]
     return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
 
 

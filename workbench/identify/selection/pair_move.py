@@ -21,7 +21,6 @@ from workbench.identify.rollouts import COARSE, Question
 from workbench.identify.selection.acceptance import too_little_left, worthwhile
 from workbench.identify.selection.best_subsets import fitted_beside, priced, seated
 from workbench.identify.selection.record import COMPLETE, Round, judged_by_all
-from workbench.identify.selection.scheduling import ONE_PULL
 from workbench.identify.selection.screening import Trial
 from workbench.identify.selection.swap import NOTHING, in_place
 
@@ -37,7 +36,7 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
     that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
     told = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
-    if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.name == "payload":
+    if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.effect.point_mass:
         return current, list(rounds)
     if too_little_left(search, current, search.fitted, rounds):
         return current, list(rounds)
@@ -65,7 +64,7 @@ def _beside_tried(taken: Round, seat: Round) -> Round:
 
 def _keeps_company(c: Candidate) -> bool:
     """What the ground does, and where masses are; not how heavy what is carried is, which walks tell last."""
-    return c.size > 0 and c.effect.layer in ("ground", "inertia") and c.name != "payload"
+    return c.size > 0 and c.effect.layer in ("ground", "inertia") and not c.effect.point_mass
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,7 @@ class _Around:
     @classmethod
     def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
         c = one.candidate
-        company = [o for o in others if o.key != c.key and not (o.name in ONE_PULL and c.name in ONE_PULL)]
+        company = [o for o in others if o.key != c.key and not (o.effect.steady_pull and c.effect.steady_pull)]
         moves = [(e, x, steps_of(x, *e.bounds(), WALKING, e.magnitudes(x))) for e, x in fit.sizes()
                  if e.size and not search.is_settled(e)]
         return cls(one, fit, moves, [(o, _probes(o)) for o in company])

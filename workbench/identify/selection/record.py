@@ -9,10 +9,6 @@ from workbench.identify.estimators.dropped_commands import Missed
 from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.selection.screening import Trial
 
-LEAST_GAIN = 150.0
-"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
-is half its noise: engines, and a robot and its model, differ by as much."""
-
 COMPLETE = 0.97
 """Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
 
@@ -35,8 +31,10 @@ class Round:
 
 @dataclass(frozen=True)
 class Chosen:
-    """The effects that stay, fitted together, and how they were found; missed: poses that servos never got."""
+    """The effects that stay, fitted together, and how they were found; search: as it was at the end, with what is settled and
+    the takes as they were played; missed: poses that servos never got."""
 
+    search: Search
     fit: Fit
     rounds: tuple[Round, ...]
     missed: tuple[Missed, ...] = ()

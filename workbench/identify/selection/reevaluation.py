@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
 from workbench.identify.selection.best_subsets import MOST_STEPS, fitted_beside
-from workbench.identify.selection.record import COMPLETE, LEAST_GAIN, Round, judged_by_all
+from workbench.identify.selection.record import COMPLETE, Round, judged_by_all
 from workbench.identify.selection.screening import Trial
 
 NEAR, MOST = 0.5, 2

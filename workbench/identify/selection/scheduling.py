@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import SEEN_ELSEWHERE, Fit, Search
+from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import heavy_links
@@ -16,8 +16,6 @@ TIERS, TIERS_OF_ALL = 8, 6
 """On the ground the first are what moves the robot as a whole, and joints that stand out."""
 LONE = 2
 """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
-ONE_PULL = ("ground_tilt", "tether_force")
-"""What pulls the robot the same way: beside the one the other only makes up for how roughly that was fitted."""
 STANDS_OUT = 4.0
 """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
 lacks something, not the robot as a whole."""
@@ -50,7 +48,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             return False
         if c.effect.layer == "inertia":
             return c.where[0] not in heavy and carried(c) in well
-        if c.effect.under_load or c.name in SEEN_ELSEWHERE or c.effect.layer == "ground":
+        if c.effect.under_load or c.effect.hidden_by_zeroing or c.effect.layer == "ground":
             return False
         if not c.where:
             return bool(well) and not ill
@@ -64,9 +62,9 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     lone = search.lone and not grounded
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
-        if c.name == "com_shift" and ("payload", c.where) in used:
-            continue  # a point mass has that freedom
-        if c.name in ONE_PULL and used & {(name, ()) for name in ONE_PULL}:
+        if any(c.where == e.where and c.name in e.effect.includes for e in current.effects):
+            continue
+        if c.effect.steady_pull and any(e.effect.steady_pull for e in current.effects):
             continue
         likely = _tier(c, bool(grounded), many, heavy, outstanding, carried(c) in well)
         if c.key in used or (min(likely, LONE) if lone else likely) != tier:
@@ -74,7 +72,7 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
         elif c.joint is not None:
-            if c.name in SEEN_ELSEWHERE:
+            if c.effect.hidden_by_zeroing:
                 if moves_all or (c.joint in joints and (grounded or not zeroed)):
                     groups[c.key] = [c]
             elif c.joint in joints and not (grounded and settled(c)):
@@ -118,9 +116,9 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
         if not c.where:
             return 1 if many else 2
         return 2 if c.joint is not None else 3
-    if c.name in SEEN_ELSEWHERE or c.name == "link_length":
+    if c.effect.moves_feet:
         return 3  # feet stand elsewhere: much like a centre of mass that does
-    if c.name == "payload" and c.where[0] not in heavy:
+    if c.effect.point_mass and c.where[0] not in heavy:
         return 7
     if c.where and c.where[0] in outstanding:
         return 1
@@ -134,7 +132,7 @@ def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outsta
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
     """Whether an effect could make these joints err with the base held, and no others: one of the whole robot errs in several,
     one of a link in the joints that carry it, the floor in none."""
-    if c.effect.layer == "ground" and c.name != "ground_tilt":
+    if not c.effect.observable_when_fixed:
         return False
     k = search.nominal.kinematics
     if not c.where:

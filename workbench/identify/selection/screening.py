@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.fitting.levenberg_marquardt import HELD, WALKING, Asks, Solved, fit_blocks, through
-from workbench.identify.fitting.responses import guess, scan, sizes_of
+from workbench.identify.fitting.responses import Part, Signatures, guess, scan, sizes_of
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import COARSE, Jury, Question, take_of
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-T = TypeVar("T")
 FAR, FAR_WALKING = 5.0, 1.6
 """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
 LOOKED, LOOKED_SHARE, LOOKED_SHARE_HELD = 2.5, 0.3, 0.5
@@ -41,8 +40,6 @@ MOST_FITTED = 3
 """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
 STEPS, STEPS_WALKING = 3, 2
 """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
-Part = Generator[list[Question], list[dict[int, Array]], T]
-"""What a part of a race asks, is answered, and returns."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +59,6 @@ class Trial:
 
 
 Asking = Part[list[Trial]]
-Seen = tuple[list[Array], list[list[Array]], float]
-"""Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
-Signatures = dict[tuple[object, ...], Seen]
-"""By group and takes."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +76,20 @@ class Race:
     least: float = 0.0
     unheld: bool = False
     early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
+
+
+def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
+          report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[Trial]:
+    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
+    at several joints, each judged by its own joint's channels. takes: on which, by group.
+    ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
+    signatures must foretell of one that is fitted."""
+    race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not search.held), []
+    for n, group in enumerate(groups):
+        base = {i: current.residuals[i] for i in takes[n]}
+        asking.append(Trying(search.jury, search.nominal, current.sizes(), base, group, race, search.apart(group[0], takes[n]),
+                             search.signatures).run())
+    return [trial for trials in search.side_by_side(asking, report) for trial in trials]
 
 
 class Trying:

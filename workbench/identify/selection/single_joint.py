@@ -23,7 +23,7 @@ from workbench.identify.selection.best_subsets import (
 from workbench.identify.selection.record import Round
 from workbench.identify.selection.reevaluation import MOST, NEAR
 from workbench.identify.selection.scheduling import LONE, asked
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import Trial, tried
 from workbench.identify.selection.swap import NOTHING, exchanges
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
         more, takes_of = asked(search, pool, current, beyond, takes, tier)
         on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
         groups += more
-    return search.tried(current, groups, on, say, least=np.inf)
+    return tried(search, current, groups, on, say, least=np.inf)
 
 
 def together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]

@@ -13,15 +13,12 @@ from pyarrow import csv as arrow_csv
 
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.numbers import map_file, rate_of
+from workbench.recording.joint_names import SO101_JOINTS as JOINTS
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
 from workbench.robot.files import read_text
 
 Array = NDArray[np.float64]
-JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
-"""Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""
-URDF_JOINTS = dict(zip(JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")))
-"""The same joints by their names in the arm's published URDF."""
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
 _MORE = {"v_meas": "velocity", "tau_abs": "torque_magnitude"}
 

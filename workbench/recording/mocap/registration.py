@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.recording.joint_names import named_by_model
 from workbench.recording.log_state import first_command, resolution
 from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.angles import Angles, joint_angles
@@ -19,7 +20,6 @@ from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets,
 from workbench.recording.mocap.yaw import YawEstimate, yaw_of
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
-from workbench.recording.take_from import named_by_model
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]

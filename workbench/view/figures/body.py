@@ -15,7 +15,7 @@ from workbench.compare.metrics import heading, travelled, turned
 from workbench.recording.take import Take
 from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import OTHERS, RECORDED, SIMULATED, legend_above, new_figure, styled
-from workbench.view.scene.playback import names_of, since_start
+from workbench.view.playback import names_of, since_start
 
 Array = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def footfalls(
     span: [s since the first command]. unseen: intervals in which the recording did not see a foot; hatched, and left out
     of its duty factor.
     """
-    feet = [foot for foot in FOOT_ORDER if foot in simulated] + [foot for foot in simulated if foot not in FOOT_ORDER]
+    feet = list(simulated)
     figure = new_figure(10, 0.55 * len(feet) + 1.5)
     axes = figure.subplots()
     _footfall_rows(axes, feet, simulated, {}, span, SIMULATED, "simulated", 0.2)
@@ -130,10 +130,6 @@ def _footfall_rows(
         if seen > 0:
             duty = float(np.diff(stands).sum()) / seen
             axes.text(1.01, row + offset, f"{duty:.2f}", transform=place, va="center", color=colour, fontsize=11)
-
-
-FOOT_ORDER = ("flb", "frb", "blb", "brb")
-"""From the front, left before right."""
 
 
 def _runs(simulated: Take, recorded: Take | None, others: Mapping[str, Take] | None) -> list[tuple[str, Take, str, float]]:

@@ -10,13 +10,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from workbench.identify.take_report import TakeStory
+from workbench.identify.take_report import TakeReport
 from workbench.robot import RobotModel
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.heat import BIN, DARKEST, HEAT, SCALE, cells
 from workbench.view.figures.stance import intervals
 from workbench.view.figures.style import ACCENT, COMMAND, NOISE, RECORDED, SIMULATED, STANCE, legend_above, new_figure, styled
-from workbench.view.scene.shapes import robot_shapes
+from workbench.view.shapes import robot_shapes
 
 Array = NDArray[np.float64]
 SHOWN = 3.0
@@ -25,25 +25,25 @@ _DEGREES = 180 / np.pi
 
 
 @styled
-def gap_map(story: TakeStory) -> Figure:
+def gap_map(take: TakeReport) -> Figure:
     """Places over time: residual over what noise and numerics alone make, RMS in cells of BIN, before and (if it differs) after.
 
     Pale up to LIMIT, dark at 30 times. Grey: not seen. The line on top marks what no choice and no parameter saw."""
-    time, edges = story.time, np.arange(0.0, max(story.time[-1], BIN) + BIN, BIN)
-    rows = len(story.channels)
+    time, edges = take.time, np.arange(0.0, max(take.time[-1], BIN) + BIN, BIN)
+    rows = len(take.channels)
     figure = new_figure(12, 0.21 * rows + 1.5)
-    same = np.array_equal(story.before, story.after, equal_nan=True)
+    same = np.array_equal(take.before, take.after, equal_nan=True)
     panels = figure.subplots(1, 1 if same else 2, sharey=True, squeeze=False)[0]
     mesh = None
-    for axes, residual, title in zip(panels, (story.before, story.after), ("nominal model", "fitted model")):
+    for axes, residual, title in zip(panels, (take.before, take.after), ("nominal model", "fitted model")):
         mesh = axes.pcolormesh(edges, np.arange(rows + 1), cells(time, residual, edges), cmap=HEAT, norm=SCALE, rasterized=True)
-        for low, high in intervals(time, story.unseen & (time >= 0)):
+        for low, high in intervals(time, take.unseen & (time >= 0)):
             axes.plot([low, high], [-0.35, -0.35], color=ACCENT, linewidth=4, solid_capstyle="butt", clip_on=False)
         axes.set_ylim(rows, -0.6)
-        axes.set_yticks(np.arange(rows) + 0.5, story.channels, fontsize=9)
+        axes.set_yticks(np.arange(rows) + 0.5, take.channels, fontsize=9)
         axes.grid(False)
         axes.set_xlabel("time since the first command [s]")
-        axes.set_title(f"{story.name}, {title}")
+        axes.set_title(f"{take.name}, {title}")
     assert mesh is not None
     bar = figure.colorbar(mesh, ax=panels, pad=0.01, fraction=0.03)
     bar.set_ticks([LIMIT, 3, 10, DARKEST], labels=[f"≤ {LIMIT:g}×", "3×", "10×", f"≥ {DARKEST:g}×"])
@@ -98,28 +98,28 @@ def _oblique(p: Array) -> tuple[float, float]:
 
 
 @styled
-def before_after(story: TakeStory, joint: str) -> Figure:
+def before_after(take: TakeReport, joint: str) -> Figure:
     """A joint as recorded, as the nominal and as the fitted model have it, and what each leaves, around the stretch that no
     choice saw on which the nominal model misses most."""
-    low, high = _worst_stretch(story, joint)
-    t = story.time
+    low, high = _worst_stretch(take, joint)
+    t = take.time
     use = (t >= low) & (t <= high)
     figure = new_figure(10, 4.8)
     top, strip = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1.6])
-    recorded = _DEGREES * story.recorded.q[use, story.recorded.column(joint)]
+    recorded = _DEGREES * take.recorded.q[use, take.recorded.column(joint)]
     top.plot(t[use], recorded, color=RECORDED, linewidth=2.6, label="recorded")
-    sigma = _DEGREES * story.sigma(joint)
-    column = story.channels.index(joint)
+    sigma = _DEGREES * take.sigma(joint)
+    column = take.channels.index(joint)
     # as they were judged, each from its own first command where the recording leaves that open
-    for what, residual, colour, style in (("nominal", story.before, COMMAND, "--"), ("fitted", story.after, SIMULATED, "-")):
+    for what, residual, colour, style in (("nominal", take.before, COMMAND, "--"), ("fitted", take.after, SIMULATED, "-")):
         left = sigma * residual[use, column]
         top.plot(t[use], recorded - left, color=colour, linestyle=style, linewidth=1.6, label=what)
         strip.plot(t[use], left, color=colour, linestyle=style, linewidth=1.5)
     if np.isfinite(sigma):
         strip.axhspan(-2 * sigma, 2 * sigma, color=NOISE, zorder=0)
     for axes in (top, strip):
-        _shade(axes, story, low, high)
-    top.set_title(f"{story.name}: joint {joint}")
+        _shade(axes, take, low, high)
+    top.set_title(f"{take.name}: joint {joint}")
     top.set_ylabel("angle [deg]")
     strip.set_ylabel("left over [deg]")
     strip.set_xlabel("time since the first command [s]; grey: no choice and no parameter saw it; green: noise and numerics, 2σ")
@@ -128,17 +128,17 @@ def before_after(story: TakeStory, joint: str) -> Figure:
     return figure
 
 
-def _shade(axes: Axes, story: TakeStory, low: float, high: float) -> None:
-    for a, b in intervals(story.time, story.unseen):
+def _shade(axes: Axes, take: TakeReport, low: float, high: float) -> None:
+    for a, b in intervals(take.time, take.unseen):
         if b > low and a < high:
             axes.axvspan(max(a, low), min(b, high), color=STANCE, zorder=-1)
 
 
-def _worst_stretch(story: TakeStory, joint: str) -> tuple[float, float]:
-    t = story.time
-    error = np.square(np.nan_to_num(story.before[:, story.channels.index(joint)]))
-    if story.unseen.any():
-        error = np.where(story.unseen, error, 0.0)
+def _worst_stretch(take: TakeReport, joint: str) -> tuple[float, float]:
+    t = take.time
+    error = np.square(np.nan_to_num(take.before[:, take.channels.index(joint)]))
+    if take.unseen.any():
+        error = np.where(take.unseen, error, 0.0)
     width = min(SHOWN, t[-1])
     sums = np.cumsum(error)
     ends = np.minimum(np.searchsorted(t, t + width), len(t) - 1)
@@ -147,14 +147,14 @@ def _worst_stretch(story: TakeStory, joint: str) -> tuple[float, float]:
 
 
 @styled
-def unseen_errors(stories: Sequence[TakeStory]) -> Figure:
+def unseen_errors(takes: Sequence[TakeReport]) -> Figure:
     """Each channel's error on frames that nothing saw, over what noise and numerics alone make, before and after, by take."""
-    ratios = [(s.ratios(s.before), s.ratios(s.after)) for s in stories]
-    worst = {c: max(float(np.nan_to_num(before.get(c, 0.0))) for before, _ in ratios) for s in stories for c in s.channels}
+    ratios = [(s.ratios(s.before), s.ratios(s.after)) for s in takes]
+    worst = {c: max(float(np.nan_to_num(before.get(c, 0.0))) for before, _ in ratios) for s in takes for c in s.channels}
     order = sorted(worst, key=lambda c: -worst[c])
     figure = new_figure(12, 0.24 * len(order) + 1.7)
-    panels = figure.subplots(1, len(stories), sharey=True, squeeze=False)[0]
-    for axes, story, (before, after) in zip(panels, stories, ratios):
+    panels = figure.subplots(1, len(takes), sharey=True, squeeze=False)[0]
+    for axes, take, (before, after) in zip(panels, takes, ratios):
         axes.axvspan(0, LIMIT, color=NOISE, zorder=0, label=f"explained: up to {LIMIT:g} times")
         rows = [i for i, c in enumerate(order) if np.isfinite(before.get(c, np.nan))]
         b, a = ([values[order[i]] for i in rows] for values in (before, after))
@@ -163,7 +163,7 @@ def unseen_errors(stories: Sequence[TakeStory]) -> Figure:
         axes.scatter(a, rows, s=42, color=SIMULATED, zorder=4, label="after")
         axes.set_xlim(left=0)
         axes.grid(False, axis="y")
-        axes.set_title(story.name)
+        axes.set_title(take.name)
         axes.set_xlabel("error over noise and numerics")
     panels[0].set_yticks(range(len(order)), order, fontsize=10)
     panels[0].set_ylim(len(order) - 0.4, -0.6)

@@ -13,7 +13,7 @@ from workbench.compare.comparison import aligned
 from workbench.compare.metrics import rms
 from workbench.dynamics.derivatives import differentiate
 from workbench.recording.take import Take
-from workbench.view.figures.stance import Stance, leg_foot
+from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import (
     COMMAND,
     ERROR,
@@ -26,7 +26,7 @@ from workbench.view.figures.style import (
     panels,
     styled,
 )
-from workbench.view.scene.playback import names_of, since_start
+from workbench.view.playback import names_of, since_start
 
 Array = NDArray[np.float64]
 
@@ -42,8 +42,8 @@ def joint_overlay(
     """Command, measured and simulated angle of one joint, the error under them.
 
     noise, floor: standard deviation of the measurement and numerical floor of the simulation [rad], drawn as a band about
-    zero error. stance: of the recorded robot, or of the simulated one alone; shades the time in which the joint's foot
-    stands. span: seconds since the first command to show; else what the takes share.
+    zero error. stance: by joint (`by_joint`), of the recorded robot, or of the simulated one alone; shades the time in which
+    the joint's foot stands. span: seconds since the first command to show; else what the takes share.
     """
     simulated = _zeroed_like(simulated, recorded)
     figure = new_figure(10, 5.2 if recorded is not None else 4.0)
@@ -57,10 +57,10 @@ def joint_overlay(
     if strip is not None and recorded is not None:
         _draw_error(strip, joint, simulated, recorded, noise, floor)
     low, high = span or _shared_span(simulated, recorded)
-    foot = leg_foot(joint, stance or {})
+    stands = (stance or {}).get(joint)
     for axes in filter(None, (top, strip)):
-        if foot is not None:
-            _shade(axes, (stance or {})[foot], f"{foot} on the ground" if axes is top else None)
+        if stands is not None:
+            _shade(axes, stands, "foot on the ground" if axes is top else None)
         axes.set_xlim(low, high)
     _widen(top)
     legend_above(top)
@@ -82,9 +82,8 @@ def joint_grid(
     for axes, joint in zip(grid, joints):
         _draw_joint(axes, joint, simulated, recorded, width=1.2)
         axes.set_title(joint, fontsize=12)
-        foot = leg_foot(joint, stance or {})
-        if foot is not None:
-            _shade(axes, (stance or {})[foot], None)
+        if stance and joint in stance:
+            _shade(axes, stance[joint], None)
         if recorded is not None and onto is not None and joint in recorded.joints:
             use = since_start(recorded) >= 0
             error = float(rms(np.degrees(recorded.q[use, recorded.column(joint)] - onto.q[use, onto.column(joint)])))

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from workbench.compare.footfalls import FootPhases
 from workbench.recording.take import Take
-from workbench.view.scene.playback import since_start
+from workbench.robot import RobotModel, legs
+from workbench.view.playback import since_start
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,6 @@ def intervals(time: Array, on: NDArray[np.bool_]) -> Array:
     return np.column_stack([time[begin], time[end.clip(max=len(time) - 1)]])
 
 
-def leg_foot(joint: str, feet: Mapping[str, Array]) -> str | None:
-    """The foot at the end of the leg that `joint` moves: the one whose name begins with the same two letters."""
-    return next((foot for foot in feet if foot[:2] == joint[:2]), None)
+def by_joint(stance: Stance, model: RobotModel) -> dict[str, Array]:
+    """Joint -> when the foot of its leg stands, of the joints that move one foot alone."""
+    return {joint: stance[foot] for foot, joints in legs(model).items() if foot in stance for joint in joints}

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from workbench.recording.take import Take
 from workbench.robot.model import RobotModel
 from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
-from workbench.view.scene.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
-from workbench.view.scene.shapes import robot_shapes
+from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
+from workbench.view.shapes import robot_shapes
 
 Array = NDArray[np.float64]
 

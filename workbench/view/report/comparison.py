@@ -13,6 +13,7 @@ from workbench.robot import RobotModel
 from workbench.view.figures import (
     body_attitude,
     body_path,
+    by_joint,
     film_strip,
     footfalls,
     joint_errors,
@@ -22,8 +23,8 @@ from workbench.view.figures import (
     unseen_of,
 )
 from workbench.view.figures.errors import LIMIT
+from workbench.view.playback import common_span
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.scene.playback import common_span
 from workbench.view.scene.replay import write_replay
 
 SHOWN = 3
@@ -99,11 +100,12 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         if k and not c.over_noise > LIMIT:
             break
         figure = joint_overlay(joint, take.simulated, take.recorded, noise=_known(c.noise), floor=_known(c.floor),
-                               stance=recorded)
+                               stance=by_joint(recorded, model))
         parts.append(Picture(figure, _about(joint, c)))
     noise = {j: c.noise for j, c in take.joints.items()}
     parts.append(Details("All joints", [
-        Picture(joint_grid(take.simulated, take.recorded, noise=noise, joints=sorted(take.joints), stance=recorded)),
+        Picture(joint_grid(take.simulated, take.recorded, noise=noise, joints=sorted(take.joints),
+                           stance=by_joint(recorded, model))),
         _joint_table(take)]))
     span = common_span([take.simulated, take.recorded])
     if take.body is not None and take.recorded.base != "fixed":

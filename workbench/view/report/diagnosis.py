@@ -11,7 +11,7 @@ import numpy as np
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
 from workbench.identify.shooting import WINDOW
-from workbench.identify.take_report import TakeStory
+from workbench.identify.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
@@ -46,57 +46,57 @@ PATH = 0.03
 Progress = Callable[[str, float | None], None]
 
 
-def write_diagnosis(diagnosis: Diagnosis, stories: Sequence[TakeStory], folder: Path, title: str,
+def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: Path, title: str,
                     progress: Progress = lambda what, done: None) -> list[Path]:
     """Writes findings.json, model.yaml, nominal.yaml, replay-TAKE.html for each take, and report.html, which holds all of it;
-    returns their paths. stories: the takes behind the diagnosis; progress: called with what is being made and the share done."""
+    returns their paths. takes: the takes behind the diagnosis; progress: called with what is being made and the share done."""
     paths = diagnosis.save(folder)
-    report = diagnosis_report(diagnosis, stories, title)
+    report = diagnosis_report(diagnosis, takes, title)
     replays: list[Part] = []
-    for i, story in enumerate(stories):
-        progress(f"drawing {story.name}", i / len(stories))
-        paths.append(folder / f"replay-{story.name}.html")
-        errors = _errors(story)
-        write_replay(paths[-1], diagnosis.model, story.fitted, story.recorded, story.name, errors)
-        poster = film_strip(diagnosis.model, story.fitted, story.recorded)
-        replays.append(Replay(paths[-1], _replay_caption(story, errors), poster))
+    for i, take in enumerate(takes):
+        progress(f"drawing {take.name}", i / len(takes))
+        paths.append(folder / f"replay-{take.name}.html")
+        errors = _errors(take)
+        write_replay(paths[-1], diagnosis.model, take.fitted, take.recorded, take.name, errors)
+        poster = film_strip(diagnosis.model, take.fitted, take.recorded)
+        replays.append(Replay(paths[-1], _replay_caption(take, errors), poster))
     if replays:
         report.add(Section("See it move", replays))
     return [report.write(folder / "report.html"), *paths]
 
 
-def _errors(story: TakeStory) -> list[Errors]:
+def _errors(take: TakeReport) -> list[Errors]:
     """What the replay shows on the robot: the map of the nominal model, and on demand that of the fitted one."""
-    out = [Errors("error against the nominal model", story.time, story.channels, story.before)]
-    if not np.array_equal(story.before, story.after, equal_nan=True):
-        out.append(Errors("error against the fitted model", story.time, story.channels, story.after, shown=False))
+    out = [Errors("error against the nominal model", take.time, take.channels, take.before)]
+    if not np.array_equal(take.before, take.after, equal_nan=True):
+        out.append(Errors("error against the fitted model", take.time, take.channels, take.after, shown=False))
     return out
 
 
-def _replay_caption(story: TakeStory, errors: Sequence[Errors]) -> str:
-    said = (f"{story.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
+def _replay_caption(take: TakeReport, errors: Sequence[Errors]) -> str:
+    said = (f"{take.name} in 3D: the fitted model solid, the recorded robot as a ghost. The spheres at its joints are the map "
             f"above, as it runs: small and pale where a joint is within {LIMIT:g} times noise and numerics of the nominal model, "
             f"large and dark at {DARKEST:g} times, grey where it was not seen.")
-    if any(c in BODY for c in story.channels):
+    if any(c in BODY for c in take.channels):
         said += " The sphere at the body is its tilt and height, the disc under it its path and heading."
     return said + (" Tick the fitted model's to see what is left." if len(errors) > 1 else "")
 
 
-def diagnosis_report(diagnosis: Diagnosis, stories: Sequence[TakeStory], title: str) -> Report:
+def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: str) -> Report:
     """The page without its replays."""
     known = dict(diagnosis.provenance)
     seed, seconds = known.pop("seed", None), known.pop("seconds", None)
     more = [(k, ", ".join(f"{a} {b}" for a, b in v.items()) if isinstance(v, dict) else str(v))
             for k, v in known.items() if k not in ("workbench", "drake", "model_sha256")]
-    report = Report(title, headline(diagnosis), _summary(diagnosis, stories), _key_numbers(diagnosis, stories),
+    report = Report(title, headline(diagnosis), _summary(diagnosis, takes), _key_numbers(diagnosis, takes),
                     Provenance(diagnosis.nominal.sha256, seed, seconds, more))
-    report.add(_where(diagnosis, stories))
+    report.add(_where(diagnosis, takes))
     drawn: set[tuple[int, str]] = set()
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
-        report.add(_finding(finding, diagnosis.rejected, stories, drawn, elsewhere))
-    if stories:
-        report.add(_unseen(stories))
+        report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
+    if takes:
+        report.add(_unseen(takes))
     report.add(_left(diagnosis))
     others = [r for r in diagnosis.rejected if not any(_rivals(r, f) for f in diagnosis.findings)]
     if others:
@@ -106,13 +106,13 @@ def diagnosis_report(diagnosis: Diagnosis, stories: Sequence[TakeStory], title: 
     return report
 
 
-def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
+def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what = [sentence_of(f) for f in diagnosis.findings]
-    seconds = sum(s.time[-1] for s in stories)
-    if stories:
-        what.append(f"Judged on stretches of {listed([s.name for s in stories])} ({seconds:.0f} s in all) that no choice and "
+    seconds = sum(s.time[-1] for s in takes)
+    if takes:
+        what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
-    if any(s.recorded.base == "free" for s in stories):
+    if any(s.recorded.base == "free" for s in takes):
         what.append(f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {WINDOW:g} s; "
                     "paths and 3D show it left to itself.")
     if seen := diagnosis.provenance.get("searched"):
@@ -123,7 +123,7 @@ def _summary(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> str:
     return " ".join(what)
 
 
-def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tuple[str, str, str]]:
+def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tuple[str, str, str]]:
     numbers = []
     for f in diagnosis.findings:
         rival = rival_of(f)
@@ -132,7 +132,7 @@ def _key_numbers(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> list[tup
             f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
         told = max(f.parameters.values(), key=_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
-    for s in stories:
+    for s in takes:
         before, after = s.ratios(s.before), s.ratios(s.after)
         worst = max(before, key=lambda c: _finite(before[c]))
         numbers.append((f"{s.name}: worst, {worst}", f"{before[worst]:.1f}× → {after[worst]:.1f}×", "on unseen stretches"))
@@ -148,11 +148,11 @@ def _size(e: Estimate) -> str:
     return quantity(math.hypot(*e.value) if isinstance(e.value, tuple) else e.value, e.unit)
 
 
-def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
+def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
     parts: list[Part] = []
-    if stories:
-        worst = {c: max((_finite(s.ratios(s.before).get(c, math.nan)) for s in stories), default=0.0)
-                 for s in stories for c in s.channels}
+    if takes:
+        worst = {c: max((_finite(s.ratios(s.before).get(c, math.nan)) for s in takes), default=0.0)
+                 for s in takes for c in s.channels}
         ledger = sorted(diagnosis.gap, key=lambda g: -g.error / g.floor if g.floor > 0 else -math.inf)
         over = list(dict.fromkeys(place for g in ledger for place in g.where))
         over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
@@ -171,23 +171,23 @@ def _where(diagnosis: Diagnosis, stories: Sequence[TakeStory]) -> Section:
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
-    maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(stories, key=_worst, reverse=True)]
+    maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
         parts.append(Details("The same map of the other takes", maps[1:]))
     return Section("Where the recordings leave the model", parts)
 
 
-def _map_caption(story: TakeStory) -> str:
-    said = (f"{story.name}: each row a joint or a motion of the body, darker where it is further from the model. "
+def _map_caption(take: TakeReport) -> str:
+    said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
-    if story.recorded.base == "free":
+    if take.recorded.base == "free":
         said += f", or the model's body had just been put back beside the recorded one, as every {WINDOW:g} s"
     return said + "."
 
 
-def _worst(story: TakeStory) -> float:
-    return max(map(_finite, story.ratios(story.before).values()))
+def _worst(take: TakeReport) -> float:
+    return max(map(_finite, take.ratios(take.before).values()))
 
 
 def _gap_row(g: GapEntry) -> list[str]:
@@ -195,7 +195,7 @@ def _gap_row(g: GapEntry) -> list[str]:
     return [g.layer, _place(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
 
 
-def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[TakeStory], drawn: set[tuple[int, str]],
+def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[TakeReport], drawn: set[tuple[int, str]],
              others: Collection[str]) -> Section:
     """drawn: takes and joints that the page has a figure of; this section's is added. others: places of other findings."""
     said = sentence_of(finding)
@@ -212,11 +212,11 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     rows = [["how sure", sure], *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
-    shown = _best_view(finding, stories, drawn, others)
+    shown = _best_view(finding, takes, drawn, others)
     if shown is not None:
         i, joint = shown
         drawn.add(shown)
-        parts.append(Picture(before_after(stories[i], joint), f"{joint} in {stories[i].name}: what the robot did, and what each "
+        parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: what the robot did, and what each "
                                                               "model says it does."))
     rivals = [r for r in rejected if _rivals(r, finding)]
     if rivals:
@@ -225,11 +225,11 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], stories: Sequence[T
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
-def _best_view(finding: Finding, stories: Sequence[TakeStory], drawn: set[tuple[int, str]], others: Collection[str]
+def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]
                ) -> tuple[int, str] | None:
     """The take and joint on which the finding shows most: its own joint, else the one that improved most of those that are no
     place of another finding; one that is not yet drawn, if there is any."""
-    found = [(_gain(s, c), i, c) for i, s in enumerate(stories) for c in s.channels if c in s.recorded.joints]
+    found = [(_gain(s, c), i, c) for i, s in enumerate(takes) for c in s.channels if c in s.recorded.joints]
     own = [f for f in found if f[2] in finding.where] or [f for f in found if f[2] not in others]
     new = [f for f in own or found if f[1:] not in drawn]
     if not found:
@@ -238,25 +238,25 @@ def _best_view(finding: Finding, stories: Sequence[TakeStory], drawn: set[tuple[
     return i, joint
 
 
-def _gain(story: TakeStory, channel: str) -> float:
-    return _finite(story.ratios(story.before)[channel]) - _finite(story.ratios(story.after)[channel])
+def _gain(take: TakeReport, channel: str) -> float:
+    return _finite(take.ratios(take.before)[channel]) - _finite(take.ratios(take.after)[channel])
 
 
-def _unseen(stories: Sequence[TakeStory]) -> Section:
-    over = {s.name: [c for c, r in s.ratios(s.after).items() if r > LIMIT] for s in stories}
+def _unseen(takes: Sequence[TakeReport]) -> Section:
+    over = {s.name: [c for c, r in s.ratios(s.after).items() if r > LIMIT] for s in takes}
     said = "; ".join(f"in {name} {listed(places)}" for name, places in over.items() if places)
-    parts: list[Part] = [Picture(unseen_errors(stories), f"Afterwards still beyond {LIMIT:g} times noise and numerics: {said}."
+    parts: list[Part] = [Picture(unseen_errors(takes), f"Afterwards still beyond {LIMIT:g} times noise and numerics: {said}."
                                  if said else f"Afterwards all is within {LIMIT:g} times noise and numerics.")]
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
                       f"{s.name}: the body's path as measured, and simulated with what was found and without (nominal).")
-              for s in stories if _walks(s)]
+              for s in takes if _walks(s)]
     return Section("Before and after, on what nothing saw", parts)
 
 
-def _walks(story: TakeStory) -> bool:
+def _walks(take: TakeReport) -> bool:
     """Whether the body's path is worth a figure."""
-    p = story.recorded.p_WB
-    return story.recorded.base == "free" and p is not None and bool(np.nanmax(np.ptp(p[np.isfinite(p[:, 0]), :2], axis=0)) > PATH)
+    p = take.recorded.p_WB
+    return take.recorded.base == "free" and p is not None and bool(np.nanmax(np.ptp(p[np.isfinite(p[:, 0]), :2], axis=0)) > PATH)
 
 
 def _left(diagnosis: Diagnosis) -> Section:

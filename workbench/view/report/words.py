@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.effects.base import Layer
-from workbench.effects.registry import effect_named
+from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
 from workbench.robot import EffectSpec
 
@@ -19,7 +19,6 @@ LAYERS: dict[Layer, str] = {
     "inertia": "where the mass is", "ground": "what the floor does", "measurement": "how it was measured"}
 _BODY = {"forward": "how far the body goes", "left": "how far the body drifts to the left", "heading": "the body's heading",
          "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
-_NAMES = {"com_shift": "centre of mass shift"}
 _EFFECT = re.compile(r"\b([a-z]+(?:_[a-z]+)+|backlash|payload)\(([^()]*)\)")
 _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
 _LEFT = re.compile(r"(?P<take>[^:]+): (?:across its axis \((?P<across>[^)]+)\), |(?P<body>\w+), )?goes with (?P<what>.+?)"
@@ -67,7 +66,8 @@ def title_of(effect: str, where: Sequence[str]) -> str:
 
 def name_of(effect: str) -> str:
     """`joint_compliance` -> "joint compliance"."""
-    return _NAMES.get(effect, effect.replace("_", " "))
+    known = known_effects().get(effect)
+    return (known.title if known else "") or effect.replace("_", " ")
 
 
 def reason_of(text: str) -> str:

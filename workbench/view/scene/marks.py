@@ -13,8 +13,8 @@ from pydrake.math import RigidTransform
 from workbench.compare.channels import BODY, joint_of
 from workbench.robot.model import RobotModel
 from workbench.view.figures.heat import BIN, cells, colours, shares
+from workbench.view.playback import Playback
 from workbench.view.scene.keyframes import kept_keys
-from workbench.view.scene.playback import Playback
 
 Array = NDArray[np.float64]
 PATH, TILT = "path", "tilt"

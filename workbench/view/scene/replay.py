@@ -18,12 +18,12 @@ from workbench.recording.take import Take
 from workbench.robot.files import write_whole
 from workbench.robot.model import GRAVITY, RobotModel
 from workbench.view.figures.style import ACCENT, RECORDED, SIMULATED, rgb
+from workbench.view.playback import Playback, common_span, names_of, play, since_start
 from workbench.view.scene.floor import GRID, add_grid, ribbon
 from workbench.view.scene.keyframes import kept_keys
 from workbench.view.scene.marks import Errors, Marker
 from workbench.view.scene.overlay import LIBRARY, Copy, Legend, with_overlay
-from workbench.view.scene.playback import Playback, common_span, names_of, play, since_start
-from workbench.view.scene.shapes import RobotShapes, VisualShape, robot_shapes
+from workbench.view.shapes import RobotShapes, VisualShape, robot_shapes
 
 Array = NDArray[np.float64]
 

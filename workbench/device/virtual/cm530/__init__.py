@@ -5,6 +5,6 @@ interrupts do not nest, as the program sets no priorities (setting one is refuse
 """
 
 from workbench.device.virtual.cm530.board import Board, Wire
-from workbench.device.virtual.cm530.processor import BoardFault
+from workbench.device.virtual.cm530.processor import BoardError
 
-__all__ = ["Board", "BoardFault", "Wire"]
+__all__ = ["Board", "BoardError", "Wire"]

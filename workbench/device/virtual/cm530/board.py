@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import random
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from workbench.device.virtual.bus import ServoBus
 from workbench.device.virtual.clock import SECOND, Clock
 from workbench.device.virtual.cm530.peripheral import Peripheral
-from workbench.device.virtual.cm530.processor import FLASH, RAM, RAM_BYTES, SYSTICK, BoardFault, Processor
+from workbench.device.virtual.cm530.processor import FLASH, RAM, RAM_BYTES, SYSTICK, BoardError, Processor
 from workbench.device.virtual.cm530.system import (
     PIN_RESET,
     POWER_RESET,
@@ -84,7 +85,7 @@ class Board:
         channels = self.dma.channels
         channels[2].usart = self.pc_usart
         channels[4].usart = channels[5].usart = self.servo_usart
-        self.pc_usart.tx_dma, self.servo_usart.tx_dma, self.servo_usart.rx_dma = channels[2], channels[4], channels[5]
+        self.pc_usart.tx_dma, self.servo_usart.tx_dma = channels[2], channels[4]
 
     # Power and time
 
@@ -129,7 +130,7 @@ class Board:
         base = address & ~0x3FF if address < 0xE0000000 else 0xE000E000
         peripheral = self.peripherals.get(base)
         if peripheral is None or address - base not in peripheral.known:
-            raise BoardFault(f"no such register: {address:#010x}")
+            raise BoardError(f"no such register: {address:#010x}")
         return peripheral
 
     def _clocked(self, peripheral: Peripheral, address: int) -> bool:
@@ -147,7 +148,7 @@ class Board:
     def _write(self, address: int, size: int, value: int) -> None:
         peripheral = self._peripheral(address)
         if size != 4:
-            raise BoardFault(f"{size} bytes written to {address:#010x}; this board takes words")
+            raise BoardError(f"{size} bytes written to {address:#010x}; this board takes words")
         base = address & ~0x3FF if address < 0xE0000000 else 0xE000E000
         if self._clocked(peripheral, address):
             peripheral.write(address - base, value)
@@ -203,15 +204,12 @@ class Board:
         if not self._on or not port.drives(LISTEN_PIN):
             return
         wrong = abs(rate - usart.rate) > 0.03 * usart.rate
-        late = 0
-        for time, value in zip(times, values):
-            byte = value ^ 0xA5 if wrong else value
-            channel = self.dma.channels[5]
-            if channel.control & 1 and time > channel.armed and self.dma.words.get(channel.base + 4, 0):
-                usart.receive(byte)
-            else:  # nobody asked: one after another, so that none overruns the next
-                self.clock.after(late * usart.byte, lambda v=byte: usart.receive(v))  # type: ignore[misc]
-                late += 1
+        data = bytes(value ^ 0xA5 for value in values) if wrong else values
+        channel = self.dma.channels[5]
+        early = bisect_right(times, channel.armed)
+        taken = early + channel.take(data[early:]) if usart.takes_dma else early
+        for late, value in enumerate(data[:early] + data[taken:]):  # nobody asked: spaced, so that none overruns the next
+            self.clock.after(late * usart.byte, lambda v=value: usart.receive(v))  # type: ignore[misc]
 
     def _to_wire(self, wire: Wire, data: bytes, rate: int, start: int) -> None:
         byte = 10 * SECOND // rate
@@ -219,7 +217,7 @@ class Board:
         wire.received += data
 
     def send(self, wire: Wire, data: bytes, at: int | None = None) -> int:
-        """The other end of a line sends at 57,600 bit/s, from `at` [ticks] or when it is free. Returns the end of the last byte."""
+        """The other end of a line sends at 57,600 bit/s, from `at` [ticks] or when it is free. Returns the last byte's end."""
         usart = self.pc_usart if wire is self.pc else self.zigbee_usart
         time = max(self.clock.now if at is None else at, wire.free_at)
         for value in data:

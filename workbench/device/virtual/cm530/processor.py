@@ -10,6 +10,7 @@ import unicorn
 from unicorn import arm_const as arm
 
 from workbench.device.virtual.clock import Clock
+from workbench.device.virtual.cm530.cycles import NEVER, Cycles, Registers
 
 FLASH, FLASH_BYTES, RAM, RAM_BYTES = 0x08000000, 0x80000, 0x20000000, 0x10000
 PERIPHERALS, PERIPHERALS_BYTES, SYSTEM, SYSTEM_BYTES = 0x40000000, 0x30000, 0xE000E000, 0x1000
@@ -20,7 +21,7 @@ _WFI = b"\x30\xbf"
 _STACKED = (arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3, arm.UC_ARM_REG_R12, arm.UC_ARM_REG_LR)
 
 
-class BoardFault(RuntimeError):
+class BoardError(RuntimeError):
     """The program did what the real chip would not survive, or what this board does not know."""
 
 
@@ -38,7 +39,7 @@ class Processor:
         self._pc = 0
         self._asleep = False
         self._exit: int | None = None
-        self._wish = False
+        self.cycles = Cycles()
         self._error: BaseException | None = None
         self.uc = uc = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | unicorn.UC_MODE_MCLASS)
         uc.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M3)
@@ -46,7 +47,8 @@ class Processor:
         uc.mem_map(RAM, RAM_BYTES)
         for base, size in ((PERIPHERALS, PERIPHERALS_BYTES), (SYSTEM, SYSTEM_BYTES)):
             uc.mmio_map(base, size, self._guarded_read(read), base, self._guarded_write(write), base)
-        uc.hook_add(unicorn.UC_HOOK_BLOCK, self._block)
+        self.cycles.attach(uc)
+        self._frame = Registers(uc, (*_STACKED, arm.UC_ARM_REG_SP, arm.UC_ARM_REG_XPSR))
         uc.hook_add(unicorn.UC_HOOK_INTR, self._interrupted)
 
     def reset(self, vectors: int) -> None:
@@ -61,8 +63,8 @@ class Processor:
         self._asleep = False
 
     def wish(self) -> None:
-        """Some exception may wait now: the code is stopped at its next block. (Stopped within an access, it would repeat that.)"""
-        self._wish = True
+        """Some exception may wait now: the code is stopped at its next block (stopped within an access, it would repeat that)."""
+        self.cycles.wish = 1
 
     def stop(self) -> None:
         """Stops the code that runs, as for a reset."""
@@ -85,14 +87,20 @@ class Processor:
                 event = clock.next_event
                 clock.advance(until if event is None else min(event, until))
                 continue
-            self._wish = number is not None  # masked: look again at every block
+            self.cycles.wish = number is not None and not self._active  # masked: look again at every block
             self._go()
 
     def _go(self) -> None:
-        uc = self.uc
+        uc, cycles = self.uc, self.cycles
         self._exit = None
+        cycles.now = self.clock.now
+        event = self.clock.next_event
+        cycles.limit = NEVER if event is None else event
         try:
-            uc.emu_start(self._pc, 0xFFFFFFFF)
+            try:
+                uc.emu_start(self._pc, 0xFFFFFFFF)
+            finally:
+                self.clock.now = cycles.now
         except unicorn.UcError as e:
             self._raise()
             at = uc.reg_read(arm.UC_ARM_REG_PC)
@@ -115,14 +123,11 @@ class Processor:
         if bytes(uc.mem_read(pc - 2, 2)) == _WFI and self._pending() is None:
             self._asleep = True
 
-    def _block(self, uc: unicorn.Uc, address: int, size: int, _: Any) -> None:
-        clock = self.clock
-        clock.now += (size >> 1) or 1
-        event = clock.next_event
-        if (event is not None and event <= clock.now) or (
-                self._wish and not self._active and not uc.reg_read(arm.UC_ARM_REG_PRIMASK)):
-            self._wish = False
-            uc.emu_stop()
+    def _look(self) -> None:
+        """After an access: it may have asked for an event that is sooner than any before."""
+        event = self.clock.next_event
+        if event is not None:
+            self.cycles.limit = event
 
     def _interrupted(self, uc: unicorn.Uc, number: int, _: Any) -> None:
         self._exit = number
@@ -130,11 +135,10 @@ class Processor:
 
     def _enter(self, number: int) -> None:
         uc = self.uc
-        sp = uc.reg_read(arm.UC_ARM_REG_SP) - 32
-        registers = [uc.reg_read(r) for r in _STACKED]
-        uc.mem_write(sp, struct.pack("<8I", *registers, self._pc & ~1, uc.reg_read(arm.UC_ARM_REG_XPSR) & 0xFF000000 | 1 << 24))
-        uc.reg_write(arm.UC_ARM_REG_SP, sp)
-        uc.reg_write(arm.UC_ARM_REG_LR, 0xFFFFFFF9)
+        *registers, sp, xpsr = self._frame.read()
+        uc.mem_write(sp - 32, struct.pack("<8I", *registers, self._pc & ~1, xpsr & 0xFF000000 | 1 << 24))
+        registers[-1] = 0xFFFFFFF9
+        self._frame.write([*registers, sp - 32, xpsr])
         self._pc = struct.unpack("<I", uc.mem_read(self.vectors + 4 * number, 4))[0] | 1
         self._active.append(number)
         self.clock.now += ENTRY_CYCLES
@@ -143,10 +147,7 @@ class Processor:
         uc = self.uc
         sp = uc.reg_read(arm.UC_ARM_REG_SP)
         *registers, pc, xpsr = struct.unpack("<8I", uc.mem_read(sp, 32))
-        for register, value in zip(_STACKED, registers):
-            uc.reg_write(register, value)
-        uc.reg_write(arm.UC_ARM_REG_SP, sp + 32)
-        uc.reg_write(arm.UC_ARM_REG_XPSR, xpsr)
+        self._frame.write([*registers, sp + 32, xpsr])
         self._pc = pc | 1
         self._active.pop()
         self.clock.now += ENTRY_CYCLES
@@ -163,7 +164,10 @@ class Processor:
     def _guarded_read(self, read: Callable[[int], int]) -> Callable[..., int]:
         def call(uc: unicorn.Uc, offset: int, size: int, base: int) -> int:
             try:
-                return read(base + offset)
+                self.clock.now = self.cycles.now
+                value = read(base + offset)
+                self._look()
+                return value
             except Exception as e:  # raised again where Python code runs, not in the engine's callback
                 self._error = e
                 uc.emu_stop()
@@ -174,7 +178,9 @@ class Processor:
     def _guarded_write(self, write: Callable[[int, int, int], None]) -> Callable[..., None]:
         def call(uc: unicorn.Uc, offset: int, size: int, value: int, base: int) -> None:
             try:
+                self.clock.now = self.cycles.now
                 write(base + offset, size, value)
+                self._look()
             except Exception as e:
                 self._error = e
                 uc.emu_stop()

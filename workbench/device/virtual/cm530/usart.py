@@ -26,7 +26,6 @@ class Usart(Peripheral):
         super().__init__(board, gate)
         self._fast, self._sends = fast, sends
         self.tx_dma: Channel | None = None
-        self.rx_dma: Channel | None = None
         self._hold: int | None = None
         self._shifting_until = -1
         self._received = 0
@@ -130,11 +129,14 @@ class Usart(Peripheral):
         """Whether bytes are under way."""
         return self._shifting_until > self.board.clock.now
 
+    @property
+    def takes_dma(self) -> bool:
+        """Whether what comes in goes to memory by itself."""
+        return bool(self.words.get(CR1, 0) & (UE | RE) == UE | RE and self.words.get(CR3, 0) & DMAR)
+
     def receive(self, value: int) -> None:
         """One byte has come in."""
         if self.words.get(CR1, 0) & (UE | RE) != UE | RE:
-            return
-        if self.words.get(CR3, 0) & DMAR and self.rx_dma is not None and self.rx_dma.take(value):
             return
         if self._status & RXNE:
             self.words[SR] |= ORE
@@ -162,9 +164,9 @@ class Dma(Peripheral):
     def write(self, offset: int, value: int) -> None:
         """IFCR clears flags; an enabled channel starts."""
         if offset == 4:
-            for channel in range(7):
-                if value >> 4 * channel & 1:
-                    self.words[0] = self.words.get(0, 0) & ~(15 << 4 * channel)
+            for k in range(7):
+                if value >> 4 * k & 1:
+                    self.words[0] = self.words.get(0, 0) & ~(15 << 4 * k)
             self.words[0] = self.words.get(0, 0) & ~value
             return
         if offset >= 8 and (offset - 8) % 20 == 0:
@@ -217,15 +219,16 @@ class Channel:
         data = bytes(self.dma.board.cpu.uc.mem_read(words[self.base + 12], count))
         usart.send_block(data, lambda: self.dma.finished(self.number))
 
-    def take(self, value: int) -> bool:
-        """USART to memory: one byte; False where the channel is off or has had all."""
+    def take(self, data: bytes) -> int:
+        """USART to memory; returns how many bytes the channel still wanted."""
         words = self.dma.words
         left = words.get(self.base + 4, 0)
-        if not self.control & 1 or self.control & 16 or not left:
-            return False
-        words[self.base + 4] = left - 1
-        self.dma.board.cpu.uc.mem_write(words[self.base + 12] + self._taken, bytes([value]))
-        self._taken += 1
-        if left == 1:
+        if not self.control & 1 or self.control & 16 or not left or not data:
+            return 0
+        count = min(left, len(data))
+        words[self.base + 4] = left - count
+        self.dma.board.cpu.uc.mem_write(words[self.base + 12] + self._taken, data[:count])
+        self._taken += count
+        if left == count:
             self.dma.finished(self.number)
-        return True
+        return count

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from workbench.compare.footfalls import foot_points
 from workbench.recording.take import Take
+from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
 
 Array = NDArray[np.float64]
@@ -129,8 +129,8 @@ def _standing(time: Array, other: Playback | None) -> tuple[Array, Array]:
 def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
     """Just clear of the floor."""
     heights = [played.in_world(link)[0][:, 2].min() for link in played.links]
-    for joint, (points, radii) in foot_points(model.path).items():
-        p, R = played.in_world(model.kinematics.frames[joint].child)
+    for foot, (points, radii) in foot_points(model).items():
+        p, R = played.in_world(model.foot_links[foot])
         heights.append((p[:, None, 2] + R[:, 2] @ points.T - radii).min())
     up = np.array([0.0, 0.0, STAND_CLEARANCE - min(heights)])
     return replace(played, base_p=played.base_p + up)

@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from workbench.compare.footfalls import foot_points
+from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
 from workbench.robot.resources import ConfigureParser
 
@@ -65,8 +65,7 @@ def robot_shapes(model: RobotModel) -> RobotShapes:
     plant.Finalize()
     inspector = scene_graph.model_inspector()
     kinematics = model.kinematics
-    feet = {joint: (kinematics.frames[joint].child, points.mean(axis=0))
-            for joint, (points, _) in foot_points(model.path).items()}
+    feet = {foot: (model.foot_links[foot], points.mean(axis=0)) for foot, (points, _) in foot_points(model).items()}
     visuals: dict[str, list[VisualShape]] = {}
     meshes: dict[str, list[MeshPart]] = {}
     for link in kinematics.links:

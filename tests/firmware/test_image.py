@@ -1,0 +1,251 @@
+"""The image that is flashed, on the virtual CM-530: poses to the microsecond, and what goes on beside them."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+
+from tests.firmware.image import IDS, Robot, image, needs_compiler
+from tests.firmware.native import walk
+from tests.firmware.test_core_play import changed
+from workbench.device.link import AnswerMessage, ControllerState, FrameType, LogMessage, StateMessage, frame, upload_frames
+from workbench.device.table_file import decode_table
+from workbench.device.virtual import MICROSECOND, MILLISECOND, SECOND
+from workbench.device.virtual.protocol import checksum, packet
+
+pytestmark = needs_compiler
+DWELLS = np.array([140, 103, 94, 131])
+
+
+def goals_of(data: bytes) -> list[tuple[int, int]]:
+    """(goal, speed) by servo, in the order of IDS, of a Sync Write whose every byte is looked at."""
+    assert data[:7] == bytes([0xFF, 0xFF, 0xFE, 79, 0x83, 30, 4])
+    assert len(data) == 83
+    assert checksum(data[2:-1]) == data[-1]
+    rows = struct.iter_unpack("<BHH", data[7:-1])
+    by_id = {i: (goal, speed) for i, goal, speed in rows}
+    return [by_id[i] for i in IDS]
+
+
+def play(poses: int, seed: int = 0) -> Robot:
+    """A walk of so many poses with telemetry, remote and uploads going on; every byte and every time is looked at."""
+    robot = Robot(seed)
+    robot.to_neutral()
+    began = len(robot.ear.packets)
+    robot.remote(1)
+    robot.remote(0)
+    tables = [changed(shift) for shift in (3, -2, 4, 0)]
+    valid = {shift: [tuple(zip(g, s)) for g, s in zip(t.goals.tolist(), t.speeds.tolist())]
+             for shift, t in ((k, decode_table(d).table) for k, d in enumerate([*tables, walk()]))}
+    sequence, logs = 0, 0
+    rng = np.random.default_rng(seed)
+    while sum(p[4] == 0x83 for _, p in robot.ear.packets[began:]) < poses:
+        robot.run(float(rng.uniform(300, 900)))
+        if rng.random() < 0.3:
+            sequence = (sequence + 1) % 256
+            link = robot.board.pc if rng.random() < 0.5 else robot.board.zigbee
+            for data in upload_frames(tables[sequence % 4], sequence):
+                robot.board.send(link, data)
+        elif rng.random() < 0.3:
+            robot.remote(int(rng.choice([0, 2, 4, 8, 32])))
+        logs += sum(isinstance(m, LogMessage) for m in robot.messages())
+    sent = [(t, p) for t, p in robot.ear.packets[began:] if p[4] == 0x83][:poses]
+    times = np.array([t for t, _ in sent])
+    expected = times[0] + MILLISECOND * np.concatenate([[0], np.cumsum(np.tile(DWELLS, poses // 4 + 1))])[:poses]
+    assert np.abs(times - expected).max() <= 50 * MICROSECOND
+    playing = {4}  # the built-in table, until another is seen
+    for k, (_, data) in enumerate(sent):
+        playing = {t for t in (playing if k % 4 else set(valid)) if valid[t][k % 4] == tuple(goals_of(data))}
+        assert playing, f"pose {k}"
+    elapsed = (times[-1] - times[0]) / SECOND
+    assert logs >= 40 * elapsed
+    assert not robot.bus.collisions
+    robot.sound()
+    robot.worst = np.abs(times - expected).max() / MICROSECOND
+    return robot
+
+
+def test_five_hundred_poses_with_telemetry_remote_and_uploads() -> None:
+    play(500)
+
+
+def test_the_same_seed_gives_the_same_trace() -> None:
+    assert len({play(30, seed=7).ear.digest.hexdigest() for _ in range(2)}) == 1
+
+
+def test_direction_follows_the_bytes() -> None:
+    robot = Robot()
+    robot.run(300)
+    talk = [(t, out) for t, out, into in robot.board.directions if out != into]
+    starts = [t for t, p in robot.ear.packets]
+    on = [t for t, out in talk if out]
+    off = [t for (t, out), (_, before) in zip(talk[1:], talk) if before and not out]
+    ends = [t + 720 * len(p) for t, p in robot.ear.packets]
+    assert len(on) >= len(starts) > 100
+    assert max(s - t for s, t in zip(starts, on)) < 5 * MICROSECOND
+    assert min(t - e for t, e in zip(off, ends)) >= 0
+    assert max(t - e for t, e in zip(off, ends)) < 5 * MICROSECOND  # a servo answers after 18 us at the earliest
+    robot.sound()
+
+
+def test_power_on_ramps_slowly_from_where_the_joints_are() -> None:
+    robot = Robot(3)
+    start = {i: robot.body.sense(i, 0).angle for i in IDS}
+    assert max(abs(a) for a in start.values()) > 0.09
+    robot.to_neutral()
+    first = robot.ear.poses()[0]
+    assert all(goal == 512 and 0 < speed <= 45 for goal, speed in goals_of(first[1]))
+    assert all(s["torque_enable"] == 1 for s in robot.servos.values())
+    robot.sound()
+
+
+def test_a_missing_servo_keeps_torque_off() -> None:
+    robot = Robot()
+    robot.servos[9].power(False)
+    robot.run(600)
+    states = [m for m in robot.messages() if isinstance(m, StateMessage)]
+    assert (states[-1].state, states[-1].reason, states[-1].servo) == (ControllerState.LIMP, "a servo is silent", 9)
+    assert not robot.ear.poses()
+    robot.sound()
+
+
+def reset_by(robot: Robot, how: str) -> str:
+    if how == "hang":
+        robot.board.core.words[0x10] = 0  # SysTick dies: the main loop feeds no more
+        robot.board.core._generation += 1
+        return "watchdog: the program hung"
+    if how == "brown-out":
+        for servo in robot.servos.values():
+            servo.power(False)
+            servo.power(True)
+        robot.board.reset(1 << 27 | 1 << 26)
+        return "brown-out"
+    if how == "fault":
+        robot.board.cpu.uc.mem_write(0x08003000 + 4 * 15, struct.pack("<I", 0x40000001))  # the SysTick vector is broken
+        return "watchdog: the program hung"
+    robot.board.reset(1 << 26)
+    return "reset button"
+
+
+@pytest.mark.parametrize("how", ["hang", "brown-out", "reset button", "fault"])
+def test_after_any_reset_it_stands_still_and_says_why(how: str) -> None:
+    robot = Robot()
+    robot.play()
+    robot.run(777)
+    robot.messages()
+    reason = reset_by(robot, how)
+    at = robot.clock.now
+    if how == "fault":
+        robot.run(60)
+        robot.board.cpu.uc.mem_write(0x08003000, image()[:256])
+    robot.run(340)
+    states = [m for m in robot.messages() if isinstance(m, StateMessage)]
+    assert [(m.state, m.reason) for m in states] == [(ControllerState.STILL, reason)]
+    assert all(t < at + 140 * MILLISECOND for t, p in robot.ear.packets if p[4] == 0x83)
+    robot.run(1000)
+    assert not [1 for t, p in robot.ear.packets if p[4] in (3, 0x83) and t > at + 250 * MILLISECOND]
+    robot.board.press_start(True)
+    robot.run(100)
+    robot.board.press_start(False)
+    robot.run(1500)
+    assert any(m.state == ControllerState.NEUTRAL for m in robot.messages() if isinstance(m, StateMessage))
+
+
+@pytest.mark.parametrize(("fault", "reason"), [
+    ("mute", "a servo is silent"), ("hot", "a servo is hot"), ("babble", "somebody babbles on the bus")])
+def test_a_fault_on_the_wire_is_met_as_in_the_core(fault: str, reason: str) -> None:
+    fault_in_image(fault, reason, 1)
+
+
+def fault_in_image(fault: str, reason: str, seed: int) -> None:
+    robot = Robot(seed)
+    robot.play()
+    rng = np.random.default_rng(seed)
+    robot.run(float(rng.uniform(50, 1500)))
+    at, servo = robot.clock.now, robot.servos[int(rng.choice(IDS))]
+    if fault == "mute":
+        servo.mute = True
+    elif fault == "overload":
+        servo.overload = True
+    elif fault == "hot":
+        servo.temperature = 66.0
+    elif fault == "low":
+        robot.bus.supply = 9.2
+    elif fault == "dead":
+        for each in robot.servos.values():
+            each.power(False)
+    elif fault == "babble":
+        def babble() -> None:
+            robot.bus.talk("babbler", rng.bytes(32), 1_000_000, robot.clock.now)
+
+        for k in range(700):
+            robot.clock.at(at + k * 330 * MICROSECOND, babble)
+    bound = 2000 if fault in ("hot", "low") else 300
+    robot.run(bound + 5)
+    told = [m for m in robot.messages() if isinstance(m, StateMessage) and m.time > at / SECOND]
+    assert [m.reason for m in told[:1]] == [reason]
+    first = next(t for t, p in robot.ear.packets if t > at and (p[4] == 3 or (p[4] == 0x83 and {g for g, _ in goals_of(p)} == {512})))
+    assert first <= at + bound * MILLISECOND
+    robot.sound()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fault", "reason"), [
+    ("mute", "a servo is silent"), ("hot", "a servo is hot"), ("babble", "somebody babbles on the bus"),
+    ("overload", "a servo is overloaded"), ("low", "the battery is low"), ("dead", "the servos' supply is dead")])
+def test_faults_on_the_wire_at_twenty_moments(fault: str, reason: str) -> None:
+    for seed in range(20):
+        fault_in_image(fault, reason, seed)
+
+
+def test_flips_in_both_directions_stop_nothing_and_every_goal_is_put_right() -> None:
+    flips(20)
+
+
+@pytest.mark.slow
+def test_flips_for_ten_minutes() -> None:
+    flips(600)
+
+
+def flips(seconds: int) -> None:
+    robot = Robot(5, to_servos=0.001, from_servos=0.001)
+    robot.to_neutral()
+    while not any(getattr(m, "state", None) == 5 for m in robot.messages()):  # a word of the remote may be lost as well
+        robot.remote(1)
+        robot.remote(0)
+        robot.run(100)
+    wrong: dict[int, int] = {}
+    for _ in range(seconds * 200):
+        robot.run(5)
+        meant = goals_of(robot.ear.poses()[-1][1])
+        for i, (goal, speed) in zip(IDS, meant):
+            servo = robot.servos[i]
+            assert 150 <= servo["goal_position"] <= 880
+            right = (servo["goal_position"], servo["moving_speed"]) == (goal, speed)
+            since = wrong.setdefault(i, robot.clock.now) if not right else wrong.pop(i, 0) and 0
+            assert not since or robot.clock.now - since <= 55 * MILLISECOND
+        del robot.ear.packets[:-200]
+    assert not [m for m in robot.messages() if isinstance(m, StateMessage) and m.state != ControllerState.PLAY]
+    robot.sound()
+
+
+def test_bridge_on_the_wire_and_its_end() -> None:
+    robot = Robot()
+    robot.to_neutral()
+    robot.board.send(robot.board.pc, frame(FrameType.RELEASE))
+    robot.run(100)
+    robot.board.send(robot.board.pc, frame(FrameType.BRIDGE))
+    robot.run(30)
+    assert any(isinstance(m, AnswerMessage) and m.well for m in robot.messages())
+    before = len(robot.board.pc.received)
+    robot.board.send(robot.board.pc, packet(9, 2, bytes([36, 2])))
+    robot.run(8)
+    assert bytes(robot.board.pc.received[before:]) == packet(9, 0, bytes([0, 2]))
+    robot.board.send(robot.board.pc, packet(9, 3, bytes([30, 88, 2, 50, 0])))
+    robot.run(900)
+    assert robot.servos[9]["torque_enable"] == 1
+    robot.run(4000)
+    assert not any(s["torque_enable"] for s in robot.servos.values())
+    robot.sound()

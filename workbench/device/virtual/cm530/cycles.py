@@ -1,0 +1,92 @@
+"""Counting cycles at each block of code. Where a C compiler is at hand it does so, many times as fast; the counts are equal."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import shutil
+import subprocess
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import unicorn
+from unicorn import arm_const as arm
+from unicorn.unicorn_py3.unicorn import uclib
+
+NEVER = 2**62
+SOURCE = Path(__file__).with_name("cycles.c")
+
+
+class Cycles(ctypes.Structure):
+    """now [ticks]; limit: when to stop; wish: stop as soon as interrupts are not masked. (The same as struct cycles.)"""
+
+    _fields_ = [
+        ("now", ctypes.c_int64), ("limit", ctypes.c_int64), ("wish", ctypes.c_int32), ("primask", ctypes.c_int32),
+        ("stop", ctypes.c_void_p), ("read", ctypes.c_void_p),
+    ]
+    now: int
+    limit: int
+    wish: int
+
+    def attach(self, uc: unicorn.Uc, compiled: bool = True) -> None:
+        """Has every block of code counted."""
+        hook = _library() if compiled else None
+        if hook is None:
+            uc.hook_add(unicorn.UC_HOOK_BLOCK, self._block)
+            return
+        self.primask = arm.UC_ARM_REG_PRIMASK
+        self.stop = ctypes.cast(uclib.uc_emu_stop, ctypes.c_void_p).value
+        self.read = ctypes.cast(uclib.uc_reg_read, ctypes.c_void_p).value
+        handle = ctypes.c_size_t()
+        everywhere = ctypes.c_uint64(1), ctypes.c_uint64(0)
+        call = ctypes.cast(hook.on_block, ctypes.c_void_p)
+        status = uclib.uc_hook_add(uc._uch, ctypes.byref(handle), unicorn.UC_HOOK_BLOCK, call,
+                                   ctypes.cast(ctypes.pointer(self), ctypes.c_void_p), *everywhere)
+        if status:
+            raise unicorn.UcError(status)
+
+    def _block(self, uc: unicorn.Uc, address: int, size: int, _: Any) -> None:
+        self.now += (size >> 1) or 1
+        if self.now >= self.limit or (self.wish and not uc.reg_read(arm.UC_ARM_REG_PRIMASK)):
+            self.wish = 0
+            uc.emu_stop()
+
+
+class Registers:
+    """Several registers read or written in one call."""
+
+    def __init__(self, uc: unicorn.Uc, numbers: tuple[int, ...]) -> None:
+        self._uc = uc
+        self._numbers = (ctypes.c_int * len(numbers))(*numbers)
+        self._values = (ctypes.c_uint64 * len(numbers))()
+        size = ctypes.sizeof(ctypes.c_uint64)
+        self._places = (ctypes.c_void_p * len(numbers))(*(ctypes.addressof(self._values) + size * k for k in range(len(numbers))))
+
+    def read(self) -> list[int]:
+        """Their values, in order."""
+        uclib.uc_reg_read_batch(self._uc._uch, self._numbers, self._places, len(self._numbers))
+        return [value & 0xFFFFFFFF for value in self._values]
+
+    def write(self, values: list[int]) -> None:
+        """Sets them, in order."""
+        self._values[:] = values  # type: ignore[assignment]
+        uclib.uc_reg_write_batch(self._uc._uch, self._numbers, self._places, len(self._numbers))
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL | None:
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        return None
+    digest = hashlib.sha256(SOURCE.read_bytes()).hexdigest()[:16]
+    out = Path(tempfile.gettempdir()) / f"workbench-cycles-{digest}.so"
+    if not out.exists():
+        part = Path(tempfile.mkdtemp()) / out.name
+        command = [compiler, "-O2", "-shared", "-fPIC", "-o", str(part), str(SOURCE)]
+        made = subprocess.run(command, capture_output=True, check=False)
+        if made.returncode:
+            return None
+        part.replace(out)
+    return ctypes.CDLL(str(out))

@@ -1,0 +1,28 @@
+"""Who chooses the next experiment: a diagnosis with ties goes in, the diagnosis with a motion that separates them comes out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from workbench.compare.session_takes import Progress, no_progress
+from workbench.experiment.design import design_experiment
+from workbench.identify.diagnosis import DiagnosisResult
+from workbench.identify.findings import Diagnosis
+from workbench.motion import Motion
+
+MOTION = "next_experiment.csv"
+"""The motion's file, beside findings.json."""
+
+
+def with_next_experiment(result: DiagnosisResult, n_jobs: int = 2, progress: Progress = no_progress
+                         ) -> tuple[Diagnosis, Motion | None]:
+    """The diagnosis with its next experiment, and that experiment's motion; as it was, and None, where nothing is tied or no
+    motion separates what is. progress: called with what is tried and the share done."""
+    if not result.ties:
+        return result.diagnosis, None
+    rivals = [(tie.found, tie.rival) for tie in result.ties]
+    experiment = design_experiment(result.diagnosis.nominal, rivals, result.observations, n_jobs, progress)
+    entry = experiment.entry(MOTION)
+    if entry is None:
+        return result.diagnosis, None
+    return replace(result.diagnosis, next_experiment=entry), experiment.motion

@@ -1,0 +1,40 @@
+"""The joints of a log by the model's names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from workbench.recording.recording import Recording
+from workbench.robot import InputError, RobotModel
+
+SO101_JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
+"""Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""
+URDF_JOINTS = dict(zip(SO101_JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")))
+"""The same joints by their names in the arm's published URDF."""
+
+def named_by_model(recording: Recording, model: RobotModel) -> Recording:
+    """A log with the model's joint names: a BAM log's one joint is the model's one, a SAGE programme's six are those of the arm's
+    URDF where the model has these; others must be the model's by name."""
+    joints = tuple(dict.fromkeys(c.partition(".")[2] for c in recording.channels if "." in c))
+    if recording.kind == "bam_log":
+        if len(model.joints) != 1:
+            raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
+        return _renamed(recording, {joints[0]: model.joints[0]})
+    if recording.kind == "sage" and set(joints) == set(URDF_JOINTS) and set(URDF_JOINTS.values()) <= set(model.joints):
+        return _renamed(recording, URDF_JOINTS)
+    unknown = [j for j in joints if j not in model.joints]
+    if unknown:
+        raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
+    return recording
+
+
+def _renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
+    """With joints called otherwise, `names` by those of the recording."""
+    channels = {}
+    for channel, values in recording.channels.items():
+        what, dot, joint = channel.partition(".")
+        channels[f"{what}{dot}{names.get(joint, joint)}"] = values
+    sent = recording.commands
+    commands = sent and replace(sent, joints=tuple(names.get(j, j) for j in sent.joints))
+    return replace(recording, channels=channels, commands=commands)
