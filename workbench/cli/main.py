@@ -20,7 +20,7 @@ from workbench.cli.progress import forget_warnings, show_warnings
 
 VERBS = (
     "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
-    "servos", "play", "record", "bench",
+    "servos", "play", "record", "run", "bench",
 )
 
 

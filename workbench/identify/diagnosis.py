@@ -30,6 +30,7 @@ from workbench.identify.ledger import channel_gaps, ledger
 from workbench.identify.preparation import check_duration, prepared
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
+from workbench.identify.registers import read_off_registers
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
@@ -90,9 +91,10 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     # 2. The gap: where, when and in which layer they leave the nominal model
     gap = ledger(seen.evidence, nominal.residuals)
 
-    # 3. What is read off without a search: the robot's geometry, commands that never arrived, stops, mounts, marker frames
+    # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames
     measured = geometry_of(session.model, evaluator.evidence, nominal.residuals) if gap else Geometry()
     build = _believed(measured, evaluator, session.model, nominal)
+    build = replace(build, measured=(*build.measured, *read_off_registers(session)))
     known = session.with_model(build.added_to(session.model))
     sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
     evidence = sent.evidence

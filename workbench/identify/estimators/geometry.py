@@ -57,12 +57,14 @@ class UncertainValue:
 
 @dataclass(frozen=True)
 class Measured:
-    """A link that is not as long as drawn, or a horn that sits turned: value and standard deviation in the contract's unit."""
+    """A link that is not as long as drawn, a horn that sits turned, or what a servo's register says: value and standard deviation
+    in the contract's unit. seen: how that is known, for a person."""
 
     effect: str
     where: str
     mean: float
     sigma: float
+    seen: str = SEEN
 
     @property
     def variance(self) -> float:
@@ -79,7 +81,7 @@ class Measured:
         half = Z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
         return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
-                       evidence=effect_named(self.effect).sentence(self.spec) + SEEN)
+                       evidence=effect_named(self.effect).sentence(self.spec) + self.seen)
 
 
 @dataclass(frozen=True)
