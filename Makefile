@@ -18,6 +18,10 @@ WORKERS ?= 2
 demo: $(STAMP)
 	$(BIN)/workbench demo
 
+# The robot's own program, with gcc-arm-none-eabi alone; image, sizes and the bound of its stack: runs/firmware.
+firmware:
+	@$(MAKE) --no-print-directory -C firmware
+
 test: lint
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "not slow"
 

@@ -13,7 +13,7 @@ from workbench.identify.fitting.fits import Fit
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.reasons import Dependence
-from workbench.identify.selection.model_comparison import Rival, Standing
+from workbench.identify.selection.model_comparison import NamePosterior, Rival
 
 FRAME = {0: np.ones((1, 1))}
 EVERY = np.ones(1, dtype=bool)
@@ -57,7 +57,7 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     other = Candidate.of(known_effects()["zero_offset"], ("knee",), (0.0,))
     rivals = [Rival(c, x, behind, p, fit)
               for c, behind, p in ((length("shank"), 10.0, 0.3), (other, 20.0, 0.2), (length("hip"), 90.0, 0.01))]
-    standing = Standing(0.45, tuple(rivals))
+    standing = NamePosterior(0.45, tuple(rivals))
     told = finding(SEEN, fit, 0, standing, FRAME, FRAME)
     assert told.where == ("thigh", "shank")
     assert told.confidence == pytest.approx(0.75)

@@ -94,6 +94,7 @@ def test_any_single_flipped_bit_is_found() -> None:
 
 
 def test_the_built_in_table_is_the_robotis_walk_as_export_writes_it() -> None:
+    assert (FIRMWARE / "robotis_walk.table").read_bytes() == walk()
     file = read_table_file(FIRMWARE / "robotis_walk.table")
     assert file.table.joints == WALK.joints
     assert [j.bus_id for j in file.joints] == [BUS_IDS[j] for j in WALK.joints]

@@ -8,9 +8,11 @@ Shell completion (argcomplete): eval "$(register-python-argcomplete workbench)" 
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -19,11 +21,11 @@ from typing import NoReturn
 import workbench
 from workbench.cli.defaults import apply_defaults
 from workbench.cli.log import LOGGER, RunLog, speak_up
-from workbench.cli.progress import progress_mode
+from workbench.cli.progress import forget_warnings, progress_mode, show_warnings
 
 VERBS = (
-    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos",
-    "play", "record", "bench", "doctor",
+    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
+    "servos", "play", "record", "run", "bench", "doctor",
 )
 
 
@@ -54,18 +56,17 @@ def make_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one verb; `argv` without the program's name. Returns the exit code."""
-    argv = sys.argv[1:] if argv is None else argv
     parser = make_parser()
     try:
         apply_defaults(_verbs(parser))
     except ValueError as e:
         return _refused("workbench", e)
     args = parser.parse_args(argv)
-    log, heard = RunLog(argv), speak_up(args.verbose, args.quiet)
+    log, heard = RunLog(sys.argv[1:] if argv is None else argv), speak_up(args.verbose, args.quiet)
     LOGGER.addHandler(log)
     progress_mode(args.quiet, args.verbose)
     try:
-        code = _run(args)
+        code = _run(args, alone=argv is None)
         log.write(args.out if isinstance(getattr(args, "out", None), Path) else None, code)
         return code
     finally:
@@ -74,10 +75,17 @@ def main(argv: Sequence[str] | None = None) -> int:
                 LOGGER.removeHandler(handler)
 
 
-def _run(args: argparse.Namespace) -> int:
+def _run(args: argparse.Namespace, alone: bool) -> int:
+    """Runs the verb. alone: whether this process is for nothing else, so that libraries' warnings may be silenced."""
+    logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
+    forget_warnings()
+    if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
+        warnings.simplefilter("ignore")
+        os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
     try:
         code: int = args.run(args)
+        show_warnings()
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -86,6 +94,9 @@ def _run(args: argparse.Namespace) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError as e:
+        print(f"workbench {args.verb}: error: out of memory ({' '.join(str(e).split()) or 'no more is free'})", file=sys.stderr)
+        return 2
     except (OSError, ValueError) as e:
         return _refused(f"workbench {args.verb}", e)
     finally:
@@ -104,6 +115,10 @@ def _refused(name: str, error: OSError | ValueError) -> int:
         raise error
     print(f"{name}: error: {problem}", file=sys.stderr)
     return 2
+
+
+def _only_errors(record: logging.LogRecord) -> bool:
+    return record.levelno >= logging.ERROR
 
 
 def _readable(error: OSError | ValueError) -> str | None:

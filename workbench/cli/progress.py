@@ -5,40 +5,68 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Iterable, Sequence
 from typing import TextIO
 
 from workbench.cli.log import LOGGER
 
+_WAITING: list[str] = []
+"""Warnings that were not shown yet."""
 QUIET = 1.5
 """Runs shorter than this say nothing [s], so that their errors stand alone."""
-LEFT_AFTER = 5.0
-"""A step has to have run that long [s] before the time that it still needs is told from its share done."""
-_mode = {"silent": False}
+BEAT = 10.0
+"""Longest silence [s]."""
+
+_MODE = {"silent": False}
 
 
 def progress_mode(quiet: bool, verbose: bool) -> None:
-    """Whether runs stay silent: with --quiet, and with --verbose, where the log speaks instead."""
-    _mode["silent"] = quiet or verbose
+    """Whether runs show no progress: with --quiet, and with --verbose, where the log speaks instead."""
+    _MODE["silent"] = quiet or verbose
+
+
+def warn(verb: str, lines: Iterable[str]) -> None:
+    """Lines for stderr, shown once the run turns out to be long, or when it has ended well: where it is refused, the error stands
+    alone."""
+    said = [f"workbench {verb}: warning: {line}" for line in lines]
+    for line in said:
+        LOGGER.warning("%s", line)
+    _WAITING.extend(said)
+
+
+def show_warnings(stream: TextIO | None = None) -> None:
+    """Shows what waits."""
+    for line in _WAITING:
+        print(line, file=stream or sys.stderr)
+    _WAITING.clear()
+
+
+def forget_warnings() -> None:
+    """Of a run that was refused, or has not begun."""
+    _WAITING.clear()
 
 
 class Progress:
     """Call it as `progress(what)` or `progress(what, done)` with done in 0..1, inside its `with` block.
 
     On a terminal one line that is rewritten at most ten times a second and cleared at the end; elsewhere a plain line for each
-    new `what`, and one every five seconds within it.
+    new `what`, one every five seconds within it, and one every `BEAT` seconds in which nothing is said. stages: what the run does
+    one after the other, by how each `what` begins, so that a line says which of how many it is; where `done` is told, it says how
+    long that stage has still to go.
     """
 
-    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None) -> None:
+    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None, stages: Sequence[str] = ()) -> None:
         quiet = QUIET if quiet is None else quiet
         self._verb = verb
+        self._stages, self._stage, self._entered = tuple(stages), 0, time.monotonic()
+        self._ended = threading.Event()
         self._stream = sys.stderr if stream is None else stream
         self._tty = self._stream.isatty()
         self._started = time.monotonic()
         self._last = -float("inf")
         self._now: tuple[str, float | None] = "", None
         self._shown = ""
-        self._stage = "", self._started
-        self._speaks = quiet <= 0 and not _mode["silent"]
+        self._speaks = quiet <= 0 and not _MODE["silent"]
         self._lock = threading.Lock()
         self._timer = threading.Timer(quiet, self._speak)
         self._timer.daemon = True
@@ -49,6 +77,7 @@ class Progress:
 
     def __exit__(self, *_: object) -> None:
         self._timer.cancel()
+        self._ended.set()
         with self._lock:
             self._speaks = False
             if self._tty and self._shown:
@@ -57,19 +86,32 @@ class Progress:
 
     def __call__(self, what: str, done: float | None = None) -> None:
         with self._lock:
-            if what != self._stage[0]:
-                self._stage = what, time.monotonic()
+            if what.partition(" ")[0] != self._now[0].partition(" ")[0]:
+                self._entered = time.monotonic()
+            if what != self._now[0]:
                 LOGGER.debug("%s", what)
             self._now = what, done
+            for k, begins in enumerate(self._stages):
+                if what.startswith(begins):
+                    self._stage = max(self._stage, k + 1)
             if self._speaks:
                 self._show()
 
     def _speak(self) -> None:
         """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
         with self._lock:
-            self._speaks = not _mode["silent"]
+            self._speaks = not _MODE["silent"]
+            show_warnings(self._stream)
             if self._speaks and self._now[0]:
                 self._show()
+        threading.Thread(target=self._beats, daemon=True).start()
+
+    def _beats(self) -> None:
+        """Says from time to time what the run is still at."""
+        while not self._ended.wait(BEAT):
+            with self._lock:
+                if self._speaks and self._now[0] and time.monotonic() - self._last >= BEAT:
+                    self._show()
 
     def _show(self) -> None:
         what, done = self._now
@@ -78,13 +120,10 @@ class Progress:
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"
-        line = f"workbench {self._verb}: {what}{share} ({now - self._started:.0f} s{self._left(done, now)})"
+        stage = f"{self._stage} of {len(self._stages)}, " if self._stage else ""
+        spent = now - self._entered
+        told = done is not None and 0.05 < done < 1 and spent > 5
+        left = f", about {spent * (1 / done - 1):.0f} s left of this" if done is not None and told else ""
+        line = f"workbench {self._verb}: {stage}{what}{share} ({now - self._started:.0f} s{left})"
         self._stream.write(f"\r\x1b[2K{line[:110]}" if self._tty else f"{line}\n")
         self._stream.flush()
-
-    def _left(self, done: float | None, now: float) -> str:
-        """How long this step still takes, if it goes on as it did."""
-        spent = now - self._stage[1]
-        if done is None or not 0 < done < 1 or spent < LEFT_AFTER:
-            return ""
-        return f", {spent * (1 - done) / done:.0f} s left of this step"

@@ -17,9 +17,9 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
 from workbench.identify.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
-from workbench.identify.selection.model_comparison import Rival, Standing
-from workbench.identify.selection.record import Round
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.model_comparison import NamePosterior, Rival
+from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.screening import CandidateFit
 from workbench.identify.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
@@ -56,7 +56,7 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplaine
     return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
 
 
-def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePosterior, before: Residuals, after: Residuals
             ) -> Finding:
     """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
     the nominal and the fitted model."""
@@ -73,7 +73,7 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standi
         validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
 
 
-def _elsewhere(c: Candidate, standing: Standing) -> list[Rival]:
+def _elsewhere(c: Candidate, standing: NamePosterior) -> list[Rival]:
     """The same effect where the data cannot tell it from this place."""
     return [r for r in standing.rivals if r.candidate.name == c.name and r.probability >= SAME_ELSEWHERE * standing.probability]
 
@@ -116,13 +116,18 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
     return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
 
 
-def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
-             ) -> tuple[Rejected, ...]:
+def rejected(
+    evidence: Sequence[TakeEvidence],
+    fit: Fit,
+    rounds: Sequence[SelectionStep],
+    posteriors: Sequence[NamePosterior],
+    before: Residuals,
+) -> tuple[Rejected, ...]:
     """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
     unseen = any(e.uses["validate"].any() for e in evidence)
-    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, standings) for r in _elsewhere(c, s)}
+    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
-    for c, standing in zip(fit.effects, standings):
+    for c, standing in zip(fit.effects, posteriors):
         for rival in standing.rivals:
             if rival.candidate.key not in kept and rival.fit is not None:
                 left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
@@ -137,10 +142,10 @@ def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round]
     return tuple(out.values())
 
 
-def _why_not(r: Round, t: Trial) -> Reason:
+def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
     """Of an effect that was tried in a round and not taken."""
     best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
-    if t.foretold:
+    if t.screened_out:
         return ScreenedOut()
     if best is None:
         return TooLittle()
@@ -184,9 +189,9 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
     return Dependence(e.name, channel, best, found[best])
 
 
-def ties(nominal: RobotModel, fit: Fit, standings: Sequence[Standing]) -> tuple[Tie, ...]:
+def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
     """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
-    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in standings
+    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
                  if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > WORTH_AN_EXPERIMENT)
 
 
