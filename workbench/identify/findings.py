@@ -21,8 +21,6 @@ LIKELY = 0.5
 """Probability from which on a name counts as an explanation."""
 TIED = 0.5
 """An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
-SUREST = 0.98
-"""What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
 FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 

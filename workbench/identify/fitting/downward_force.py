@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from workbench.effects.base import si_values
 from workbench.identify.findings import Unexplained
 from workbench.identify.fitting.fits import Fit
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.reasons import DownwardPull
 from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
-ASIDE = np.tan(np.deg2rad(15.0))
-"""Share of a pull's weight that it may pull aside by and still is one straight down."""
 STEP = 1e-3
 """Of a size, by which a slope is told."""
 
@@ -24,7 +23,7 @@ STEP = 1e-3
 def pulls_down(c: Candidate, x: Array) -> bool:
     """Whether an effect pulls the base straight down."""
     aside_x, aside_y, up = _pull(c, x)
-    return bool(np.hypot(aside_x, aside_y) < -ASIDE * up)
+    return bool(np.hypot(aside_x, aside_y) < -CONCLUSIONS.aside * up)
 
 
 def downward_pulls(fit: Fit) -> Iterator[Unexplained]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
-from workbench.identify.shooting import WINDOW
+from workbench.identify.options import PROBLEM
 from workbench.identify.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
@@ -113,8 +113,10 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
         what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
     if any(s.recorded.base == "free" for s in takes):
-        what.append(f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {WINDOW:g} s; "
-                    "paths and 3D show it left to itself.")
+        what.append(
+            f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
+            "paths and 3D show it left to itself."
+        )
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
@@ -182,7 +184,7 @@ def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
     if take.recorded.base == "free":
-        said += f", or the model's body had just been put back beside the recorded one, as every {WINDOW:g} s"
+        said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
 
