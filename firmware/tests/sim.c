@@ -97,7 +97,7 @@ static void reply(struct sim *s, struct sim_servo *v, const uint8_t *parameters,
     a[2] = v->table[DXL_ID];
     a[3] = (uint8_t)(n + 2u);
     a[4] = error;
-    memcpy(a + 5, parameters, n);
+    if (n) memcpy(a + 5, parameters, n);
     a[5 + n] = dxl_sum(a, n + DXL_OVERHEAD);
     s->answer_length = n + DXL_OVERHEAD;
     if (v->twin) a[5 + sim_random(s, n + 1u)] ^= (uint8_t)(1u + sim_random(s, 255));
@@ -235,7 +235,8 @@ void sim_frame(struct sim *s, uint32_t link, uint32_t type, const uint8_t *paylo
     uint8_t bytes[RING_BYTES];
     uint32_t k = 0;
     ring.in = ring.out = 0;
-    frame_send(&ring, (uint8_t)type, 1, payload, n);
+    static const uint8_t nothing;
+    frame_send(&ring, (uint8_t)type, 1, payload ? payload : &nothing, n);
     while (ring_used(&ring)) bytes[k++] = ring_get(&ring);
     sim_send(s, link, bytes, k);
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import subprocess
 import tempfile
 from functools import lru_cache
@@ -14,7 +15,7 @@ from workbench.device.table_file import TableFile, bounds_of, encode_table
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 
-FIRMWARE = Path(__file__).parents[2] / "firmware"
+FIRMWARE = Path(os.environ.get("WORKBENCH_FIRMWARE", Path(__file__).parents[2] / "firmware"))
 LINK_PC, LINK_ZIGBEE = 0, 1
 POWER_ON = 1
 NONE = 2**64 - 1
