@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
+from workbench.effects.schedules import LOOP
 from workbench.identify.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
 from workbench.identify.findings import Alternative, Change, Finding, Unexplained
 from workbench.identify.fitting.fits import Fit
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
-from workbench.identify.problem import LOOP
-from workbench.identify.selection.model_comparison import Rival, Standing
+from workbench.identify.reasons import Dependence
+from workbench.identify.selection.model_comparison import NamePosterior, Rival
 
 FRAME = {0: np.ones((1, 1))}
 EVERY = np.ones(1, dtype=bool)
@@ -56,7 +57,7 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     other = Candidate.of(known_effects()["zero_offset"], ("knee",), (0.0,))
     rivals = [Rival(c, x, behind, p, fit)
               for c, behind, p in ((length("shank"), 10.0, 0.3), (other, 20.0, 0.2), (length("hip"), 90.0, 0.01))]
-    standing = Standing(0.45, tuple(rivals))
+    standing = NamePosterior(0.45, tuple(rivals))
     told = finding(SEEN, fit, 0, standing, FRAME, FRAME)
     assert told.where == ("thigh", "shank")
     assert told.confidence == pytest.approx(0.75)
@@ -71,7 +72,7 @@ def test_a_name_that_is_less_likely_than_not_explains_nothing():
         return Finding("ground_friction", (), confidence, {}, change, change, ties)
 
     tie = Alternative("ground_tilt", (), 0.3)
-    rest = Unexplained((), 1.0, 0.1, "deg", "goes with nothing tried")
+    rest = Unexplained((), 1.0, 0.1, "deg", Dependence("wave", "one"))
     assert verdict_of(False, [], []) == "no_gap"
     assert verdict_of(True, [], [rest]) == "unexplained"
     assert verdict_of(True, [named(0.9)], []) == verdict_of(True, [named(0.4, tie)], []) == "explained"

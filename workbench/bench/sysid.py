@@ -21,7 +21,7 @@ from workbench.identify.diagnosis import STEP
 from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.problem import TakeEvidence, gather
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import FINE, Jury
+from workbench.identify.rollouts import FINE, RolloutEvaluator
 from workbench.identify.selection.best_subsets import MOST_STEPS
 from workbench.simulation import SimulationConfig
 
@@ -122,22 +122,22 @@ def _evidence(mine: Session) -> list[TakeEvidence]:
 
 def _fitted(mine: Session, evidence: list[TakeEvidence], iterations: int) -> Ours:
     """From nominal, all rollouts anew."""
-    jury = Jury(evidence, CONFIG, 1)
-    search = Search(jury, mine.model)
+    evaluator = RolloutEvaluator(evidence, CONFIG, 1)
+    search = Search(evaluator, mine.model)
     pool = {c.name: c for c in candidates(mine.model, evidence) if c.joint == ODD}
     start = search.evaluated([(pool[name], np.zeros(1)) for name in ("coulomb_friction", "viscous_friction")])
-    return _told(jury, search.refitted(start, search.fitted, iterations))
+    return _told(evaluator, search.refitted(start, search.fitted, iterations))
 
 
 def _refined(mine: Session, evidence: list[TakeEvidence], fit: Fit) -> Ours:
-    jury = Jury(evidence, CONFIG, 1)
-    return _told(jury, Search(jury, mine.model).refined(fit))
+    evaluator = RolloutEvaluator(evidence, CONFIG, 1)
+    return _told(evaluator, Search(evaluator, mine.model).refined(fit))
 
 
-def _told(jury: Jury, fit: Fit) -> Ours:
+def _told(evaluator: RolloutEvaluator, fit: Fit) -> Ours:
     (coulomb,), (viscous,) = (c.values(x) for c, x in fit.sizes())
-    left = np.sqrt(np.nanmean(np.square(fit.residuals[0] * jury.evidence[0].sigma)))
-    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), jury.rollouts)
+    left = np.sqrt(np.nanmean(np.square(fit.residuals[0] * evaluator.evidence[0].sigma)))
+    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), evaluator.rollouts)
 
 
 def _timed(run: Callable[[], Any]) -> tuple[Any, float]:

@@ -68,7 +68,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
 
 def _by_first_motion(read: ReadTake) -> RegisteredTake:
     """A recording of which nothing is known but itself: its start is where its first joint leaves rest."""
-    if read.recording.kind != "motive" or read.commands is not None:
+    if read.recording.sensing == "encoders" or read.commands is not None:
         return register_take(read, None, None)
     start = float(read.recording.time[0])
     for _ in range(2):  # the zero is taken before the start, and the start found from zeroed angles

@@ -76,7 +76,7 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
 def read_start(path: Path) -> Recording:
     """The first frames of a captured take."""
     start = read_recording(path)
-    if start.kind != "motive" or not start.rigid_bodies:
+    if start.sensing != "mocap" or not start.rigid_bodies:
         raise InputError(path, "expected the start of a Motive take with rigid bodies")
     return start
 

@@ -39,7 +39,8 @@ class Rival:
         for i in self.own:
             spec = effects[i]
             effects[i] = EffectSpec(spec.effect, spec.where, {
-                p.name: (next(at), next(at), next(at)) if p.vector else next(at) for p in effect_named(spec.effect).parameters})
+                p.name: (next(at), next(at), next(at)) if p.vector else next(at)
+                for p in effect_named(spec.effect).parameters if p.name in spec.parameters})
         return replace(self, model=replace(self.model, effects=tuple(effects)))
 
     def steps(self) -> Array:
@@ -58,9 +59,11 @@ class Rival:
             effect = effect_named(spec.effect)
             neutral = iter(effect.neutral(self.model))
             for p in effect.parameters:
+                at_neutral = [next(neutral) for _ in range(3 if p.vector else 1)]
+                if p.name not in spec.parameters:
+                    continue
                 given = spec.parameters[p.name]
-                for v in given if isinstance(given, tuple) else (given,):
-                    n = next(neutral)
+                for v, n in zip(given if isinstance(given, tuple) else (given,), at_neutral):
                     out.append(_Number(float(v), p.low, p.high, p.typical_beside(n), math.inf if p.shapes else n, p.vector))
         return out
 

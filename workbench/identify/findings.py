@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Layer
+from workbench.identify.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.files import write_together
 from workbench.robot.model_file import model_text
@@ -120,11 +121,11 @@ class Rejected:
 
     effect: str
     where: tuple[str, ...]
-    reason: str
+    reason: Reason
     validation: Change | None = None
 
     def to_json(self) -> dict[str, Any]:
-        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason}
+        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.said()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
 
@@ -160,11 +161,11 @@ class Unexplained:
     error: float
     floor: float
     unit: str
-    description: str
+    description: Description
 
     def to_json(self) -> dict[str, Any]:
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
-                "description": self.description}
+                "description": self.description.said()}
 
 
 @dataclass(frozen=True)

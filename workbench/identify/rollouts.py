@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,7 +33,7 @@ REST = 0.1
 
 
 @dataclass(frozen=True)
-class Question:
+class RolloutRequest:
     """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone. until: how long after
     the first command [s]; frames after that are NaN."""
 
@@ -42,7 +43,7 @@ class Question:
     until: float = np.inf
 
 
-class Jury:
+class RolloutEvaluator:
     """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
     answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
 
@@ -56,10 +57,10 @@ class Jury:
         self.work = 0.0
         self._known: dict[str, NDArray[np.float32]] = {}
 
-    def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
+    def residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
         keys: list[dict[int, str]] = []
-        new: dict[str, tuple[Question, int, RobotModel]] = {}
+        new: dict[str, tuple[RolloutRequest, int, RobotModel]] = {}
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
             keys.append({i: self._key(model, i, q) for i, model in felt.items()})
@@ -81,9 +82,9 @@ class Jury:
         return [{i: self.evidence[i].residual(self._known[key].astype(float), q.model, q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
-    def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
-        """A jury on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
-        other = Jury(evidence, self.config, self.n_jobs, self.memory)
+    def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
+        """The same on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
+        other = RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
         other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
         return other
 
@@ -204,13 +205,13 @@ class Jury:
         felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
         return model if len(felt) == len(model.effects) else replace(model, effects=felt)
 
-    def _key(self, felt: RobotModel, take: int, q: Question) -> str:
+    def _key(self, felt: RobotModel, take: int, q: RolloutRequest) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
         until = self._until(take, q)
         return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}" + ("" if np.isinf(until) else f"-until{until:.6g}")
 
-    def _until(self, take: int, q: Question) -> float:
+    def _until(self, take: int, q: RolloutRequest) -> float:
         """How long a question looks at a take [s]."""
         return min(q.until, self.evidence[take].until)
 
@@ -224,13 +225,13 @@ class Jury:
         simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
         self._known[key] = simulated
         if self.memory is not None:
-            part = self.memory / f"{key}.part.npy"
+            part = self.memory / f"{key}.{os.getpid()}.part.npy"  # two runs may share the memory
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
 
 
 def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Of `Jury.stretches`."""
+    """Of `RolloutEvaluator.stretches`."""
     return stretches // STRETCHES
 
 

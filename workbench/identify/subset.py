@@ -22,7 +22,7 @@ STARVED = 0.1
 """Share of what a channel lacks with the base held below which the frames that judge show too little of it."""
 
 
-def judged_fairly(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
     """Takes of which, with the base held, another third of the frames judges where that which does shows next to nothing of what
     a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
     return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e
@@ -45,7 +45,7 @@ def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
     return replace(e, uses={**e.uses, **uses})
 
 
-def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
     """Takes as a search looks at them: not those that only validate; of long sessions, each from its first command until what is
     missing there was seen, or not at all, so that every channel's gap shows, in as many takes as it has.
 
@@ -97,7 +97,7 @@ def _until(e: TakeEvidence, until: float) -> TakeEvidence:
     return replace(e, until=until, uses={use: mask & early for use, mask in e.uses.items()})
 
 
-def share_of(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
+def subset_used(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
     """What to say of a search that looked at a share of what it might: seconds by take that it looked at; else empty."""
     if all(np.isinf(e.until) for e in evidence if e.take.spec.use != "validate"):
         return {}

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-Lost = dict[tuple[int, str], tuple[int, ...]]
+DroppedPoses = dict[tuple[int, str], tuple[int, ...]]
 """Poses by take and joint."""
 LEAST_STEP = np.deg2rad(2.0)
 """A pose that moves a joint by less does not tell whether it came [rad]."""
@@ -32,15 +32,15 @@ MOST, TURNS = 0.5, 12
 """Share of poses that may be missed: of more, something else is the matter. Poses that may be missed one after another."""
 
 
-def played_without(jury: Jury, lost: Mapping[tuple[int, str], Sequence[int]]) -> Jury:
-    """The jury whose takes are played without some poses, by take and joint."""
-    evidence = list(jury.evidence)
+def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], Sequence[int]]) -> RolloutEvaluator:
+    """The evaluator whose takes are played without some poses, by take and joint."""
+    evidence = list(evaluator.evidence)
     for (i, joint), poses in lost.items():
         take = evidence[i].take
         assert take.commands is not None
         commands = without_poses(take.commands, take.commands.column(joint), poses)
         evidence[i] = replace(evidence[i], take=replace(take, commands=commands))
-    return jury.on(evidence)
+    return evaluator.on(evidence)
 
 
 def end_of(e: TakeEvidence, k: int) -> float:
@@ -50,38 +50,42 @@ def end_of(e: TakeEvidence, k: int) -> float:
     return float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end)
 
 
-def passed_over(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> Lost:
+def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]) -> DroppedPoses:
     """Poses that were missed in motion. residuals: of the nominal robot, by take."""
-    lost: Lost = {}
+    lost: DroppedPoses = {}
     cleared: set[tuple[int, str, int]] = set()
     now = dict(residuals)
     for _ in range(TURNS):
-        new = _suspects(jury, now, lost, cleared)
+        new = _suspects(evaluator, now, lost, cleared)
         if not new:
             break
-        after = _played(jury, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
-        guilty = {(i, j): tuple(k for k in poses if _explained(jury.evidence[i], j, k, now[i], after[i]))
+        after = _played(evaluator, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
+        guilty = {(i, j): tuple(k for k in poses if _explained(evaluator.evidence[i], j, k, now[i], after[i]))
                   for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
         found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
         if not found:
             break
         lost |= found
-        now = after if guilty == new else _played(jury, nominal, lost, residuals)
+        now = after if guilty == new else _played(evaluator, nominal, lost, residuals)
     return lost
 
 
-def _played(jury: Jury, nominal: RobotModel, lost: Lost, residuals: Mapping[int, Array]) -> dict[int, Array]:
+def _played(
+    evaluator: RolloutEvaluator, nominal: RobotModel, lost: DroppedPoses, residuals: Mapping[int, Array]
+) -> dict[int, Array]:
     """What is left without these poses."""
     takes = tuple(sorted({i for i, _ in lost}))
-    return dict(residuals) | played_without(jury, lost).residuals([Question(nominal, takes)])[0]
+    return dict(residuals) | played_without(evaluator, lost).residuals([RolloutRequest(nominal, takes)])[0]
 
 
-def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tuple[int, str, int]]) -> Lost:
+def _suspects(
+    evaluator: RolloutEvaluator, now: Mapping[int, Array], lost: DroppedPoses, cleared: set[tuple[int, str, int]]
+) -> DroppedPoses:
     """Poses with which joints that were well begin to stay behind; of several in a row the first, as what one does shows with the
     next, and left out together neither would be believed."""
-    out: Lost = {}
-    for i, e in enumerate(jury.evidence):
+    out: DroppedPoses = {}
+    for i, e in enumerate(evaluator.evidence):
         for joint in e.joints if e.take.commands is not None else ():
             gone = lost.get((i, joint), ())
             moves = steps(e, joint, gone)

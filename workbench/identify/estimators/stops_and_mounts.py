@@ -28,7 +28,7 @@ LEAST_TURN = np.deg2rad(0.3)
 """A marker frame is asked about that is turned by more than this at rest [rad]."""
 
 
-def special(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
+def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """Those that these takes suggest; residuals: of the nominal robot, by take."""
     ill = [channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)]
     out: list[Candidate] = []

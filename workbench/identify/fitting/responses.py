@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import Question
+from workbench.identify.rollouts import RolloutRequest
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-Part = Generator[list[Question], list[dict[int, Array]], T]
+Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
 """What a part of a search asks, is answered, and returns."""
 Seen = tuple[list[Array], list[list[Array]], float]
 """Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
-Signatures = dict[tuple[object, ...], Seen]
+ResponseBank = dict[tuple[object, ...], Seen]
 """By group and takes."""
 SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
 """Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
@@ -30,7 +30,7 @@ SHAPED = (0.0, 2.0, -2.0)
 """Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 
 
-def sizes_of(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
+def scan_sizes(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
     """Of the above, for an effect. unheld: whether no take had the base held, where joints show what they lack, however much."""
     if walking and c.effect.layer == "ground":
         return SCANNED_GROUND
@@ -55,7 +55,9 @@ def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
-def guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
+def linearised_estimate(
+    c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float
+) -> tuple[Array, float]:
     """Sizes to start from, and how much of the sum of squares signatures say they take away."""
     whole = float(r0 @ r0)
     if not c.size:

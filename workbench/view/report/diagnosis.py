@@ -21,6 +21,7 @@ from workbench.view.report.words import (
     capital,
     change,
     headline,
+    in_words,
     intervals_of,
     is_error,
     layers_of,
@@ -29,7 +30,6 @@ from workbench.view.report.words import (
     name_of,
     next_said,
     quantity,
-    reason_of,
     rival_of,
     sentence_of,
     this_or,
@@ -269,7 +269,7 @@ def _left(diagnosis: Diagnosis) -> Section:
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
                   "effect that was tried explains it."), *_folded(header, off, "more")] if off else []
-    return Section("What is left", [*still, *(Text(f"{capital(u.description)}.") for u in order if not is_error(u))])
+    return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
@@ -281,10 +281,10 @@ def _tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
     """A table; without a column of errors where none was measured."""
     measured = any(r.validation is not None for r in rejected)
     header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
-    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), reason_of(r.reason)]
+    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
             for r in rejected]
     parts = _folded(header, rows, summary)
-    if any("chi squared" in r.reason for r in rejected):
+    if any(r.reason.of_chi_squared for r in rejected):
         parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
     return parts
 
