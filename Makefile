@@ -13,7 +13,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test test-newest lint docs prove studies system clean
+.PHONY: firmware demo test test-newest lint docs prove studies system clean
 
 demo: $(STAMP)
 	$(BIN)/workbench demo
