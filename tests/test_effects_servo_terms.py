@@ -27,8 +27,10 @@ DRY = ServoConstants(coulomb_friction=0.06, viscous_friction=0.0)
 CASES = {
     "stribeck_friction": EffectSpec("stribeck_friction", ("flm",), {"torque": 0.15, "speed": 20.0}),
     "load_friction": EffectSpec("load_friction", ("flm",), {"coefficient": 0.5}),
+    "friction_asymmetry": EffectSpec("friction_asymmetry", ("flm",), {"ratio": 4.0}),
     "supply_sag": EffectSpec("supply_sag", (), {"drop": 1.0}),
     "torque_ceiling": EffectSpec("torque_ceiling", ("flm",), {"torque": 0.1}),
+    "torque_saturation": EffectSpec("torque_saturation", ("flm",), {"torque": 0.2}),
     "thermal_fade": EffectSpec("thermal_fade", (), {"rate": 1.0}),
 }
 each_effect = pytest.mark.parametrize("name", CASES)
@@ -136,6 +138,49 @@ def test_friction_of_a_load_brakes_a_joint_by_what_it_hands_on(tmp_path, plant):
     assert (first - last) / 0.02 == pytest.approx(a, rel=0.02)
 
 
+@each_plant
+@pytest.mark.parametrize(("share", "held"), [(0.95, True), (1.06, False)])
+def test_friction_of_a_load_is_more_at_rest(tmp_path, plant, share, held):
+    """Let go, the load stays where friction of load at rest, k + s of what is handed on, holds it: f = c + (k + s) f."""
+    servo = replace(DRY, coulomb_friction=0.03)
+    rubbing = terms(tmp_path, servo, "load_friction", coefficient=0.2, static=0.3, speed=5.0)
+    rig = make_rig(tmp_path, servo, terms=rubbing, **plant)
+    assert (moved_when_let_go(rig, share * 0.03 / (1 - 0.5)) < 1e-3) == held
+
+
+@each_plant
+@pytest.mark.parametrize(("way", "share", "held"), [(1, 0.95, True), (1, 1.05, False), (-1, 0.95, True), (-1, 1.05, False)])
+def test_a_gear_that_is_driven_backwards_holds_more_of_its_load(tmp_path, plant, way, share, held):
+    """A motor at rest turns upwards when its torque leaves the load L by c + k L, downwards, against it, by c + (k + b) L."""
+    k, b, load = 0.1, 0.3, load_at(np.pi / 2, mass=0.5)
+    servo = ServoConstants(compliance_slope=None, compliance_margin=None, punch=None, proportional_gain=0.02,
+                           viscous_friction=0.0)
+    rig = make_rig(tmp_path, servo, mass=0.5, terms=terms(tmp_path, servo, "load_friction", coefficient=k, backdrive=b), **plant)
+    torque = load + way * share * (servo.coulomb_friction + (k if way > 0 else k + b) * load)
+    balanced = np.pi / 2 + load / (servo.gain * servo.torque_at_full_duty)
+    reference = np.pi / 2 + torque / (servo.gain * servo.torque_at_full_duty)
+    rig.command(balanced)
+    rig.put(np.pi / 2, reference=balanced)
+    rig.run(0.1)
+    rig.command(reference, speed=4.0 * abs(reference - balanced))
+    rig.run(0.3)
+    there = rig.run(0.1)[0]
+    turned = rig.run(0.2)[0] - there
+    assert abs(turned) < 2e-4 if held else way * turned > 2e-3
+
+
+@each_plant
+@pytest.mark.parametrize(("side", "holds"), [(1, 0.06 * 2 * 3 / 4), (-1, 0.06 * 2 / 4)])
+@pytest.mark.parametrize(("share", "held"), [(0.9, True), (1.06, False)])
+def test_a_gear_that_turns_harder_one_way_holds_more_on_that_way(tmp_path, plant, side, holds, share, held):
+    """A load at a negative angle would turn the joint forwards."""
+    rig = make_rig(tmp_path, DRY, terms=terms(tmp_path, DRY, "friction_asymmetry", ratio=3.0), mass=0.2, **plant)
+    rig.command(0.0, enabled=False)
+    rig.put(-side * angle_of(share * holds, 0.2))
+    start = rig.run(0.25)[0]
+    assert (abs(rig.run(0.25)[0] - start) < 1e-4) == held
+
+
 def test_a_held_joint_creeps_no_faster_than_with_plain_friction(tmp_path):
     friction = terms(tmp_path, DRY, "load_friction", coefficient=0.9)
     rig = make_rig(tmp_path, DRY, mass=1.0, terms=friction)
@@ -238,6 +283,25 @@ def test_a_ceiling_holds_when_the_motor_brakes(tmp_path, plant):
     rig.put(0.0, rate=4.0, reference=-100.0)
     deceleration = 0.3 / (SMOOTH.reflected_inertia + MASS * LENGTH**2)
     assert rig.run(0.05)[1] == pytest.approx(4.0 - 0.05 * deceleration, rel=4e-3)
+
+
+@each_plant
+def test_a_saturating_motor_gives_half_at_its_torque_and_keeps_its_no_load_speed(tmp_path, plant):
+    saturating = terms(tmp_path, SMOOTH, "torque_saturation", torque=SMOOTH.torque_at_full_duty)
+    rig = make_rig(tmp_path, SMOOTH, gravity=False, terms=saturating, **plant)
+    rig.command(100.0)
+    rig.put(0.0, reference=100.0)
+    assert rig.output("motor_torque") == pytest.approx(SMOOTH.torque_at_full_duty / 2)
+    inertia, full, stall = SMOOTH.reflected_inertia + MASS * LENGTH**2, 6.18 * 11.1 / 12, SMOOTH.torque_at_full_duty
+    later = 0.05
+    speed = rig.run(later)[1]
+
+    def slope(v: float) -> float:
+        left = stall - SMOOTH.back_emf * v
+        return left / (1 + left / stall) / inertia
+
+    assert quad(lambda v: 1 / slope(v), 0.0, speed)[0] == pytest.approx(later, rel=0.02)
+    assert rig.run(1.5)[1] == pytest.approx(full, rel=1e-3)
 
 
 def test_motors_fade_from_the_first_command_on(tmp_path):

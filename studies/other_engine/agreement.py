@@ -41,8 +41,10 @@ def E(effect: str, *where: str, **parameters: float | tuple[float, float, float]
 FIXED = (
     E("backlash", "flm", gap=4.0), E("joint_compliance", "flm", stiffness=4.0), E("coulomb_friction", "flm", torque=0.12),
     E("viscous_friction", "flm", coefficient=0.1), E("stribeck_friction", "flm", torque=0.15, speed=20.0),
-    E("load_friction", "flm", coefficient=0.8), E("supply_voltage", voltage=8.5), E("supply_sag", drop=0.3),
-    E("torque_ceiling", "flm", torque=0.15), E("thermal_fade", rate=0.15), E("servo_gain", "flm", ratio=0.5),
+    E("load_friction", "flm", coefficient=0.8), E("load_friction", "flm", coefficient=0.4, static=0.9, speed=80.0, backdrive=0.9),
+    E("friction_asymmetry", "flm", ratio=4.0), E("supply_voltage", voltage=8.5), E("supply_sag", drop=0.3),
+    E("torque_ceiling", "flm", torque=0.15), E("torque_saturation", "flm", torque=0.4), E("thermal_fade", rate=0.15),
+    E("servo_gain", "flm", ratio=0.5),
     E("dead_band", "flm", margin=2.0), E("reflected_inertia", "flm", inertia=0.006),
     E("joint_stop", "flm", lower=-10.0, upper=12.0), E("zero_offset", "flm", angle=6.0),
     E("parallel_spring", "flm", stiffness=0.6),

@@ -93,8 +93,8 @@ class _Run:
         self.damping = self.servos.viscous + self.servos.back_emf
         self.friction_of = {int(d): i for i, d in enumerate(self.dof)}
         n = len(self.joints)
-        self.load, self.motor = np.zeros(n), np.zeros(n)
-        """Of the last step [N m]: what each servo handed to its link, and what its motor gave."""
+        self.load, self.motor, self.rubbed = np.zeros(n), np.zeros(n), np.zeros(n)
+        """Of the last step [N m]: what each servo handed to its link, what its motor gave, and what dry friction did."""
         # The angle of a link is the servo's and that of the hinges in series about the same axis.
         self.series = np.zeros((n, model.nq))
         for i, j in enumerate(self.joints):
@@ -133,17 +133,17 @@ class _Run:
 
     def _step(self, t: float) -> Array:
         """One step from t; returns the motors' torque at t. Back-EMF acts through the joints' damping, which is implicit, but
-        where a ceiling holds the motor's torque."""
+        where less than the motor's torque acts."""
         servos, data, model, on = self.servos, self.data, self.model, self.reference.enabled
         q, v = data.qpos[self.position], data.qvel[self.dof]
         duty = np.where(on, servos.duty(self.reference.at(t) - self.drive.sensed(q)), 0.0)
         damping, on_link = self.damping, None
         if self.drive.effects:
-            now = Instant(t, model.opt.timestep, q, v, self.series @ data.qpos, duty, self.load, self.motor)
+            now = Instant(t, model.opt.timestep, q, v, self.series @ data.qpos, duty, self.load, self.motor, self.rubbed)
             torque = duty * servos.full_torque * self.drive.strength(now)
             net = torque - np.where(on, servos.back_emf * v, 0.0)
-            held = np.abs(net) > self.drive.most
-            net = np.clip(net, -self.drive.most, self.drive.most)
+            acting = self.drive.acting(net)
+            held, net = np.abs(net) > np.abs(acting), acting
             torque = np.where(held, net, torque)
             damping = np.where(held, servos.viscous, damping)
             model.dof_frictionloss[self.dof] = self.drive.friction(now)
@@ -155,7 +155,8 @@ class _Run:
         self._pull(torque, on_link)
         mujoco.mj_step(model, data)
         if self.needs_load:
-            self.load = torque - damping * v - model.dof_armature[self.dof] * data.qacc[self.dof] + self._friction()
+            self.rubbed = self._friction()
+            self.load = torque - damping * v - model.dof_armature[self.dof] * data.qacc[self.dof] + self.rubbed
         self.motor = net
         return np.asarray(net, dtype=float)
 

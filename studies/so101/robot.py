@@ -10,7 +10,6 @@ Zero and sign of the joints are the URDF's; `zero.py` checks them against the re
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -117,4 +116,4 @@ def servo(jaw_range: float | None = None) -> ServoConstants:
 
 def servo_yaml(constants: ServoConstants) -> str:
     """servo.yaml (contract, section 4)."""
-    return yaml_text({k: v for k, v in asdict(constants).items() if v is not None})
+    return yaml_text(constants.written())

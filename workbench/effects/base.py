@@ -46,7 +46,8 @@ class Parameter:
     it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them. shapes: it
     only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it takes the place of a
     value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording goes below, as
-    every model leaves so much open."""
+    every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left out; empty: it
+    is always given."""
 
     name: str
     unit: str
@@ -58,6 +59,7 @@ class Parameter:
     shapes: bool = False
     replaces: bool = False
     resolution: float = 0.0
+    option: str = ""
 
     def typical_beside(self, neutral: float) -> float:
         """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
@@ -190,10 +192,14 @@ def scalar(spec: EffectSpec, name: str) -> float:
 
 
 def si_values(effect: Effect, spec: EffectSpec) -> dict[str, float]:
-    """Scalar parameters of a spec in SI; InputError names one that is missing, unknown, or out of range."""
+    """Scalar parameters of a spec in SI, those of options left out at their neutral value; InputError names one that is missing,
+    unknown, or out of range."""
     out: dict[str, float] = {}
     for p in effect.parameters:
         if p.name not in spec.parameters:
+            if p.option:
+                out[p.name] = (p.typical if p.shapes else 0.0) * p.si
+                continue
             raise InputError(None, f"effect '{spec.effect}': parameter '{p.name}' [{p.unit}] is missing")
         value = spec.parameters[p.name]
         if p.vector != isinstance(value, tuple):

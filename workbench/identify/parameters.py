@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
+from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 """What an effect is, and where."""
-LEAST_SIZE, OF_VECTOR = 0.3, 0.5
-"""What a move for a slope is at least a share of: of the typical size, and of its length for one of a vector's numbers."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,8 @@ class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
     speed at which friction fades) x is the number of doublings. held: by number, whether it is no matter of fitting (an axis that
-    was read off the recording). reach: how far numbers go from neutral."""
+    was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there; numbers of
+    others are none of its numbers."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -33,13 +33,16 @@ class Candidate:
     typical: tuple[float, ...]
     held: tuple[bool, ...]
     reach: float = math.inf
+    options: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
-           held: Sequence[bool] | None = None) -> Self:
-        """typical: default the effect's own."""
-        own = tuple(p.typical_beside(n) for p, n in zip(_by_number(effect), neutral))
-        return cls(effect, where, tuple(neutral), tuple(typical or own), tuple(held or (False,) * len(own)))
+           held: Sequence[bool] | None = None, options: tuple[str, ...] = ()) -> Self:
+        """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own."""
+        given = [(p, n) for p, n in zip(_by_number(effect.parameters), neutral) if p.option in ("", *options)]
+        own = tuple(p.typical_beside(n) for p, n in given)
+        return cls(effect, where, tuple(n for _, n in given), tuple(typical or own), tuple(held or (False,) * len(own)),
+                   options=options)
 
     @property
     def name(self) -> str:
@@ -60,9 +63,14 @@ class Candidate:
         return not self.effect.from_neutral
 
     @property
+    def given(self) -> list[Parameter]:
+        """The effect's parameters, but those of options that it does not have here."""
+        return [p for p in self.effect.parameters if p.option in ("", *self.options)]
+
+    @property
     def parameters(self) -> list[Parameter]:
         """The parameter behind each number; a vector has three."""
-        return _by_number(self.effect)
+        return _by_number(self.given)
 
     @property
     def size(self) -> int:
@@ -82,9 +90,9 @@ class Candidate:
     def magnitudes(self, x: Array) -> Array:
         """What each size is moved for a slope in shares of: a small number of a long vector, as how high a load sits, by as much
         as the others, else what it does drowns in what contact makes of small moves."""
-        out = np.maximum(np.abs(x), LEAST_SIZE)
+        out = np.maximum(np.abs(x), FIT.least_move)
         vector = self.of_vector
-        out[vector] = np.maximum(out[vector], OF_VECTOR * np.linalg.norm(x[vector]))
+        out[vector] = np.maximum(out[vector], FIT.vector_move * np.linalg.norm(x[vector]))
         return np.asarray(out)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
@@ -126,7 +134,7 @@ class Candidate:
     def probes(self) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
         that says where a scalar acts; one empty for an effect without numbers."""
-        scalar = any(not p.vector for p in self.effect.parameters)
+        scalar = any(not p.vector for p in self.given)
         fitted = [p for p, held in zip(self.parameters, self.held) if not held]
         shown = [i for i, p in enumerate(fitted) if not p.shapes and not (scalar and p.vector)]
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
@@ -146,7 +154,7 @@ class Candidate:
         """The effect at these sizes."""
         rest = iter(self.values(x))
         parameters: dict[str, float | tuple[float, float, float]] = {}
-        for p in self.effect.parameters:
+        for p in self.given:
             parameters[p.name] = (next(rest), next(rest), next(rest)) if p.vector else next(rest)
         return EffectSpec(self.effect.name, self.where, parameters)
 
@@ -161,9 +169,9 @@ def both_ways(middle: Array, ways: Sequence[Array]) -> list[Array]:
             *(middle + s * ways[0] + t * ways[1] for s in signs for t in signs)]
 
 
-def _by_number(effect: Effect) -> list[Parameter]:
+def _by_number(parameters: Sequence[Parameter]) -> list[Parameter]:
     """The parameter behind each number; a vector has three."""
-    return [p for p in effect.parameters for _ in range(3 if p.vector else 1)]
+    return [p for p in parameters for _ in range(3 if p.vector else 1)]
 
 
 def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]) -> RobotModel:

@@ -102,8 +102,11 @@ class Take:
             if good.sum() < 2:
                 return out
             inside = (time >= self.time[good][0]) & (time <= self.time[good][-1])
-            path = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))
-            out[inside] = path(time[inside]).as_quat(scalar_first=True)
+            if (q[good] == q[good][0]).all():  # a base that is held
+                out[inside] = q[good][0]
+            else:
+                path = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))
+                out[inside] = path(time[inside]).as_quat(scalar_first=True)
             out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
             return out
 

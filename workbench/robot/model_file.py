@@ -69,12 +69,12 @@ def save_model(model: RobotModel, path: str | Path, posterior: Posterior | None 
 def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = None,
                provenance: Mapping[str, Any] | None = None) -> str:
     """The text of a model.yaml that is to lie in `folder`: an SDF inside that is named relative to it, another absolutely."""
-    servos = {j: {k: v for k, v in asdict(model.servo(j)).items() if v is not None} for j in model.joints}
+    servos = {j: model.servo(j).written() for j in model.joints}
     alike = len({repr(s) for s in servos.values()}) == 1
     content: dict[str, Any] = {
         "format": 1,
         "robot": {"model": _description(model, folder.resolve()), "base": model.base, "rigid_bodies": dict(model.rigid_bodies),
-                  "bus_ids": dict(model.bus_ids)},
+                  "bus_ids": dict(model.bus_ids), **({"packages": dict(model.packages)} if model.packages else {})},
         "ground": {k: v for k, v in asdict(model.ground).items() if v is not None},
         "servos": next(iter(servos.values())) if alike else servos,
     }
@@ -98,7 +98,8 @@ def _effect_content(e: EffectSpec) -> dict[str, Any]:
 def _description(model: RobotModel, folder: Path) -> str:
     if model.description.startswith("package://"):
         return model.description
-    return str(model.path.relative_to(folder) if model.path.is_relative_to(folder) else model.path)
+    path = model.source.source
+    return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
 def load_model(path: str | Path) -> RobotModel:

@@ -21,7 +21,8 @@ SPEED_UNIT = 0.111 * 2 * math.pi / 60
 class ServoConstants:
     """Constants of one servo; torques N m, speeds rad/s, voltages V, margins and slopes in counts of 300/1023 deg.
 
-    Either `compliance_slope`, `compliance_margin` and `punch` (of 1023), or `proportional_gain` (duty per radian).
+    Either `compliance_slope`, `compliance_margin` and `punch` (of 1023), or `proportional_gain` (duty per radian). sd: how well
+    numbers are known, by key, in their units; of others SHARES_KNOWN counts.
     """
 
     model: str = "AX-12A"
@@ -36,6 +37,7 @@ class ServoConstants:
     compliance_margin: float | None = 1
     punch: float | None = 32
     proportional_gain: float | None = None
+    sd: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         compliance = (self.compliance_slope, self.compliance_margin, self.punch)
@@ -46,6 +48,8 @@ class ServoConstants:
             raise ValueError("proportional_gain excludes compliance_slope, compliance_margin and punch")
         for f in fields(self):
             v = getattr(self, f.name)
+            if f.name == "sd":
+                continue
             if f.name == "model":
                 if not isinstance(v, str):
                     raise ValueError("model: expected the servo's name as text")
@@ -88,6 +92,22 @@ class ServoConstants:
         """Torque lost per joint speed by the motor's back-EMF [N m s/rad]."""
         return self.stall_torque / self.no_load_speed
 
+    def share_known(self, key: str) -> float:
+        """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0."""
+        value, given = float(getattr(self, key) or 0.0), dict(self.sd)
+        if key not in given:
+            return SHARES_KNOWN.get(key, 0.0)
+        return given[key] / value if value else 0.0
+
+    def constants(self) -> dict[str, Any]:
+        """By key, None where the other position law's."""
+        return {key: getattr(self, key) for key in _KEYS}
+
+    def written(self) -> dict[str, Any]:
+        """As servo.yaml has it."""
+        known = dict(self.sd)
+        return {k: {"value": v, "sd": known[k]} if k in known else v for k, v in self.constants().items() if v is not None}
+
     def updated(self, changes: dict[str, Any]) -> ServoConstants:
         """With some keys replaced; a switch between the two position laws drops the other's keys."""
         changes = dict(changes)
@@ -96,9 +116,9 @@ class ServoConstants:
                 changes.setdefault(key, None)
         elif any(changes.get(k) is not None for k in ("compliance_slope", "compliance_margin", "punch")):
             changes.setdefault("proportional_gain", None)
-        unknown = sorted(set(changes) - {f.name for f in fields(self)})
+        unknown = sorted(set(changes) - set(_KEYS))
         if unknown:
-            raise ValueError(f"unknown key '{unknown[0]}'; known: {', '.join(f.name for f in fields(self))}")
+            raise ValueError(f"unknown key '{unknown[0]}'; known: {', '.join(_KEYS)}")
         return replace(self, **changes)
 
 
@@ -113,6 +133,11 @@ class ServoConstants:
         return tuple(out)
 
 
+SHARES_KNOWN = {"supply_voltage": 0.10, "no_load_speed": 0.10, "coulomb_friction": 0.5, "viscous_friction": 0.5,
+                "reflected_inertia": 0.15}
+"""How well a hobby servo's numbers are known where its servo.yaml does not say: supply and motor constant to what servos of one
+type differ by and a battery loses, friction to a factor of 1.6, as it changes with wear and grease."""
+_KEYS = tuple(f.name for f in fields(ServoConstants) if f.name != "sd")
 _LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
 _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
            "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
@@ -137,20 +162,34 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
     at = f"{place}: " if place else ""
     if not isinstance(content, Mapping):
         raise InputError(path, f"{at}expected a mapping of servo constants")
-    known = [f.name for f in fields(ServoConstants)]
     for key in content:
-        if key not in known:
-            raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(known))}")
+        if key not in _KEYS:
+            raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(_KEYS))}")
     missing = sorted(_REQUIRED - set(content))
     if missing:
         raise InputError(path, f"{at}key '{missing[0]}' is missing")
     empty = [key for key in content if content[key] is None]
     if empty:
         raise InputError(path, f"{at}{empty[0]}: is empty; expected a value, or no such key")
+    values, sd = dict(content), []
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            values[key], known = _value_and_sd(value, path, f"{at}{key}: ")
+            sd.append((key, known))
     try:
-        return ServoConstants(**(dict.fromkeys(_LAW) | dict(content)))
+        return ServoConstants(**(dict.fromkeys(_LAW) | values), sd=tuple(sd))
     except ValueError as e:
         raise InputError(path, f"{at}{e}") from None
+
+
+def _value_and_sd(content: Mapping[Any, Any], path: Path, at: str) -> tuple[Any, float]:
+    """A number written {value: 11.1, sd: 1.1}."""
+    if set(content) != {"value", "sd"}:
+        raise InputError(path, f"{at}expected a number, or {{value: number, sd: number}}")
+    sd = content["sd"]
+    if isinstance(sd, bool) or not isinstance(sd, (int, float)) or not (math.isfinite(sd) and sd >= 0):
+        raise InputError(path, f"{at}sd: expected a non-negative number, got {sd!r}")
+    return content["value"], float(sd)
 
 
 _REQUIRED = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",

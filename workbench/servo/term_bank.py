@@ -1,9 +1,9 @@
-"""A servo bank whose servos do more than the nominal law: a failing supply, a ceiling, friction that varies."""
+"""A servo bank whose servos do more than the nominal law: a failing supply, torque that ends early, friction that varies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from pydrake.systems.framework import BasicVector, Context, DependencyTicket, Di
 
 from workbench.servo.law import ServoLaw
 from workbench.servo.system import BRISTLE_SHARPNESS, BRISTLE_SLIP, ServoBank
-from workbench.servo.terms import Instant, ServoTerm, most_friction
+from workbench.servo.terms import Instant, ServoTerm, most_friction, wanted_friction
 
 Array = NDArray[np.float64]
 
@@ -37,13 +37,14 @@ class _Parts:
 
 
 class TermBank(ServoBank):
-    """As ServoBank, with `terms`; duty torque times their strengths, motor torque cut at their lowest ceiling, friction raised.
+    """As ServoBank, with `terms`; duty torque times their strengths, motor torque saturated and cut at their lowest ceiling,
+    friction raised.
 
     Further ports: input `net_actuation` (of the plant; needed where friction varies in a discrete plant), output
     `friction_relief` (n) N m.
 
-    Back-EMF is damping of the plant, implicit in a discrete one, so that a motor torque that is cut, or off, gets it back, at
-    the velocity to expect at the end of the step.
+    Back-EMF is damping of the plant, implicit in a discrete one, so that a motor torque that is saturated, cut, or off gets it
+    back, at the velocity to expect at the end of the step.
 
     Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank
     pushes along the motion, at rest along the motion that friction prevents, with that less the friction wanted. A held joint
@@ -66,9 +67,11 @@ class TermBank(ServoBank):
         self._most = most_friction(terms, law)
         self._varies = bool((self._most > law.coulomb).any())
         self._ceiling = np.full(len(joints), np.inf)
+        self._bend = np.zeros(len(joints))
         for term in terms:
             self._ceiling = np.minimum(self._ceiling, term.ceiling())
-        self._cuts = bool(np.isfinite(self._ceiling).any())
+            self._bend = self._bend + 1.0 / np.asarray(term.saturation())
+        self._cuts = bool(np.isfinite(self._ceiling).any() or self._bend.any())
         self._discrete = plant.time_step() > 0
         self._smoothing = period / (period + LOAD_SMOOTHING)
         self._inertia_rate = law.inertia / period
@@ -110,26 +113,32 @@ class TermBank(ServoBank):
         duty = duty if on is None else duty * on
         (last_v, _, load, held), stepped = self._remembered(context)
         begin = context.get_numeric_parameter(self._first_command).value()[0]
-        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load)
-        torque, friction = duty * law.full_torque, law.coulomb
+        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none)
+        torque = duty * law.full_torque
         for term in self.terms:
             torque = torque * term.strength(law, now)
-            friction = friction + term.friction(now)
         ahead = 2.0 * v - last_v if stepped and self._discrete else v
         push, motor = torque, torque - law.back_emf * v
         if self._cuts:
-            push = push - _beyond(torque - law.back_emf * ahead, self._ceiling)
-            motor = motor - _beyond(motor, self._ceiling)
+            push = push - self._lost(torque - law.back_emf * ahead)
+            motor = motor - self._lost(motor)
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
         if not self._varies:
             return _Parts(push, motor, law.coulomb, self._none)
-        friction = np.minimum(friction, self._most)
+        now = replace(now, motor=motor, direction=_limited(v / MOVING))
+        friction = np.minimum(wanted_friction(self.terms, law, now), self._most)
+        yielding = np.maximum(friction / 2, 1e-6)  # well below what brakes a joint that slides, so that this counts as sliding
+        now = replace(now, direction=_limited(v / MOVING - held / yielding))
+        friction = np.minimum(wanted_friction(self.terms, law, now), self._most)
         if self._bristles:
             return _Parts(push, motor, friction, self._none)
-        yielding = np.maximum(friction / 2, 1e-6)  # well below what brakes a joint that slides, so that this counts as sliding
-        direction = np.minimum(np.maximum(v / MOVING - held / yielding, -1.0), 1.0)
-        return _Parts(push, motor, friction, (self._most - friction) * direction)
+        return _Parts(push, motor, friction, (self._most - friction) * now.direction)
+
+    def _lost(self, torque: Array) -> Array:
+        """What of the motor's torque does not act, with its sign."""
+        bent = torque / (1.0 + np.abs(torque) * self._bend)
+        return np.asarray(torque - np.minimum(np.maximum(bent, -self._ceiling), self._ceiling))
 
     def _calc_force(self, context: Context, output: BasicVector) -> None:
         parts: _Parts = self._parts.Eval(context)
@@ -179,9 +188,9 @@ class TermBank(ServoBank):
         return np.asarray(np.clip(force, -level, level), dtype=float)
 
 
-def _beyond(torque: Array, ceiling: Array) -> Array:
-    """What of a torque is beyond the ceiling, with its sign."""
-    return torque - np.minimum(np.maximum(torque, -ceiling), ceiling)
+def _limited(direction: Array) -> Array:
+    """Within -1 and 1."""
+    return np.asarray(np.minimum(np.maximum(direction, -1.0), 1.0))
 
 
 def _last_actuators(plant: MultibodyPlant, joints: Sequence[RevoluteJoint]) -> NDArray[np.int_]:

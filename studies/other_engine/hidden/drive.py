@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.other_engine.hidden.values import angle, number
+from studies.other_engine.hidden.values import angle, number, optional
 from studies.other_engine.servo import ServoBank
 from workbench.robot import EffectSpec
 
@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 class Instant:
     """t [s] since the first command, step [s]; servo angles q and speeds v (n,) [rad, rad/s]; link: angles of the links
     against their parents about the servos' axes (n,); duty (n,) before anything takes from it; load (n,): torque that
-    each servo hands to its link [N m]; motor (n,): torque of the motors, each as it was a step ago."""
+    each servo hands to its link [N m]; motor (n,): torque of the motors; rubbed (n,): that of dry friction, each as it was a step
+    ago."""
 
     t: float
     step: float
@@ -29,6 +30,12 @@ class Instant:
     duty: Array
     load: Array
     motor: Array
+    rubbed: Array
+
+    @property
+    def way(self) -> Array:
+        """1 or -1: where each servo turns, or, at rest, where friction keeps it from turning."""
+        return np.where(np.abs(self.v) > 5e-3, np.sign(self.v), -np.sign(self.rubbed))
 
 
 class StepEffect:
@@ -53,9 +60,17 @@ class StepEffect:
         """Most of the motor's torque [N m]."""
         return np.inf
 
+    def saturated(self, torque: Array) -> Array:
+        """What acts of the motor's torque (n,) [N m]."""
+        return torque
+
     def friction(self, now: Instant) -> Array | float:
         """Coulomb friction beyond the constant [N m]."""
         return 0.0
+
+    def friction_ratio(self, now: Instant) -> Array | float:
+        """What all Coulomb friction is times."""
+        return 1.0
 
     def link_torque(self, now: Instant) -> Array | float:
         """On the links, past the servos [N m]."""
@@ -84,6 +99,17 @@ class TorqueCeiling(StepEffect):
         return self.most
 
 
+class TorqueSaturation(StepEffect):
+    """The motor's torque x, duty torque less back-EMF, acts as x / (1 + |x| / `torque`)."""
+
+    def __init__(self, columns: NDArray[np.int_], n: int, spec: EffectSpec, rng: np.random.Generator) -> None:
+        super().__init__(columns, n)
+        self.bend = self.here / number(spec, "torque")
+
+    def saturated(self, torque: Array) -> Array:
+        return torque / (1 + self.bend * np.abs(torque))
+
+
 class ThermalFade(StepEffect):
     """Duty torque times exp(-rate t) from the first command."""
 
@@ -107,7 +133,8 @@ class StribeckFriction(StepEffect):
 
 
 class LoadFriction(StepEffect):
-    """Coulomb friction grows by `coefficient` times what the joint hands to its link (not what the motor gives)."""
+    """Coulomb friction grows by `coefficient` times what the joint hands to its link (not what the motor gives), by `static`
+    times that more at rest, fading as exp(-(v / speed)²), by `backdrive` times more where the motor pulls against the motion."""
 
     needs_load = True
     SMOOTH = 2e-3
@@ -116,15 +143,33 @@ class LoadFriction(StepEffect):
     def __init__(self, columns: NDArray[np.int_], n: int, spec: EffectSpec, rng: np.random.Generator) -> None:
         super().__init__(columns, n)
         self.coefficient, self.load = number(spec, "coefficient"), np.zeros(n)
+        self.static, self.backdrive = optional(spec, "static"), optional(spec, "backdrive")
+        self.speed = angle(spec, "speed") if self.static else 1.0
 
     def friction(self, now: Instant) -> Array:
         self.load += (now.load - self.load) * now.step / (now.step + self.SMOOTH)
-        return self.here * self.coefficient * np.abs(self.load)
+        share = self.coefficient + self.static * np.exp(-np.square(now.v / self.speed))
+        share = share + self.backdrive * (now.way * now.motor < 0)
+        return self.here * share * np.abs(self.load)
+
+
+class FrictionAsymmetry(StepEffect):
+    """All Coulomb friction is `ratio` times as much forwards as backwards, and in the mean what it was."""
+
+    needs_load = True
+
+    def __init__(self, columns: NDArray[np.int_], n: int, spec: EffectSpec, rng: np.random.Generator) -> None:
+        super().__init__(columns, n)
+        self.share = self.here * (number(spec, "ratio") - 1) / (number(spec, "ratio") + 1)
+
+    def friction_ratio(self, now: Instant) -> Array:
+        return 1 + self.share * now.way
 
 
 STEP: dict[str, Callable[[NDArray[np.int_], int, EffectSpec, np.random.Generator], StepEffect]] = {
     "supply_sag": SupplySag, "torque_ceiling": TorqueCeiling, "thermal_fade": ThermalFade,
-    "stribeck_friction": StribeckFriction, "load_friction": LoadFriction,
+    "stribeck_friction": StribeckFriction, "load_friction": LoadFriction, "torque_saturation": TorqueSaturation,
+    "friction_asymmetry": FrictionAsymmetry,
 }
 
 
@@ -168,9 +213,15 @@ class Drive:
         for e in self.effects:
             self.most = np.minimum(self.most, e.ceiling())
 
+    def acting(self, torque: Array) -> Array:
+        """What acts of the motors' torque (n,) [N m]."""
+        for e in self.effects:
+            torque = e.saturated(torque)
+        return np.clip(torque, -self.most, self.most)
+
     @property
     def needs_load(self) -> bool:
-        """Whether `Instant.load` is read."""
+        """Whether `Instant.load` and `Instant.rubbed` are read."""
         return any(e.needs_load for e in self.effects)
 
     def sensed(self, q: Array) -> Array:
@@ -188,10 +239,11 @@ class Drive:
 
     def friction(self, now: Instant) -> Array:
         """Coulomb friction of each servo [N m]."""
-        total = self.servos.coulomb.copy()
+        total, ratio = self.servos.coulomb.copy(), np.ones_like(self.servos.coulomb)
         for e in self.effects:
             total += e.friction(now)
-        return total
+            ratio *= e.friction_ratio(now)
+        return total * ratio
 
     def link_torque(self, now: Instant) -> Array:
         """On the links, past the servos [N m]."""

@@ -18,6 +18,11 @@ def number(spec: EffectSpec, name: str) -> float:
     return float(value)
 
 
+def optional(spec: EffectSpec, name: str) -> float:
+    """A number that may be left out, and is 0 then."""
+    return number(spec, name) if name in spec.parameters else 0.0
+
+
 def angle(spec: EffectSpec, name: str) -> float:
     """A parameter in degrees [rad]."""
     return float(np.deg2rad(number(spec, name)))

@@ -17,7 +17,11 @@ ROUNDING = 1e-9
 
 def whole_steps(config: SimulationConfig, seconds: float) -> float:
     """The log's instant that is nearest [s]."""
-    return round(seconds / config.logged_every) * config.logged_every
+    return _whole(config.logged_every, seconds)
+
+
+def _whole(every: float, seconds: float) -> float:
+    return round(seconds / every) * every
 
 
 def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float, duration: float, elapsed: float,
@@ -25,25 +29,34 @@ def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float
     """lead: in whole steps of the log. commands: as the servos get them, columns in the model's order.
 
     What comes at or after the end does not come; of two things at one instant the later stays, as in `Simulation`."""
-    dt = config.time_step
-    end = _on_grid(config, lead + duration)
-    sent = {} if commands is None else {_on_grid(config, lead + t): k for k, t in enumerate(commands.times.tolist())}
-    sent = {t: k for t, k in sorted(sent.items()) if t < end}
-    puts = {} if steadied is None else {whole_steps(config, lead + t): k for k, t in enumerate(steadied.times.tolist())}
+    dt, every = config.time_step, config.logged_every
+    end = _on_grid(every, lead + duration)
+    at, which = _sent(every, np.zeros(0) if commands is None else lead + commands.times, end)
+    puts = {} if steadied is None else {_whole(every, lead + t): k for k, t in enumerate(steadied.times.tolist())}
     puts = {t: k for t, k in sorted(puts.items()) if t < end}
-    steps = np.array([math.ceil(t / dt - 1e-6) for t in sent], dtype=np.int64)
-    late = np.array([dt * math.ceil(t / dt - 1e-6) - t for t in sent])
-    which, put = list(sent.values()), list(puts.values())
+    steps = np.ceil(at / dt - 1e-6).astype(np.int64)
+    late = dt * steps - at
+    put = list(puts.values())
     n = 0 if commands is None else len(commands.joints)
     empty = np.zeros((0, n))
     return Schedule(
-        dt=dt, steps=math.ceil(end / dt - 1e-6), log_every=max(1, round(config.logged_every / dt)), begin=lead - elapsed,
+        dt=dt, steps=math.ceil(end / dt - 1e-6), log_every=max(1, round(every / dt)), begin=lead - elapsed,
         command_step=steps, late=np.where(late > ROUNDING, late, 0.0),
         goal=empty if commands is None else np.ascontiguousarray(commands.goals[which], dtype=float),
         speed=empty if commands is None else np.ascontiguousarray(commands.speeds[which], dtype=float),
         on=empty.astype(bool) if commands is None else np.ascontiguousarray(commands.enabled[which], dtype=bool),
         put_step=np.array([round(t / dt) for t in puts], dtype=np.int64),
         put_quat=_rows(steadied, "quat", put, 4), put_v=_rows(steadied, "v", put, 3), put_w=_rows(steadied, "w", put, 3))
+
+
+def _sent(every: float, times: np.ndarray, end: float) -> tuple[np.ndarray, np.ndarray]:
+    """Instants of commands before the end, in order, and which comes there: of several the last."""
+    nearest = np.round(times / every) * every
+    at = np.where(np.abs(nearest - times) < ROUNDING, nearest, times)
+    order = np.argsort(at, kind="stable")
+    last = np.append(np.diff(at[order]) > 0.0, True)[:len(order)]
+    kept = order[last & (at[order] < end)]
+    return at[kept], kept
 
 
 def settling(config: SimulationConfig, servos: int) -> Schedule:
@@ -55,11 +68,11 @@ def settling(config: SimulationConfig, servos: int) -> Schedule:
 
 def rows_of(config: SimulationConfig, end: float) -> int:
     """Rows of the log from 0 to the end."""
-    return math.floor(_on_grid(config, end) / config.logged_every + 1e-6) + 1
+    return math.floor(_on_grid(config.logged_every, end) / config.logged_every + 1e-6) + 1
 
 
-def _on_grid(config: SimulationConfig, t: float) -> float:
-    nearest = whole_steps(config, t)
+def _on_grid(every: float, t: float) -> float:
+    nearest = _whole(every, t)
     return nearest if abs(nearest - t) < ROUNDING else t
 
 

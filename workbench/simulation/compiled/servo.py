@@ -94,24 +94,43 @@ def _push_with_terms(servos: Servos, elapsed: float, free: int, state: State, w:
         ahead = 2.0 * v - state.memory[0, i] if state.stepped[0] > 0.0 else v
         if state.on[i]:
             free_end, now = torque - servos.back_emf[i] * ahead, torque - servos.back_emf[i] * v
-            most = servos.ceiling[i]
-            w.push[i] = torque - (free_end - clamp(free_end, -most, most))
-            w.motor[i] = clamp(now, -most, most)
+            w.push[i] = torque - (free_end - _acting(servos, i, free_end))
+            w.motor[i] = _acting(servos, i, now)
         else:
             w.push[i], w.motor[i] = servos.back_emf[i] * ahead, 0.0
-        w.relief[i] = _relief(servos, i, v, state) if servos.varies else 0.0
+        w.relief[i] = _relief(servos, i, v, w.motor[i], state) if servos.varies else 0.0
 
 
 @part
-def _relief(servos: Servos, i: int, v: float, state: State) -> float:
+def _acting(servos: Servos, i: int, torque: float) -> float:
+    """What of a motor's torque acts."""
+    return clamp(torque / (1.0 + abs(torque) * servos.bend[i]), -servos.ceiling[i], servos.ceiling[i])
+
+
+@part
+def _relief(servos: Servos, i: int, v: float, motor: float, state: State) -> float:
     """What is taken off the plant's friction, along the motion."""
-    friction = servos.coulomb[i] + servos.rubbing[i] * abs(state.memory[2, i])
+    friction = _friction(servos, i, v, motor, state, clamp(v / _MOVING, -1.0, 1.0))
+    direction = clamp(v / _MOVING - state.memory[3, i] / max(0.5 * friction, 1e-6), -1.0, 1.0)
+    return (servos.most[i] - _friction(servos, i, v, motor, state, direction)) * direction
+
+
+@part
+def _friction(servos: Servos, i: int, v: float, motor: float, state: State, direction: float) -> float:
+    """The dry friction wanted of a joint that turns, or would, in this direction."""
+    share = servos.rubbing[i]
+    for c in range(servos.still_speed.shape[0]):
+        if servos.still[c, i] > 0.0:
+            share += servos.still[c, i] * math.exp(-((v / servos.still_speed[c]) ** 2))
+    if servos.backwards[i] > 0.0 and motor != 0.0:
+        share += servos.backwards[i] * max(-math.copysign(1.0, motor) * direction, 0.0)
+    friction = servos.coulomb[i] + share * abs(state.memory[2, i])
     for b in range(servos.speed.shape[0]):
         if servos.sticking[b, i] > 0.0:
             friction += servos.sticking[b, i] * math.exp(-((v / servos.speed[b]) ** 2))
-    friction = min(friction, servos.most[i])
-    yielding = max(0.5 * friction, 1e-6)
-    return (servos.most[i] - friction) * clamp(v / _MOVING - state.memory[3, i] / yielding, -1.0, 1.0)
+    for d in range(servos.lopsided.shape[0]):
+        friction *= 1.0 + servos.lopsided[d, i] * direction
+    return min(friction, servos.most[i])
 
 
 @part

@@ -1,0 +1,57 @@
+"""A gear that turns harder one way than the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.robot import EffectSpec, RobotModel
+from workbench.servo import Instant, ServoTerm, TermNumbers
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Asymmetric(ServoTerm):
+    """share: (n,) by which friction is more forwards, and less backwards."""
+
+    share: Array
+
+    def friction_ratio(self, now: Instant) -> Array:
+        return np.asarray(1.0 + self.share * now.direction)
+
+    def most_friction_ratio(self) -> Array:
+        return np.asarray(1.0 + np.abs(self.share))
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(lopsided=self.share)
+
+
+class FrictionAsymmetry(Effect):
+    """A gear that turns harder one way than the other: all dry friction, whatever it depends on, is `ratio` times as much to
+    positive angles as to negative ones, the mean of both as it was."""
+
+    name = "friction_asymmetry"
+    layer = "actuator"
+    places = ("joint",)
+    family = "friction"
+    parameters = (Parameter("ratio", "", 0.1, 10.0, 1.3),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        ratio = scalar(spec, "ratio")
+        way, more = ("positive", ratio) if ratio >= 1 else ("negative", 1 / ratio)
+        return f"{', '.join(spec.where)} turns harder to {way} angles: {more:.2f} times the dry friction of the other way."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0,)
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        ratio = values["ratio"]
+        return _Asymmetric(here.astype(float) * (ratio - 1.0) / (ratio + 1.0))
+
+
+EFFECT = FrictionAsymmetry()

@@ -1,0 +1,53 @@
+"""A motor whose torque grows less and less with its duty: an H-bridge's drop, a magnetic circuit, a weak driver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect, Parameter, scalar
+from workbench.robot import EffectSpec, RobotModel
+from workbench.servo import ServoTerm, TermNumbers
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Saturating(ServoTerm):
+    """torque: (n,) [N m]."""
+
+    torque: Array
+
+    def saturation(self) -> Array:
+        return self.torque
+
+    def numbers(self) -> TermNumbers:
+        return TermNumbers(bend=1.0 / self.torque)
+
+
+class TorqueSaturation(Effect):
+    """A motor whose torque x, duty torque less back-EMF, acts as x / (1 + |x|/torque): nearly all of it while small, half of it
+    at `torque`, never more than that. Smooth, unlike a ceiling."""
+
+    name = "torque_saturation"
+    layer = "actuator"
+    places = ("joint",)
+    family = "electrical"
+    under_load = True
+    parameters = (Parameter("torque", "N m", 0.02, 100.0, 1.0),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"The motor of {', '.join(spec.where)} saturates: of {scalar(spec, 'torque'):.2f} N m half arrives."
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (math.inf,)
+
+    def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
+        return _Saturating(np.where(here, values["torque"], np.inf))
+
+
+EFFECT = TorqueSaturation()

@@ -1,0 +1,108 @@
+"""A hypothesis fitted, with its evidence; fits ask for rollouts as generators, so that many share one batch."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.region import Region
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+Asks = Generator[list[Hypothesis], list[Array], T]
+"""Yields hypotheses to be rolled out, is sent the residuals (n,) [rad] that each leaves."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """r (n,): what it leaves [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of which
+    effects there are."""
+
+    hypothesis: Hypothesis
+    r: Array = field(repr=False)
+    J: Array = field(repr=False)
+    discrepancy: float
+    log_evidence: float
+    log_prior: float
+
+    @property
+    def log_posterior(self) -> float:
+        """But for a constant [nats]."""
+        return self.log_evidence + self.log_prior
+
+    def covariance(self, region: Region, options: EvidenceOptions) -> Array:
+        """Of theta (k, k)."""
+        h, likelihood = self.hypothesis, region.likelihood
+        H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
+        return np.asarray(np.linalg.inv(H + np.diag(Prior.of(h, options).precision(h.theta))))
+
+
+def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array) -> Fitted:
+    """A hypothesis with its evidence, where it stands."""
+    prior = Prior.of(h, options)
+    log, s = region.likelihood.evidence(r, J, prior.log(h.theta), prior.precision(h.theta))
+    parts = len(h.effects) + sum(len(c.options) for c in h.effects)
+    return Fitted(h, r, J, s, log, parts * log_odds(len(region.candidates), options.expected))
+
+
+def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
+            J: Array | None = None) -> Asks[Fitted]:
+    """Fits a hypothesis from where it stands, at a discrepancy s. r, J: what it leaves there and how that answers to theta, where
+    known; else they are asked."""
+    prior, seen = Prior.of(start, options), {}
+    low, high = start.bounds()
+    start = start.at(np.clip(start.theta, low, high))
+    if r is None:
+        (r,) = yield [start]
+    seen[start.theta.tobytes()] = r
+
+    def rows(h: Hypothesis, left: Array) -> Array:
+        seen[h.theta.tobytes()] = left
+        return np.concatenate([region.likelihood.rows(left, s), prior.rows(h.theta)])
+
+    first = rows(start, r)
+    since = [] if J is None else [Solved(start.theta, first, np.vstack([region.likelihood.slope(r, s)[:, None] * J,
+                                                                         _prior_slopes(prior, start.theta)]))]
+    fit = fit_blocks([start.theta], [first], [(low, high)], iterations, options.stride, since, np.ones(len(start.theta)))
+    try:
+        points = next(fit)
+        while True:
+            hypotheses = [start.at(p[0]) for p in points]
+            answers = yield hypotheses
+            points = fit.send([[rows(h, left)] for h, left in zip(hypotheses, answers)])
+    except StopIteration as end:
+        (solved,) = end.value
+    there = start.at(solved.x)
+    left = seen[there.theta.tobytes()]
+    J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
+    return judged(region, options, there, left, J_there)
+
+
+def polished(region: Region, options: EvidenceOptions, f: Fitted, iterations: int) -> Asks[Fitted]:
+    """A fit gone on with at its own discrepancy, with slopes measured anew."""
+    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, iterations, f.r))
+
+
+def renewed(region: Region, options: EvidenceOptions, f: Fitted, r: Array) -> Fitted:
+    """A fit judged anew where it stands, by residuals that changed as other regions did, or by another correlation time."""
+    return judged(region, options, f.hypothesis, r, f.J)
+
+
+def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
+    """A fit's hypothesis without some effects, and its slopes without theirs."""
+    keep = list(range(len(f.hypothesis.numbers)))
+    for c, s in zip(f.hypothesis.effects, f.hypothesis.slices()):
+        keep += [] if gone(c) else list(range(s.start, s.stop))  # type: ignore[operator]
+    return f.hypothesis.without(gone), f.J[:, keep]
+
+
+def _prior_slopes(prior: Prior, theta: Array) -> Array:
+    step = 1e-4
+    return np.diag((prior.rows(theta + step) - prior.rows(theta - step)) / (2 * step))

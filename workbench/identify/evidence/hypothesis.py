@@ -1,0 +1,130 @@
+"""A hypothesis about one region: its numbers that may be recalibrated, the effects there, and what is believed before any data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.nuisance import Uncertain
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.parameters import Candidate
+from workbench.robot import EffectSpec
+
+Array = NDArray[np.float64]
+FAR = 6.0
+"""Standard deviations that a recalibrated number may go: beyond, the nominal model is of another servo."""
+Term = tuple[str, tuple[str, ...], tuple[str, ...]]
+"""An effect's name, where it acts, and its options."""
+
+
+def term_of(c: Candidate) -> Term:
+    """What a candidate is."""
+    return (c.name, c.where, c.options)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the effects'
+    sizes (`Candidate`)."""
+
+    numbers: tuple[Uncertain, ...]
+    effects: tuple[Candidate, ...]
+    theta: Array = field(repr=False)
+
+    @property
+    def key(self) -> frozenset[Term]:
+        """Which effects there are, whatever their sizes."""
+        return frozenset(term_of(c) for c in self.effects)
+
+    @property
+    def z(self) -> Array:
+        """Of the recalibrated numbers."""
+        return self.theta[:len(self.numbers)]
+
+    def slices(self) -> list[slice]:
+        """Of theta, for each effect."""
+        ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def sizes(self) -> list[tuple[Candidate, Array]]:
+        """Each effect with its sizes."""
+        return [(c, self.theta[s]) for c, s in zip(self.effects, self.slices())]
+
+    def specs(self) -> list[EffectSpec]:
+        """The effects, as a model has them."""
+        return [c.spec(x) for c, x in self.sizes()]
+
+    def at(self, theta: Array) -> Hypothesis:
+        """The same with other numbers."""
+        return replace(self, theta=np.asarray(theta, dtype=float))
+
+    def with_effect(self, c: Candidate, x: Array) -> Hypothesis:
+        """With one effect more; in the place of the same one with other options."""
+        bare = self.without(lambda other: (other.name, other.where) == (c.name, c.where))
+        return replace(bare, effects=(*bare.effects, c), theta=np.concatenate([bare.theta, x]))
+
+    def without(self, gone: object) -> Hypothesis:
+        """Without the effects for which `gone` (a function of a Candidate) holds."""
+        keep = [(c, x) for c, x in self.sizes() if not gone(c)]  # type: ignore[operator]
+        return replace(self, effects=tuple(c for c, _ in keep), theta=np.concatenate([self.z, *(x for _, x in keep)]))
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Of theta."""
+        n = len(self.numbers)
+        ends = [(np.full(n, -FAR), np.full(n, FAR)), *(c.bounds() for c in self.effects)]
+        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Cauchy of sizes, half of it where they have one sign.
+    center (k,), scale (k,); normal, one_sided (k,)."""
+
+    center: Array
+    scale: Array
+    normal: NDArray[np.bool_]
+    one_sided: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
+        n = len(h.numbers)
+        center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
+        for c in h.effects:
+            low, high = c.bounds()
+            shapes = c.shapes
+            center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
+            scale.append(np.where(shapes, options.doublings, 1.0 if c.read_off else options.width))
+            normal.append(shapes)
+            one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
+        return cls(*(np.concatenate(x) for x in (center, scale, normal, one_sided)))
+
+    def rows(self, theta: Array) -> Array:
+        """Numbers of which half the squares are the log prior but for a constant."""
+        z = (theta - self.center) / self.scale
+        return np.asarray(np.where(self.normal, z, np.copysign(np.sqrt(2 * np.log1p(z * z)), z)))
+
+    def log(self, theta: Array) -> float:
+        """Log density [nats]."""
+        z = (theta - self.center) / self.scale
+        cauchy = -np.log(np.pi) - np.log1p(z * z) + np.log(2.0) * self.one_sided
+        return float(np.sum(np.where(self.normal, -0.5 * z * z - 0.5 * np.log(2 * np.pi), cauchy) - np.log(self.scale)))
+
+    def precision(self, theta: Array) -> Array:
+        """How sharply it tells each number (k,), as reweighted least squares have it."""
+        z = (theta - self.center) / self.scale
+        return np.asarray(np.where(self.normal, 1.0, 2.0 / (1 + z * z)) / np.square(self.scale))
+
+
+def log_odds(names: int, expected: float) -> float:
+    """By which each effect more is less likely before any data, of so many names, of which `expected` are thought to be there."""
+    share = min(0.5, expected / max(names, 1))
+    return float(np.log(share / (1 - share)))
+
+
+def start(numbers: Sequence[Uncertain]) -> Hypothesis:
+    """The nominal law as it stands."""
+    return Hypothesis(tuple(numbers), (), np.zeros(len(numbers)))

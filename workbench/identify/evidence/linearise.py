@@ -1,0 +1,184 @@
+"""What each effect more would do around a fit, and the evidence that this foretells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.fit import Asks, Fitted, judged
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.region import Region
+from workbench.identify.parameters import Candidate
+
+Array = NDArray[np.float64]
+AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
+"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows nothing
+until it is met."""
+SHAPES = (0.0, 2.0, -2.0)
+"""Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
+"""Shares of the way between two sizes that were seen, and beyond the last and to the other side, at which lines are read."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """A hypothesis that a fit could go on to. r: what it is foretold to leave; J: its slopes; gain [nats]: of log posterior."""
+
+    hypothesis: Hypothesis
+    r: Array
+    J: Array
+    gain: float
+    added: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Probe:
+    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that leaves."""
+
+    candidate: Candidate
+    x: Array
+    moved: int
+    r: Array
+
+
+def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
+    """Effects that the hypothesis lacks, and its own with one option more."""
+    there = {(c.name, c.where) for c in h.effects}
+    out = [c for c in region.candidates if (c.name, c.where) not in there]
+    for c in h.effects:
+        more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
+        whole = tuple(p.typical if p.shapes else 0.0 for p in c.effect.parameters)
+        out += [Candidate.of(c.effect, c.where, whole, options=(*c.options, name)) for name in more]
+    return out
+
+
+def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
+    """Every extension at some sizes, and what it foretells at its best one; the best first."""
+    asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in _points(c, f.hypothesis)]
+    left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
+    ways: dict[object, list[_Probe]] = {}
+    for (c, x, k), r in zip(asked, left):
+        shape = tuple(np.delete(x, k).round(6)) if k >= 0 else ()
+        ways.setdefault((c.name, c.where, c.options, k, shape), []).append(_Probe(c, x, k, r))
+    moves = [_foretold(region, options, f, probe.candidate, probe.moved, x, r)
+             for along in ways.values() for probe in along[:1] for x, r in _on_lines(f, along)]
+    return best_of_each(moves)
+
+
+def best_of_each(moves: Sequence[Move]) -> list[Move]:
+    """The best move to each set of effects, the best first."""
+    out: dict[object, Move] = {}
+    for m in sorted(moves, key=lambda m: -m.gain):
+        out.setdefault(m.hypothesis.key, m)
+    return list(out.values())
+
+
+def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequence[Move]) -> list[Move]:
+    """Two of the best moves at once, foretold by what each does alone."""
+    out = []
+    there = {(c.name, c.where) for c in f.hypothesis.effects}
+    alone = [m for m in moves[:options.paired] if (m.added[0].name, m.added[0].where) not in there]
+    for a, b in combinations(alone, 2):
+        (two,) = b.added
+        h = a.hypothesis.with_effect(two, b.hypothesis.theta[len(b.hypothesis.theta) - two.size:])
+        J = np.column_stack([a.J, b.J[:, b.J.shape[1] - two.size:]])
+        led = np.arange(len(h.theta)) < len(f.hypothesis.theta)
+        back = a.J[:, :len(f.hypothesis.theta)] @ (b.hypothesis.theta - a.hypothesis.theta)[:len(f.hypothesis.theta)]
+        r = a.r + (b.r - f.r) - back  # b as it is with the other numbers where a has them
+        out.append(_led(region, options, f, h, r, J, led, (*a.added, two)))
+    return out
+
+
+def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
+    """The fit's slopes in the order of another hypothesis' numbers, 0 of those that it lacks, and which it has."""
+    n = len(h.numbers)
+    J, known = np.zeros((len(f.r), len(h.theta))), np.zeros(len(h.theta), dtype=bool)
+    J[:, :n], known[:n] = f.J[:, :n], True
+    own = {(c.name, c.where): s for c, s in zip(f.hypothesis.effects, f.hypothesis.slices())}
+    for c, s in zip(h.effects, h.slices()):
+        if (c.name, c.where) in own:
+            was = own[c.name, c.where]
+            m = min(was.stop - was.start, s.stop - s.start)  # numbers of options come after those that are always given
+            J[:, s.start:s.start + m] = f.J[:, was.start:was.start + m]
+            known[s.start:s.start + m] = True
+    return J, known
+
+
+def _points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
+    """Sizes at which a candidate is looked at, and which number is moved there."""
+    low, high = c.bounds()
+    if c.read_off or not c.size:
+        return [(np.ones(c.size), -1)]
+    if len({p.vector for p in c.given}) > 1:  # a load: its probes are where it may hang
+        return [(np.clip(p, low, high), -1) for p in c.probes()]
+    own = next((x for other, x in h.sizes() if (other.name, other.where) == (c.name, c.where)), np.empty(0))
+    start = np.concatenate([own, np.zeros(c.size - len(own))])
+    new = np.arange(c.size) >= len(own)
+    shapes = SHAPES if (c.shapes & new).any() else (0.0,)
+    amounts = ENDLESS if any(np.isinf(n) for n in c.neutral) else AMOUNTS
+    out: list[tuple[Array, int]] = []
+    for k, d, amount in product(np.flatnonzero(new & ~c.shapes), shapes, amounts):
+        x = start + d * (c.shapes & new)
+        x[k] = amount
+        x = np.clip(x, low, high)
+        if not any(np.allclose(x, other) for other, _ in out):
+            out.append((x, int(k)))
+    return out
+
+
+def _on_lines(f: Fitted, along: Sequence[_Probe]) -> list[tuple[Array, Array]]:
+    """Sizes along one way of a candidate and what each is foretold to leave: by lines between those that were seen, none of it
+    being the first, and drawn out beyond the last and to the other side."""
+    k = along[0].moved
+    if k < 0:
+        return [(p.x, p.r) for p in along]
+    low, high = along[0].candidate.bounds()
+    seen = sorted(along, key=lambda p: abs(p.x[k]))
+    knots = [(0.0, f.r), *((float(p.x[k]), p.r) for p in seen)]
+    read = [*knots[1:]]
+    for (a, ra), (b, rb) in pairwise(knots):
+        read += [(a + share * (b - a), ra + share * (rb - ra)) for share in BETWEEN]
+    (a, ra), (b, rb) = knots[-2:]
+    read += [(b + share * (b - a), rb + share * (rb - ra)) for share in BEYOND]
+    read += [(-share * knots[1][0], f.r - share * (knots[1][1] - f.r)) for share in (*BETWEEN, *BEYOND)]
+    out = []
+    for amount, r in read:
+        if low[k] <= amount <= high[k]:
+            x = seen[0].x.copy()
+            x[k] = amount
+            out.append((x, r))
+    return out
+
+
+def _foretold(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> Move:
+    """A candidate at sizes x that leave r."""
+    h = f.hypothesis.with_effect(c, x)
+    J, led = slopes_for(f, h)
+    if c.size:
+        own = h.slices()[-1]
+        moved = k if k >= 0 else 0
+        J[:, own.start + moved] = (r - f.r) / (x[moved] if abs(x[moved]) > 1e-6 else 1.0)
+        led[own] = False
+    return _led(region, options, f, h, r, J, led, (c,))
+
+
+def _led(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_],
+         added: tuple[Candidate, ...]) -> Move:
+    """A move with the numbers that the fit had led after it on lines."""
+    prior = Prior.of(h, options)
+    precision = region.likelihood.precision(r, f.discrepancy)
+    theta, left = h.theta.copy(), r
+    if led.any():
+        G, P = J[:, led], prior.precision(theta)[led]
+        pull = P * (theta - prior.center)[led]
+        step = -np.linalg.solve((G.T * precision) @ G + np.diag(P), G.T @ (precision * r) + pull)
+        low, high = h.bounds()
+        theta[led] = np.clip(theta[led] + step, low[led], high[led])
+        left = r + G @ (theta - h.theta)[led]
+    then = judged(region, options, h.at(theta), left, J)
+    return Move(then.hypothesis, left, J, then.log_posterior - f.log_posterior, added)

@@ -1,0 +1,98 @@
+"""The nominal law as nuisance: how well its numbers are known, and the robot with them recalibrated within that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from workbench.robot import EffectSpec, RobotModel, ServoConstants
+
+ZERO = "zero"
+ZERO_SD = math.radians(1.15)
+"""Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on it by
+eye."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations make
+    it nominal · exp(sd z), and a zero of sd z."""
+
+    joint: str
+    name: str
+    sd: float
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.joint})"
+
+
+@dataclass(frozen=True)
+class Recalibrated:
+    """What a number became: nominal and fitted values, in `unit`; sigmas: standard deviations of what was known that it went."""
+
+    number: Uncertain
+    nominal: float
+    value: float
+    sigmas: float
+    unit: str
+
+    def to_json(self) -> dict[str, object]:
+        return {"number": self.number.name, "where": [self.number.joint], "nominal": self.nominal, "value": self.value,
+                "sd": self.number.sd * (self.nominal or 1.0), "sigmas": self.sigmas, "unit": self.unit}
+
+
+UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
+         "reflected_inertia": "kg m^2", ZERO: "rad"}
+"""The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells apart."""
+
+
+def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncertain]:
+    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log tells
+    a zero."""
+    servo = model.servo(joint)
+    shares = {
+        "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),
+        "back_emf": servo.share_known("no_load_speed"), "coulomb_friction": servo.share_known("coulomb_friction"),
+        "viscous_friction": servo.share_known("viscous_friction"), "reflected_inertia": servo.share_known("reflected_inertia")}
+    out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and _nominal(servo, name) > 0]
+    return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
+
+
+def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
+    """The robot with numbers z standard deviations from nominal; a zero becomes an effect `zero_offset`."""
+    servos = {j: model.servo(j) for j in model.joints}
+    zeros: list[EffectSpec] = []
+    for number, by in z.items():
+        if number.name == ZERO:
+            zeros += [EffectSpec("zero_offset", (number.joint,), {"angle": math.degrees(number.sd * by)})] if by else []
+        else:
+            servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
+    return replace(model, servos=servos, effects=(*model.effects, *zeros))
+
+
+def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
+    """Nominal and recalibrated values, those that went furthest first."""
+    out = []
+    for number, by in z.items():
+        nominal = 0.0 if number.name == ZERO else _nominal(model.servo(number.joint), number.name)
+        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
+        out.append(Recalibrated(number, nominal, value, float(by), UNITS[number.name]))
+    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
+
+
+def _nominal(servo: ServoConstants, name: str) -> float:
+    return float(getattr(servo, name))
+
+
+def _scaled(servo: ServoConstants, name: str, by: float) -> ServoConstants:
+    if name == "torque_at_full_duty":  # the back-EMF stays
+        return replace(servo, stall_torque=servo.stall_torque * by, no_load_speed=servo.no_load_speed * by)
+    if name == "back_emf":
+        return replace(servo, no_load_speed=servo.no_load_speed / by)
+    return replace(servo, **{name: getattr(servo, name) * by})  # type: ignore[arg-type]
+
+
+def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:
+    """Standard deviations by number."""
+    return dict(zip(numbers, map(float, z), strict=True))

@@ -1,0 +1,151 @@
+"""A region: what is judged together, with what could be wrong there; and its rollouts, several regions' at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.hypothesis import Hypothesis
+from workbench.identify.evidence.likelihood import Likelihood, correlation_time
+from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.parameters import Candidate
+from workbench.identify.problem import TakeEvidence
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Wants = tuple[int, Hypothesis]
+"""A region, by its index, and what it wants rolled out."""
+SPAN = 0.02
+"""Between the frames that are looked at [s]: neighbours closer than that tell the same."""
+LOST = 1.0
+"""Residual that stands for a rollout that went astray [rad]."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording; scale
+    (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
+
+    take: int
+    rows: Mask
+    columns: NDArray[np.int_]
+    seen: Mask
+    scale: Array
+    every: int
+    span: float
+
+    @property
+    def size(self) -> int:
+        """How many residuals there are."""
+        return int(self.seen.sum())
+
+    def residuals(self, of_take: Array) -> Array:
+        """(n,) [rad]; of_take (N, channels): over sigma."""
+        return np.asarray((of_take[self.rows][:, self.columns] * self.scale)[self.seen])
+
+    def series(self, r: Array) -> list[Array]:
+        """By channel at even times, NaN where unseen; r (n,)."""
+        values = np.full(self.seen.shape, np.nan)
+        values[self.seen] = r
+        whole = np.full((len(self.rows), values.shape[1]), np.nan)
+        whole[self.rows] = values
+        return list(whole[::self.every].T)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Joints that are judged together. numbers: of the nominal law; candidates: effects that could act there."""
+
+    joints: tuple[str, ...]
+    parts: tuple[Part, ...]
+    numbers: tuple[Uncertain, ...]
+    candidates: tuple[Candidate, ...]
+    likelihood: Likelihood
+
+    def vector(self, residuals: Mapping[int, Array]) -> Array:
+        """Residuals (n,) [rad] of the frames that count; residuals: over sigma, by take."""
+        r = np.concatenate([p.residuals(residuals[p.take]) for p in self.parts])
+        return np.clip(np.nan_to_num(r, nan=LOST), -LOST, LOST)
+
+    @property
+    def takes(self) -> NDArray[np.int_]:
+        """Of which take each residual of `vector` is (n,)."""
+        return np.concatenate([np.full(p.size, p.take) for p in self.parts])
+
+    def measured(self, r: Array, options: EvidenceOptions) -> Region:
+        """The region with the correlation time that residuals (n,) show; the largest are cut, as an event is none of it."""
+        series, at = [], 0
+        most = 4 * float(np.median(np.abs(r))) + 1e-12
+        for p in self.parts:
+            series += [(x, p.span) for x in p.series(np.clip(r[at:at + p.size], -most, most))]
+            at += p.size
+        return replace(self, likelihood=replace(self.likelihood, tau=correlation_time(series, options.window)))
+
+    def of_takes(self, takes: Sequence[int]) -> Region:
+        """The same judged by some takes alone."""
+        mine = np.isin(self.takes, takes)
+        likelihood = replace(self.likelihood, known=self.likelihood.known[mine], span=self.likelihood.span[mine])
+        return replace(self, parts=tuple(p for p in self.parts if p.take in takes), likelihood=likelihood)
+
+
+def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: Sequence[Uncertain],
+              candidates: Sequence[Candidate], options: EvidenceOptions) -> Region:
+    """Some joints on all takes that are not for validation, frames at most every SPAN."""
+    parts, known, spans = [], [], []
+    for i, e in enumerate(evidence):
+        columns = np.array([k for k, c in enumerate(e.channels) if c in joints], dtype=int)
+        every = max(1, round(SPAN / e.frame_time))
+        rows = (e.uses["fit"] | e.uses["choose"]) & (np.arange(len(e.since)) % every == 0)
+        if not len(columns) or not rows.any():
+            continue
+        seen = np.isfinite(e.recorded[rows][:, columns])
+        scale = np.broadcast_to(e.sigma * e.rough, e.recorded.shape)[rows][:, columns]
+        parts.append(Part(i, rows, columns, seen, scale, every, every * e.frame_time))
+        known.append(scale[seen])
+        spans.append(np.full(int(seen.sum()), parts[-1].span))
+    span = np.concatenate(spans)
+    between = (options.least_discrepancy, options.most_discrepancy)
+    likelihood = Likelihood(np.concatenate(known), span, float(np.median(span)) / 2, options.tails, between)
+    return Region(tuple(joints), tuple(parts), tuple(numbers), tuple(candidates), likelihood)
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at."""
+
+    evaluator: RolloutEvaluator
+    nominal: RobotModel
+    regions: tuple[Region, ...]
+    standing: tuple[Hypothesis, ...]
+
+    def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
+        """One robot with a hypothesis for each region."""
+        z: dict[Uncertain, float] = {}
+        for h in hypotheses:
+            z |= as_mapping(h.numbers, h.z)
+        model = recalibrated(self.nominal, z)
+        return replace(model, effects=(*model.effects, *(spec for h in hypotheses for spec in h.specs())))
+
+    def answers(self, wants: Sequence[Wants]) -> list[Array]:
+        """Residuals (n,) of each want's region. Wants of different regions share rollouts."""
+        queues: dict[int, list[int]] = {}
+        for k, (region, _) in enumerate(wants):
+            queues.setdefault(region, []).append(k)
+        questions, shared = [], []
+        for row in range(max(map(len, queues.values()), default=0)):
+            here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
+            hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
+            takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
+            questions.append(RolloutRequest(self.model(hypotheses), takes))
+            shared.append(here)
+        out: list[Array] = [np.empty(0)] * len(wants)
+        for here, residuals in zip(shared, self.evaluator.residuals(questions)):
+            for region, k in here.items():
+                out[k] = self.regions[region].vector(residuals)
+        return out
