@@ -25,7 +25,8 @@ from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.findings import Diagnosis, Finding, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import channel_gaps, ledger
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.preparation import check_duration, prepared
