@@ -12,13 +12,14 @@ from pathlib import Path
 
 from workbench.gait.limits import Margin, allowed_rms, contact_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import GaitMeasure, as_plain, from_plain, measure
+from workbench.gait.measure import GaitMeasure, as_plain, fallen, from_plain, measure
 from workbench.gait.request import Request
+from workbench.gait.rollouts import rollouts
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import AT_ONCE, GaitTable, gait_table
 from workbench.motion import PoseTable
 from workbench.robot import InputError, RobotModel
-from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.simulation import Job, SimulationConfig
 
 SECONDS, CYCLES = 2.0, 2
 """A gait is measured over at least so long [s], and so many cycles."""
@@ -130,11 +131,12 @@ class Evaluator:
             cycles = max(CYCLES, math.ceil(SECONDS / table.period))
             end = table.start_seconds + cycles * table.period
             jobs.append(Job(model, self.config, table.commands(cycles), end))
-        takes = simulate_batch(jobs, self.n_jobs) if jobs else []
         self.rollouts += len(jobs)
         lines = []
-        for (key, (table, model)), take in zip(missing.items(), takes):
-            self._known[key] = measure(take, model, table.start_seconds, table.period)
+        for (key, (table, model)), take in zip(missing.items(), rollouts(jobs, self.n_jobs)):
+            begin, period = table.start_seconds, table.period
+            self._known[key] = (fallen(len(model.joints)) if take is None else
+                                measure(take, model, begin, period, electrical=model is self.nominal))
             lines.append(json.dumps([key, as_plain(self._known[key])]) + "\n")
         if self._memory is not None and lines:
             with self._memory.open("a") as f:
