@@ -183,7 +183,8 @@ class _Examiner:
 
     def _measured(self, take: Take, model: RobotModel) -> tuple[GaitMeasure, FeetMeasure]:
         begin, period = self.table.start_seconds, self.table.period
-        return measure(take, model, begin, period), feet_measure(take, model, self.machine.legs, begin, period)
+        feet = feet_measure(take, model, self.machine.legs, begin, period)
+        return replace(measure(take, model, begin, period), clearance=feet.clearance), feet
 
     def _commands(self, seconds: float) -> tuple[Commands, float]:
         cycles = max(2, math.ceil(seconds / self.table.period))

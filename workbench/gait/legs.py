@@ -40,6 +40,10 @@ class Leg:
         """Where the tip is in the base link's frame (N, 3) [m] for angles (N, k) [rad], other joints at zero."""
         return self._place(q)[0]
 
+    def jacobian(self, q: Array) -> Array:
+        """How the tip moves with the angles (N, 3, k) [m/rad]."""
+        return self._place(q)[1]
+
     def solve(self, targets: Array, bend: int) -> tuple[Array, Array]:
         """Angles (N, k) [rad] that put the tip at `targets` (N, 3) [m] in the base link's frame, other joints at zero, and how
         far it stays from them (N,) [m]. bend: +1 the knee points back, -1 forward."""

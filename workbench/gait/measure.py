@@ -38,7 +38,8 @@ class GaitMeasure:
     between the ends [m]; drift: change of heading on the way [rad], lateral: beside the first heading [m]. tilt: largest [rad].
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
-    electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3].
+    electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
+    cycles of how high a foot comes [m]; NaN where nobody looked.
     """
 
     fell: bool
@@ -56,6 +57,7 @@ class GaitMeasure:
     power: float
     mechanical: float
     jerk: float
+    clearance: float = math.nan
 
     @property
     def speed(self) -> float:
