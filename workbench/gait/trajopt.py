@@ -49,8 +49,8 @@ class Task:
 @dataclass(frozen=True)
 class Planned:
     """What came out. solved: whether a solver says so; solver, seconds: which, and how long. q (N, n) [rad] at the knots, of all
-    joints; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m] of the base off the frame that goes along; shape: the gait nearest to
-    it in numbers, a seed."""
+    joints; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m] of the base off the frame that goes along; shape: the gait nearest
+    to it in numbers, a seed."""
 
     task: Task
     solved: bool
