@@ -13,7 +13,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test test-newest lint docs prove studies system clean
+.PHONY: firmware demo test test-newest lint docs prove studies system clean
 
 demo: $(STAMP)
 	$(BIN)/workbench demo
@@ -47,6 +47,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/counts.py
 
 # The slow tests, then the trial of diagnosis in runs/concealed_effects: hours; stopped and called again, it goes on.
 prove: $(STAMP)

@@ -42,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.simulation import SimulationConfig
     from workbench.view.report.comparison import write_comparison
 
-    config = SimulationConfig(contact=args.contact)
+    config = SimulationConfig(contact=args.contact, engine="drake")
     with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:
         if args.b is None:
             session = load_session(args.a)

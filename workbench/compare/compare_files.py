@@ -32,7 +32,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     numerical floor and the contact spread are known, else not. InputError names the file that does not fit.
     """
     began = time.monotonic()
-    config = config or SimulationConfig()
+    config = config or SimulationConfig(engine="drake")
     model.check_base(floating=base == "free")
     kinds = file_kind(a), file_kind(b)
     if kinds[1] == "recording" and kinds[0] != "recording":
