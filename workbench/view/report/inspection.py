@@ -210,7 +210,7 @@ def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
     problems = list(model.problems)
     try:
         if kinematics.joints:
-            MakeStation(SimulationConfig(base="fixed" if kinematics.fixed_to_world else "free"), model)
+            MakeStation(model, SimulationConfig(base="fixed" if kinematics.fixed_to_world else "free"))
         else:
             problems.append("no joint that turns: nothing for a servo to move")
     except (RuntimeError, ValueError) as e:
