@@ -47,6 +47,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/counts.py
 
 # The slow tests, then the trial of diagnosis in runs/concealed_effects: hours; stopped and called again, it goes on.
 prove: $(STAMP)

@@ -10,8 +10,8 @@ from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
 from workbench.identify.estimators import geometry as built
 from workbench.identify.findings import Change
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.model_comparison import SUREST
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.mocap.tracks import capture_axes
 from workbench.recording.recording import Measurement, Recording
@@ -81,7 +81,7 @@ def test_a_longer_thigh_and_a_turned_hip_are_measured(monkeypatch):
     finding = zero.finding(error, error)
     angle = finding.parameters["angle"]
     assert angle.low < zero.mean < angle.high
-    assert (finding.where, finding.confidence, angle.unit) == (("frm",), SUREST, "deg")
+    assert (finding.where, finding.confidence, angle.unit) == (("frm",), CONCLUSIONS.surest, "deg")
     assert "cameras" in finding.evidence
 
 

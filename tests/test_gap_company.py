@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants
 
 
@@ -85,7 +86,7 @@ def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_fa
     search = SimpleNamespace(side_by_side=lambda parts: list(together(dict(enumerate(parts)), lambda wanted: []).values()),
                              evaluating=lambda *starts: asks_nothing([fit_at(s, 1e4) for s in starts]),
                              refitting=lambda *a: asks_nothing(ended(*a)), refitted=ended)
-    here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + LEAST_GAIN * 3)
+    here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + FIT.least_gain * 3)
     there = begun_again(search, here, (0,), 9)
     assert (there is not here) is again
     assert {tuple(np.sign(f.x[:2] - here.x[:2])) for f in begun} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}

@@ -8,8 +8,8 @@ import pytest
 
 from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.covariance import TEMPER_WALKING
 from workbench.identify.fitting.downward_force import downward_pulls
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.proposals import candidates
@@ -244,7 +244,7 @@ def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
     fit = SimpleNamespace(cost={"choose": left[None]}, residuals={0: None, 1: None})
     knee, whole = SimpleNamespace(joint="knee", gain={"choose": 100.0}), SimpleNamespace(joint=None, gain={"choose": 100.0})
     assert _temper(search, fit, None, knee) == pytest.approx(1.3 * TEMPER)
-    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * TEMPER_WALKING)
+    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * FIT.overdispersion_free)
 
 
 def test_twins_name_each_other():

@@ -10,8 +10,9 @@ from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.covariance import _scattered
 from workbench.identify.fitting.fits import Search
-from workbench.identify.fitting.levenberg_marquardt import WALKING, Solved, fit_blocks, lowest, together
-from workbench.identify.fitting.responses import SCANNED, SCANNED_GROUND, linearised_estimate, scan, scan_sizes
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest, together
+from workbench.identify.fitting.responses import linearised_estimate, scan, scan_sizes
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts import STRETCHES, RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.scheduling import _when_held
@@ -364,7 +365,9 @@ def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
 
     def ends(magnitudes: np.ndarray | None) -> np.ndarray:
         start = np.array([9.0, 0.05])
-        fit = fit_blocks([start], [left(start)], [(np.full(2, -99.0), np.full(2, 99.0))], 4, WALKING, magnitudes=magnitudes)
+        fit = fit_blocks(
+            [start], [left(start)], [(np.full(2, -99.0), np.full(2, 99.0))], 4, FIT.stride_free, magnitudes=magnitudes
+        )
         (solved,) = together({0: fit}, lambda wanted: [[left(p) for p in point] for _, point in wanted])[0]
         return solved.x
 
@@ -377,12 +380,12 @@ def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
 def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
     effect = known_effects()[name]
     c = Candidate.of(effect, ("two",), (np.inf if name == "torque_ceiling" else 0.0,))
-    assert [float(x[0]) for x in scan(c, SCANNED[:1] if walking else SCANNED, walking)] == sizes
+    assert [float(x[0]) for x in scan(c, FIT.scanned[:1] if walking else FIT.scanned, walking)] == sizes
 
 
 @pytest.mark.parametrize(("name", "walking", "unheld", "sizes"), [
-    ("coulomb_friction", False, False, SCANNED), ("coulomb_friction", True, False, SCANNED[:1]),
-    ("coulomb_friction", True, True, SCANNED), ("ground_friction", True, True, SCANNED_GROUND)])
+    ("coulomb_friction", False, False, FIT.scanned), ("coulomb_friction", True, False, FIT.scanned[:1]),
+    ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground)])
 def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, unheld, sizes):
     """Of a hip's friction six times the typical one nothing was foretold at once its size, and more of a wrong name."""
     effect = known_effects()[name]

@@ -15,8 +15,6 @@ from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.estimators.dropped_commands import (
-    LEAST_CLOSED,
-    SURELY,
     DroppedCommands,
     _least_closed,
     _lost,
@@ -27,6 +25,7 @@ from workbench.identify.estimators.dropped_in_motion import _suspects, dropped_i
 from workbench.identify.estimators.stops_and_mounts import _stop, read_off_candidates
 from workbench.identify.findings import Change
 from workbench.identify.fitting.fits import Search
+from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.problem import gather
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
@@ -225,7 +224,7 @@ def test_poses_missed_on_the_ground_alone_must_explain_nearly_all():
     def evaluator(*bases):
         return SimpleNamespace(evidence=[SimpleNamespace(take=SimpleNamespace(spec=SimpleNamespace(base=b))) for b in bases])
 
-    assert _least_closed(evaluator("fixed", "free"), {0: 1, 1: 0}) == LEAST_CLOSED
-    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 2}) == SURELY
-    assert _least_closed(evaluator("free", "free"), {0: 1, 1: 1}) == LEAST_CLOSED
+    assert _least_closed(evaluator("fixed", "free"), {0: 1, 1: 0}) == READ_OFF.dropped_explains
+    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 2}) == READ_OFF.dropped_explains_free
+    assert _least_closed(evaluator("free", "free"), {0: 1, 1: 1}) == READ_OFF.dropped_explains
     assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 1}) is None

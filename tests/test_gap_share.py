@@ -1,5 +1,7 @@
 """Of long recordings a search looks at a share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify import subset as share
 from workbench.identify.diagnosis import diagnose_session
-from workbench.identify.problem import JUDGES, gather, part_of
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import gather, part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
 from workbench.simulation import SimulationConfig
@@ -44,8 +47,7 @@ def two(tmp_path_factory):
 @pytest.fixture
 def shorter(monkeypatch):
     """What counts as long."""
-    for name, seconds in (("LONG", 3.0), ("SEARCHED", 1.7), ("PIECE", 0.8)):
-        monkeypatch.setattr(share, name, seconds)
+    monkeypatch.setattr(share, "PROBLEM", replace(PROBLEM, long=3.0, looked_at=1.7, piece=0.8))
 
 
 def test_short_sessions_are_looked_at_whole(two):
@@ -82,7 +84,7 @@ def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(t
 
 @pytest.mark.parametrize("long", [1.0, 60.0])
 def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch, long):
-    monkeypatch.setattr(share, "LONG", long)
+    monkeypatch.setattr(share, "PROBLEM", replace(share.PROBLEM, long=long))
     session = write_two_takes(tmp_path, {"worn": "fit", "well": "validate"})
     evidence = evidence_of(session)
     residuals = RolloutEvaluator(evidence, CONFIG, n_jobs=1).residuals([RolloutRequest(session.model, (0, 1))])[0]
@@ -92,7 +94,7 @@ def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch, long):
 
 
 def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter, monkeypatch):
-    monkeypatch.setattr(share, "SEARCHED", 3.0)
+    monkeypatch.setattr(share, "PROBLEM", replace(share.PROBLEM, looked_at=3.0))
     for k, name in enumerate(("wave", "again")):
         record_arm(tmp_path, name, 0.16, seed=k)
     wave = session_content()["takes"][0]
@@ -125,6 +127,6 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
 
     assert judging(0) == {0}
     assert judging(2) == {2}
-    assert judging(JUDGES) == {JUDGES}
+    assert judging(PROBLEM.deciding_part) == {PROBLEM.deciding_part}
     assert rebalanced(evaluator.evidence, residuals) == list(evaluator.evidence)
     assert rebalanced(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)

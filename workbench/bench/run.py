@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from workbench import __version__
 from workbench.bench import drives, engine, reader
 from workbench.bench.diagnose_time import diagnose_time
 from workbench.bench.figure import Figure
@@ -97,7 +96,7 @@ def _processor() -> str:
 
 
 def _versions() -> dict[str, str]:
-    out = {"workbench": __version__, "python": platform.python_version()}
+    out = {"workbench": version("drake-workbench"), "python": platform.python_version()}
     for package in PACKAGES:
         try:
             out[package] = version(package)

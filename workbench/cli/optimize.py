@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             write_gait_page(folder, model, result)
     if not result.met:
         where = f" (written to {args.out})" if result.table is not None else ""
-        print(f"workbench optimize: {result.problem}{where}", file=sys.stderr)
+        print(f"workbench optimize: error: {result.problem}{where}", file=sys.stderr)
         return 2
     assert result.certified is not None
     print(result.certified.certificate.summary())

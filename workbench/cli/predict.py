@@ -39,8 +39,8 @@ def run(args: argparse.Namespace) -> int:
     model = session.model if args.model is None else load_model(args.model, args.packages)
     check_session("predict", session, args.yes)
     with output_directory(args.out) as folder, Progress("predict", stages=("finding", "simulating")) as progress:
-        predicted = predict_session(session, model, folder, progress, config=SimulationConfig(contact=args.contact),
-                                    n_jobs=args.jobs)
+        config = SimulationConfig(contact=args.contact, engine="drake")
+        predicted = predict_session(session, model, folder, progress, config=config, n_jobs=args.jobs)
     for name, reason in predicted.left_out:
         print(f"workbench predict: warning: take '{name}' left out: {reason}", file=sys.stderr)
     print(f"wrote {args.out}: {', '.join(path.name for path in predicted.paths)}")

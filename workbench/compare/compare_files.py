@@ -32,7 +32,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     numerical floor and the contact spread are known, else not. InputError names the file that does not fit.
     """
     began = time.monotonic()
-    config = config or SimulationConfig()
+    config = config or SimulationConfig(engine="drake")
     model.check_base(floating=base == "free")
     kinds = file_kind(a), file_kind(b)
     if kinds[1] == "recording" and kinds[0] != "recording":
@@ -64,6 +64,11 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     result = compare_takes(replace(recorded, name=files[0].stem), replace(simulated, name=files[1].stem), model, finer=finer,
                            other_contact=other)
     return Comparison((result,), provenance=provenance(model, config, time.monotonic() - began) | made_by)
+
+
+def recorded_take(path: str | Path, model: RobotModel, base: Base = "free") -> Take:
+    """A recording alone as a take, its start where its first joint leaves rest. InputError names the file and what is wrong."""
+    return _by_first_motion(_read(Path(path), model, base)).recorded
 
 
 def _by_first_motion(read: ReadTake) -> RegisteredTake:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.compare.options import COMPARE
 from workbench.compare.session import PredictSpec, Session
 from workbench.compare.session_takes import LeftOut, Progress, capture_yaw, no_progress, read_takes
 from workbench.effects.apply import seen
@@ -26,8 +27,6 @@ from workbench.simulation import Simulation, SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 
 Array = NDArray[np.float64]
-LEAD = 0.3
-"""Rest before the first command of each rollout [s]."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
     units, its assets, axes, pivots and clock. A prediction of `commands` becomes a joint log with their times, from the state
     in their first row. InputError where a file does not fit, there is nothing to predict, or no yaw can be found.
     """
-    config = config or SimulationConfig(contact_period=0)  # nobody asks for contact forces
+    config = config or SimulationConfig(contact_period=0, engine="drake")  # nobody asks for contact forces
     if not session.predict:
         raise InputError(session.path, "predict: expected at least one entry")
     models = {"": model} if nominal is None else {"": model, ".nominal": nominal}
@@ -105,7 +104,7 @@ class _Captured:
         commands = load_motion(self.spec.motion, model).commands(self.spec.cycles)
         check_assets(self.start, model)
         after = max(float(self.time[-1]) - self.starts_at, 0.0) + config.logged_every
-        return Job(model, replace(config, base=self.spec.base), commands, after, LEAD, name=self.spec.name)
+        return Job(model, replace(config, base=self.spec.base), commands, after, COMPARE.lead, name=self.spec.name)
 
     def write(self, take: Take, model: RobotModel, yaw: float, path: Path) -> Path:
         """Writes a rollout as the cameras of the start file would have seen it."""
@@ -134,7 +133,7 @@ def predict_log(session: Session, spec: PredictSpec, path: Path, config: Simulat
     start = Start(np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"]), logged=True) if known else None
     since = log.time - log.time[0]
     simulation = Simulation(model, replace(config, base=spec.base))
-    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, LEAD, start=start).as_logged()
+    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, COMPARE.lead, start=start).as_logged()
     commanded = [j for j in model.joints if f"goal.{j}" in log.channels]
     channels = {name: values for name, values in log.channels.items() if name.startswith(("goal.", "enabled."))}
     channels |= {f"position.{j}": np.interp(since, take.time, take.q[:, take.column(j)]) for j in commanded}

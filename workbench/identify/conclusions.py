@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
-from workbench.identify.fitting.covariance import WIDER, Z90
-from workbench.identify.fitting.fits import Fit
-from workbench.identify.ledger import GAP_RATIO, in_file_units
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.ledger import in_file_units
+from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
@@ -26,14 +26,6 @@ from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
-LEAST_RELATIVE = 0.005
-"""Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
-WORTH_AN_EXPERIMENT = 0.05
-"""Probability from which on the likeliest rival of a finding is worth an experiment."""
-CORRELATED = 0.3
-"""Correlation from which on a residual goes with a signal."""
-SAME_ELSEWHERE = 0.1
-"""Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
 
 class ReadOff(Protocol):
@@ -66,7 +58,7 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePo
     alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
-    numbers = estimates(c, x, WIDER**2 * fit.covariance[own, own])
+    numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
     return Finding(
         effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
         alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
@@ -75,26 +67,32 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePo
 
 def _elsewhere(c: Candidate, standing: NamePosterior) -> list[Rival]:
     """The same effect where the data cannot tell it from this place."""
-    return [r for r in standing.rivals if r.candidate.name == c.name and r.probability >= SAME_ELSEWHERE * standing.probability]
+    return [
+        r
+        for r in standing.rivals
+        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * standing.probability
+    ]
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
-    half = Z90 * np.sqrt(np.diag(covariance))
+    half = CONCLUSIONS.z90 * np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
     values = np.array(c.values(x))
     unknown = np.ones(len(values), dtype=bool)
     if isinstance(c, PointMass):  # where it is says a moment over a mass: both err, together
         slopes, known = _slopes(c, x), np.isfinite(half)
-        spread = Z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
+        spread = CONCLUSIONS.z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
         ends = np.array([values - spread, values + spread])
         unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     else:
         unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
-    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), [p.resolution for p in c.parameters])
+    least = CONCLUSIONS.z90 * np.maximum(
+        CONCLUSIONS.least_relative * np.abs(values - neutral), [p.resolution for p in c.parameters]
+    )
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
@@ -163,7 +161,7 @@ def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: 
         for c, r in ratios(e, residuals[i], "validate").items():
             column = e.channels.index(c)
             wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0
-            if not r > GAP_RATIO * wider:
+            if not r > PROBLEM.gap_ratio * wider:
                 continue
             sigma, unit = in_file_units(float(e.sigma[column]), c)
             out.append(Unexplained(() if c in BODY else (joint_of(c),), r * sigma, wider * sigma, unit,
@@ -184,7 +182,7 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
         if good.sum() > 20 and np.std(s[good]) > 0 and np.std(residual[good]) > 0:
             found[name] = abs(float(np.corrcoef(residual[good], s[good])[0, 1]))
     best = max(found, key=lambda k: found[k], default=None)
-    if best is None or not found[best] > CORRELATED:
+    if best is None or not found[best] > CONCLUSIONS.correlated:
         return Dependence(e.name, channel)
     return Dependence(e.name, channel, best, found[best])
 
@@ -192,7 +190,7 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
 def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
     """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
     return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
-                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > WORTH_AN_EXPERIMENT)
+                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
@@ -206,7 +204,7 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
         slopes[row:row + len(c.neutral), s] = _slopes(c, fit.x[s])
     known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
-    inner = WIDER**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
+    inner = CONCLUSIONS.wider**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
     covariance = slopes @ inner @ slopes.T
     lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     covariance[lost] = covariance[:, lost] = np.inf

@@ -25,8 +25,10 @@ from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.findings import Diagnosis, Finding, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import channel_gaps, ledger
+from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.preparation import check_duration, prepared
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
@@ -43,11 +45,6 @@ from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
-
-STEP = 2e-3
-"""Of the search's rollouts [s]; what this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
-WORSE = 0.05
-"""Share of all that is missing that may come with what was measured."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes."""
     began = time.monotonic()
-    config = SimulationConfig(settle=0.6, contact_period=0, time_step=STEP)
+    config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
 
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
@@ -138,7 +135,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
         return build
     there = Search(evaluator, build.added_to(model)).evaluated([])
     worse = (there.cost["fit"] + there.cost["choose"]) / (nominal.cost["fit"] + nominal.cost["choose"]) - 1.0
-    return build if worse < WORSE else replace(build, measured=())
+    return build if worse < READ_OFF.geometry_worse else replace(build, measured=())
 
 
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:

@@ -13,23 +13,17 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.identify.ledger import GAP_RATIO, channel_gaps
-from workbench.identify.problem import BLOCK, TakeEvidence
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
 
 Array = NDArray[np.float64]
-COARSE, FINE = 2.0, 0.25
-"""Steps for a first look, and for last numbers, in search steps."""
 STRETCHES = 10_000
 """More than a take has."""
-STATION, PUPPY = 17, 15
-"""What a station costs by itself, in joints, and how many a puppy has. Measured: 30 ms for a second of a joint, 33 of three
-joints, 53 of fifteen."""
-REST = 0.1
-"""Rest before the first command in rollouts [s]."""
 
 
 @dataclass(frozen=True)
@@ -112,9 +106,9 @@ class RolloutEvaluator:
         e = self.evidence[take]
         spec = e.take.spec
         frames = e.since
-        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
+        times = np.concatenate([[-PROBLEM.rest, -PROBLEM.rest / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
         duration = float(times[-1]) + 2e-3
-        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
+        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, PROBLEM.rest,
                    name=spec.name, times=times, start=e.take.start_state(), steadied=e.steadied)
 
     def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
@@ -161,7 +155,7 @@ class RolloutEvaluator:
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / BLOCK).astype(int)
+            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
             parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 
@@ -184,7 +178,7 @@ class RolloutEvaluator:
     def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
         """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a held robot no more than
         expected, where running means alone show one."""
-        most = GAP_RATIO**2 * expected
+        most = PROBLEM.gap_ratio**2 * expected
         slight = [np.empty(0, dtype=bool)]
         for i, r in sorted(residuals.items()):
             e = self.evidence[i]
@@ -195,7 +189,7 @@ class RolloutEvaluator:
     def _length(self, take: int, until: float = np.inf) -> float:
         """Of a rollout [s of a puppy's], a walk counting more as it takes longer, few joints less."""
         e = self.evidence[take]
-        share = (len(e.joints) + STATION) / (PUPPY + STATION)
+        share = (len(e.joints) + PROBLEM.station_joints) / (PROBLEM.puppy_joints + PROBLEM.station_joints)
         return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
 
     def _felt(self, model: RobotModel, take: int) -> RobotModel:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
+from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
@@ -20,16 +21,6 @@ from workbench.robot import RobotModel
 Array = NDArray[np.float64]
 DroppedPoses = dict[tuple[int, str], tuple[int, ...]]
 """Poses by take and joint."""
-LEAST_STEP = np.deg2rad(2.0)
-"""A pose that moves a joint by less does not tell whether it came [rad]."""
-CALM, BEHIND = 4.0, 7.0
-"""Standard deviations within which a joint goes as the model has it, and beyond which it stays behind."""
-BEFORE, LAG = 0.03, 0.05
-"""Times [s] before a command that show how the joint went until then, and by which what it does shows later."""
-EXPLAINED = 0.8
-"""Share of what a joint lacks until the next command that leaving out the pose must explain."""
-MOST, TURNS = 0.5, 12
-"""Share of poses that may be missed: of more, something else is the matter. Poses that may be missed one after another."""
 
 
 def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], Sequence[int]]) -> RolloutEvaluator:
@@ -55,7 +46,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
     lost: DroppedPoses = {}
     cleared: set[tuple[int, str, int]] = set()
     now = dict(residuals)
-    for _ in range(TURNS):
+    for _ in range(READ_OFF.turns):
         new = _suspects(evaluator, now, lost, cleared)
         if not new:
             break
@@ -90,7 +81,7 @@ def _suspects(
             gone = lost.get((i, joint), ())
             moves = steps(e, joint, gone)
             behind = tuple(k for k, way in moves.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
-            if behind and len(behind) + len(gone) <= MOST * (len(moves) + len(gone)):
+            if behind and len(behind) + len(gone) <= READ_OFF.most_dropped_in_motion * (len(moves) + len(gone)):
                 out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
     return out
 
@@ -101,7 +92,7 @@ def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     assert commands is not None
     column = commands.column(joint)
     ways = np.diff(without_poses(commands, column, gone).goals[:, column], prepend=0.0)
-    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= LEAST_STEP and k not in gone}
+    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= READ_OFF.least_step and k not in gone}
 
 
 def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) -> bool:
@@ -109,9 +100,9 @@ def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) ->
     own = -np.sign(way) * residual[:, e.channels.index(joint)]
     came, until = _between(e, k)
     time = e.take.recorded.since_start
-    was, then = own[(time > came - BEFORE) & (time <= came)], own[(time > came) & (time <= until)]
+    was, then = own[(time > came - READ_OFF.before) & (time <= came)], own[(time > came) & (time <= until)]
     was, then = was[np.isfinite(was)], then[np.isfinite(then)]
-    return bool(len(then)) and bool(np.all(np.abs(was) < CALM)) and bool(then.max() > max(BEHIND, -then.min()))
+    return bool(len(then)) and bool(np.all(np.abs(was) < READ_OFF.calm)) and bool(then.max() > max(READ_OFF.behind, -then.min()))
 
 
 def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
@@ -120,11 +111,11 @@ def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array)
     time, channel = e.take.recorded.since_start, e.channels.index(joint)
     own = (time > came) & (time <= until) & np.isfinite(before[:, channel])
     was, now = (float(np.sum(r[own, channel] ** 2)) for r in (before, after))
-    return bool(was - now > EXPLAINED * (was - own.sum()))
+    return bool(was - now > READ_OFF.pose_explains * (was - own.sum()))
 
 
 def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
     """When a command came [s], and until when what it did shows alone."""
     commands = e.take.commands
     assert commands is not None
-    return float(commands.times[k]), end_of(e, k) + LAG
+    return float(commands.times[k]), end_of(e, k) + READ_OFF.lag

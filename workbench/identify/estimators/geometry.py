@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.findings import SUREST, Change, Estimate, Finding
-from workbench.identify.fitting.covariance import Z90
+from workbench.identify.findings import Change, Estimate, Finding
 from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import CONCLUSIONS, READ_OFF
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.problem import TakeEvidence
 from workbench.recording.mocap import quaternions as quat
@@ -28,14 +28,6 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
-LEAST_ALONG = 0.5
-"""Cosine between a link's length and what of it two axes tell."""
-ROUGH, ROUGH_TURN = 1e-4, np.deg2rad(0.25)
-"""What a take's distance between axes [m], and a direction [rad] for what the model says of droop, are off by at the least."""
-SURE = 5.0
-"""Standard deviations from which on a link is not as drawn."""
-LEAST_CHANGE, LEAST_TURNED = 5e-4, np.deg2rad(1.5)
-"""Changes of length [m] and turned horns [rad] below which no gait shows anything: what is told to be nearer is as drawn."""
 SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
 
 
@@ -48,7 +40,7 @@ class UncertainValue:
 
     def differs(self, least: float) -> bool:
         """Whether it is neither nothing nor too little to show."""
-        return abs(self.value) > max(SURE * self.sigma, least)
+        return abs(self.value) > max(READ_OFF.geometry_sure * self.sigma, least)
 
     def is_nothing(self, least: float) -> bool:
         """Whether it is too little to show, surely."""
@@ -78,9 +70,9 @@ class Measured:
     def finding(self, fit: Change, validation: Change) -> Finding:
         """With the 90 % interval of what was measured."""
         p = effect_named(self.effect).parameters[0]
-        half = Z90 * self.sigma
+        half = CONCLUSIONS.z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
-        return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
+        return Finding(self.effect, (self.where,), CONCLUSIONS.surest, {p.name: number}, fit, validation,
                        evidence=effect_named(self.effect).sentence(self.spec) + self.seen)
 
 
@@ -113,8 +105,8 @@ def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: 
     ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
     measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
     for (effect, *_), least, told in (
-            (lengths, LEAST_CHANGE, _changes(model, [s for there in between.values() for s in there])),
-            (turns, LEAST_TURNED, _turns(model, held))):
+            (lengths, READ_OFF.least_change, _changes(model, [s for there in between.values() for s in there])),
+            (turns, READ_OFF.least_turned, _turns(model, held))):
         name, unit = effect.name, effect.parameters[0].si
         for where, number in told.items():
             if number.is_nothing(least):
@@ -143,8 +135,8 @@ def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainV
         link, drawn = k.frames[s.joint].child, _drawn(k, s)
         way, distance = sdf.way(k, link), float(np.linalg.norm(drawn))
         along = float(drawn @ way) / (distance * float(np.linalg.norm(way))) if distance > 0 and way.any() else 0.0
-        if along > LEAST_ALONG:
-            change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, ROUGH))
+        if along > READ_OFF.least_along:
+            change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, READ_OFF.length_error))
             told.setdefault(link, []).append(UncertainValue(change / along, sigma / along))
     return {link: _mean(each) for link, each in told.items()}
 
@@ -165,7 +157,7 @@ def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]
             if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
                 turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))
                 told.setdefault(s.joint, []).append(
-                    UncertainValue(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), ROUGH_TURN)))
+                    UncertainValue(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), READ_OFF.direction_error)))
                 )
     return {joint: _mean(each) for joint, each in told.items()}
 

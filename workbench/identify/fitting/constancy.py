@@ -9,19 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Slopes
+from workbench.identify.fitting.fit import Fit, Slopes
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import in_file_units
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.reasons import ParameterDrift
 from workbench.identify.rollouts import RolloutEvaluator
 
 Array = NDArray[np.float64]
-CHANGE = 0.25
-"""Share of a number that it changes by from a take's first to its last frame, from which on that is told: two engines, or a robot
-and a model, differ by less."""
-SURE = 5.0
-"""Standard errors of that change that it must be."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
             c, x, k = of_number[n]
             if c.read_off and c.effect.free_play:
                 continue  # a loose mount rattles by chance, and nothing else is seen across an axis
-            if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
+            if not c.shapes[k] and abs(change) > FIT.drift * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
                 first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
@@ -85,5 +82,5 @@ def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[tuple[
         change = -float(z @ r) / power
         by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
         error = float(np.linalg.norm(by_stretch)) / power
-        if abs(change) >= SURE * error and change**2 * power >= LEAST_GAIN:
+        if abs(change) >= FIT.drift_sure * error and change**2 * power >= FIT.least_gain:
             yield n, change, error, float(np.sqrt(power / int(np.count_nonzero(r))))

@@ -8,18 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.fitting.levenberg_marquardt import Solved
+from workbench.identify.options import FIT
 from workbench.identify.rollouts import RolloutEvaluator, take_of
 
 Array = NDArray[np.float64]
-Z90 = 1.645
-WIDER = 1.3
-"""Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
-engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials held the truth, with 1.3 it is 91 %."""
-TEMPER_WALKING = 60.0
-"""What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of the
-same effect that begin elsewhere end some hundreds apart there."""
-ENGINES = 0.06
-"""Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
 
 def covariance_of(
@@ -28,9 +20,9 @@ def covariance_of(
     """Of a block's numbers; joint: whose channels tell them, None for all; bent: whether contact bends what walks tell. Infinite
     where nothing depends on a number."""
     stretches = evaluator.stretches(takes, "fit", joint)
-    engines = bent * ENGINES * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
+    engines = bent * FIT.contact_error * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)
-    temper = TEMPER_WALKING if bent and evaluator.walks(takes) else 1.0
+    temper = FIT.overdispersion_free if bent and evaluator.walks(takes) else 1.0
     return np.asarray(_scattered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 

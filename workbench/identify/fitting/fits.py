@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -12,89 +11,17 @@ from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
 from workbench.identify.fitting.covariance import covariance_of
-from workbench.identify.fitting.levenberg_marquardt import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
+from workbench.identify.fitting.fit import Fit, Slopes
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest, through, together
 from workbench.identify.fitting.responses import Part, ResponseBank
-from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import FINE, RolloutEvaluator, RolloutRequest
+from workbench.identify.options import FIT, PROBLEM
+from workbench.identify.parameters import Candidate, with_effects
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-Sizes = list[tuple[Candidate, Array]]
-"""Effects, each with its sizes."""
 Report = Callable[[str, float | None], None]
-RESETTLING = 3
-"""Steps of a fit of effects that were settled before."""
-AGAINST = 100.0
-"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number."""
-LEAST_GAIN = 150.0
-"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
-is half its noise: engines, and a robot and its model, differ by as much."""
-FINER, FINER_STEPS = 0.5, 3
-"""In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
-does is less than what a coarse step makes of it."""
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step. joint: whose
-    channels alone, None for all."""
-
-    numbers: NDArray[np.int_]
-    takes: tuple[int, ...]
-    J: Array
-    joint: str | None = None
-
-
-@dataclass(frozen=True)
-class Fit:
-    """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
-
-    cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
-    """
-
-    effects: tuple[Candidate, ...]
-    x: Array
-    covariance: Array
-    cost: dict[str, float]
-    residuals: dict[int, Array] = field(repr=False)
-    slopes: tuple[Slopes, ...] = field(default=(), repr=False)
-
-    def slices(self) -> list[slice]:
-        """Of x, for each effect."""
-        ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
-        return [slice(a, b) for a, b in pairwise(ends)]
-
-    def numbers(self, effects: Iterable[int]) -> NDArray[np.int_]:
-        """Indices of x, of some effects."""
-        slices = self.slices()
-        return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
-
-    def sizes(self, x: Array | None = None) -> Sizes:
-        """Each effect with its own sizes; with those of another x."""
-        x = self.x if x is None else x
-        return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
-
-    def sizes_without(self, key: Key) -> Sizes:
-        """Those of all effects but one."""
-        return [s for s in self.sizes() if s[0].key != key]
-
-    def sizes_with(self, key: Key, x: Array) -> Sizes:
-        """Those of all effects, one at other sizes."""
-        return [(c, x if c.key == key else own) for c, own in self.sizes()]
-
-    def sizes_by_key(self) -> dict[Key, Array]:
-        """Of each effect, by what it is and where."""
-        return {c.key: x for c, x in self.sizes()}
-
-    def bounds(self) -> tuple[Array, Array]:
-        """Of x."""
-        ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
-        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
-
-    def model(self, nominal: RobotModel) -> RobotModel:
-        """The nominal robot with these effects."""
-        return with_effects(nominal, self.sizes())
 
 
 class Search:
@@ -150,7 +77,7 @@ class Search:
         settled: for when one went or another came."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         free = self.with_settled(None)
-        settled = free.with_timing_refitted(free.refitted(free.evaluated(there), self.held, RESETTLING, range(len(there))))
+        settled = free.with_timing_refitted(free.refitted(free.evaluated(there), self.held, FIT.refit_steps, range(len(there))))
         told = settled.sizes_by_key()
         return self.with_settled(settled), self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
@@ -160,7 +87,7 @@ class Search:
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
         if not timing or not self.floating_base(self.fitted):
             return current
-        fit = self.refitted(current, self.fitted, RESETTLING, timing)
+        fit = self.refitted(current, self.fitted, FIT.refit_steps, timing)
         if contradicted_by_fixed_base(self, fit, current):
             return current
         numbers = fit.numbers(timing)
@@ -215,11 +142,13 @@ class Search:
             return [self.evaluator.vector(answer, "fit", joint) for joint in blocks]
 
         # several numbers share what a walk shows: a short move of one drowns
-        near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
+        near = np.concatenate([np.full(c.size, FIT.stride_end if c.size == 1 else FIT.stride_free) for c in current.effects])[
+            moving
+        ]
         magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
         start = [current.x[n] for n in blocks.values()]
         answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
-        stride, least = (near, magnitudes) if self.evaluator.walks(takes) else (HELD, None)
+        stride, least = (near, magnitudes) if self.evaluator.walks(takes) else (FIT.stride_fixed, None)
         bounds = [(low[n], high[n]) for n in blocks.values()]
         fit = fit_blocks(start, told(answer), bounds, iterations, stride, magnitudes=least)
         solved = yield from through(fit, ask, told)
@@ -289,7 +218,7 @@ class Search:
         """The fit with what walks tell fitted once more in finer steps, where that is more than one number."""
         if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.floating_base(self.fitted):
             return fit
-        return self.side_by_side([self.refitting(fit, self.fitted, FINER_STEPS, step=FINER)])[0]
+        return self.side_by_side([self.refitting(fit, self.fitted, FIT.finer_steps, step=FIT.finer)])[0]
 
     def _newton(self, seen: Fit) -> Array:
         """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
@@ -303,12 +232,12 @@ class Search:
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
         model = with_effects(self.nominal, fit.sizes())
-        longer = self.evaluator.residuals([RolloutRequest(model, self.takes, 2 * FINE)])[0]
+        longer = self.evaluator.residuals([RolloutRequest(model, self.takes, 2 * PROBLEM.fine)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.evaluator.evidence[i].moving])) for i in self.takes}
 
     def finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
-        asked = [RolloutRequest(with_effects(self.nominal, fit.sizes(x)), takes, FINE) for x in points]
+        asked = [RolloutRequest(with_effects(self.nominal, fit.sizes(x)), takes, PROBLEM.fine) for x in points]
         return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.evaluator.residuals(asked))]
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
@@ -323,7 +252,7 @@ def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence
 
 def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
     """Whether held takes speak against a fit, beside another."""
-    return gained(search.evaluator, fit, other, search.held, "fit") > AGAINST
+    return gained(search.evaluator, fit, other, search.held, "fit") > FIT.against
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
@@ -338,7 +267,7 @@ def _around(fit: Fit, n: int) -> list[Array]:
     """The fit's sizes, and those with number n far on both sides."""
     low, high = fit.bounds()
     x = np.array([fit.x] * 3)
-    x[1:, n] *= 1 + WIDE, 1 / (1 + WIDE)
+    x[1:, n] *= 1 + FIT.wide, 1 / (1 + FIT.wide)
     return list(np.clip(x, low, high))
 
 

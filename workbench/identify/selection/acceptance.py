@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
-from workbench.identify.ledger import GAP_RATIO, channel_gaps
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.selection.best_subsets import NEARLY_ALL
@@ -54,7 +56,7 @@ def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> 
     shares = np.full(len(e.channels), share)
     if not search.evaluator.walks((take,)):
         was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
-        parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > GAP_RATIO**2 - 1)
+        parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > PROBLEM.gap_ratio**2 - 1)
         if len(parts) > 1 and parts[-1][0] > STANDS_OUT * parts[-2][0] and parts[-1][1] not in {c.joint for c in now.effects}:
             shares[e.columns(parts[-1][1])] *= ALONE
     return shares
@@ -91,7 +93,7 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
             may_err = _may_err(search, before, current, i, share)
             left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
-        return left < ALL_CLOSED * LEAST_GAIN
+        return left < ALL_CLOSED * FIT.least_gain
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
     return left < max(LEAST_WALKING, LEFT_SHARE * brought)
 
@@ -106,7 +108,7 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
     if t.screened_out:
         return False
     walks = search.evaluator.walks(takes)
-    least = LEAST_WALKING if t.joint is None and walks else LEAST_GAIN * max(1, t.candidate.size)
+    least = LEAST_WALKING if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
     if t.joint is not None and t.closed > NEARLY_ALL:
         least *= ALL_CLOSED
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted

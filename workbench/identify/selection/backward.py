@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, contradicted_by_fixed_base
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search, contradicted_by_fixed_base
+from workbench.identify.options import FIT
 from workbench.identify.selection.acceptance import ALL_CLOSED, LAST_CLOSED, explained_at_the_end
 from workbench.identify.selection.best_subsets import HALF, TOGETHER_STEPS
 from workbench.identify.selection.record import SelectionStep
@@ -30,7 +32,7 @@ def without_idle(search: Search, current: Fit) -> Fit:
         if len(current.effects) < 2:
             break
         c, settled = current.effects[i], search.is_settled(current.effects[i])
-        least = LEAST_GAIN * max(1, c.size) * (ALL_CLOSED if settled else 1.0)
+        least = FIT.least_gain * max(1, c.size) * (ALL_CLOSED if settled else 1.0)
         rest = search.evaluated(current.sizes_without(c.key))
         before = rest.cost["choose"]
         if search.single_joint or before - current.cost["choose"] < CLEARLY * least:

@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Sizes
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.responses import Part
+from workbench.identify.options import FIT
 from workbench.identify.selection.record import SelectionStep
 from workbench.identify.selection.screening import CandidateFit
 
@@ -191,7 +193,7 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
 
 def penalised_cost(fit: Fit) -> float:
     """What a fit leaves on the choosing stretches, and what its numbers have to bring."""
-    return fit.cost["choose"] + LEAST_GAIN * len(fit.x)
+    return fit.cost["choose"] + FIT.least_gain * len(fit.x)
 
 
 def selection_steps(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[CandidateFit]]]) -> list[SelectionStep]:

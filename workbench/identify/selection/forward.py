@@ -13,8 +13,10 @@ import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Report, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Report, Search
 from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.acceptance import (
     ALL_CLOSED,
@@ -115,7 +117,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, rounds = False, list(rounds)
-    least = LEAST_WALKING if search.evaluator.walks(takes) else ALL_CLOSED * LEAST_GAIN
+    least = LEAST_WALKING if search.evaluator.walks(takes) else ALL_CLOSED * FIT.least_gain
     for _ in range(MOST_ROUNDS):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
         if stopped or not beyond or too_little_left(search, current, takes, rounds):

@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.findings import SUREST
-from workbench.identify.fitting.covariance import TEMPER_WALKING
-from workbench.identify.fitting.fits import Fit, Report, Search, gained
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Report, Search, gained
 from workbench.identify.fitting.responses import Part
+from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.selection.acceptance import explained_at_the_end
 from workbench.identify.selection.forward import CLOSE, MOST_RIVALS
@@ -109,7 +109,7 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     weight = np.maximum(np.exp(0.5 * (leads - leads.max()) / temper), np.where(twins, TWIN, 0.0))
     p = weight / weight.sum()
     closed = explained_at_the_end(search, *seats[fit.effects[i].key], fit)
-    sure = SUREST * next((factor for share, factor in CLOSED if closed >= share), LEAST)
+    sure = CONCLUSIONS.surest * next((factor for share, factor in CLOSED if closed >= share), LEAST)
     told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
             for r, q in zip(rivals, p[1:])]
     return NamePosterior(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
@@ -130,7 +130,7 @@ def _walked(search: Search, c: Candidate, taken: CandidateFit) -> bool:
 def _temper(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> float:
     """What leads of an effect's rivals are divided by when they become probabilities."""
     if _walked(search, c, taken):
-        return max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) * _misfit(search, fit)
+        return max(FIT.overdispersion_free, ROUGH * taken.gain["choose"]) * _misfit(search, fit)
     return TEMPER * _misfit(search, fit, taken.joint)
 
 
@@ -177,7 +177,7 @@ def _by_both(of: Mapping[str, float]) -> float:
 
 def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
     """By how much a rival of an effect that held takes told is better: these take the word first."""
-    walks = _better(search, fit, rival, search.floating_base(search.fitted)) * TEMPER / TEMPER_WALKING
+    walks = _better(search, fit, rival, search.floating_base(search.fitted)) * TEMPER / FIT.overdispersion_free
     return _better(search, fit, rival, search.held) + float(np.clip(walks, -WALKS_SAY, WALKS_SAY))
 
 

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Report, Search, Sizes
-from workbench.identify.fitting.levenberg_marquardt import WALKING, steps_of
-from workbench.identify.fitting.responses import AROUND, SCANNED_GROUND
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.levenberg_marquardt import steps_of
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import COARSE, RolloutRequest
+from workbench.identify.rollouts import RolloutRequest
 from workbench.identify.selection.acceptance import is_acceptable, too_little_left
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
 from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
@@ -80,7 +81,7 @@ class _Around:
     def of(cls, one: CandidateFit, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
         c = one.candidate
         company = [o for o in others if o.key != c.key and not (o.effect.steady_pull and c.effect.steady_pull)]
-        moves = [(e, x, steps_of(x, *e.bounds(), WALKING, e.magnitudes(x))) for e, x in fit.sizes()
+        moves = [(e, x, steps_of(x, *e.bounds(), FIT.stride_free, e.magnitudes(x))) for e, x in fit.sizes()
                  if e.size and not search.is_settled(e)]
         return cls(one, fit, moves, [(o, _probes(o)) for o in company])
 
@@ -104,7 +105,7 @@ class _Around:
 
 def _probes(c: Candidate) -> list[Array]:
     """Sizes at which an effect is looked at: the floor's alone at two."""
-    sizes = (AROUND,) if c.size > 1 else SCANNED_GROUND[:1] if c.where else SCANNED_GROUND
+    sizes = (FIT.scanned_around,) if c.size > 1 else FIT.scanned_ground[:1] if c.where else FIT.scanned_ground
     return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
 
 
@@ -112,7 +113,9 @@ def _foretold(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: S
     """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
     takes = search.telling([t.candidate for t in ones], search.fitted)
     around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
-    questions = [RolloutRequest(with_effects(search.nominal, sizes), takes, COARSE) for a in around for sizes in a.asked()]
+    questions = [
+        RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.asked()
+    ]
     answers = iter([search.evaluator.vector(answer, "fit") for answer in search.evaluator.residuals(questions)])
     best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}
     for a in around:

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
+from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import MOST_STEPS, fitted_beside
 from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
 from workbench.identify.selection.screening import CandidateFit
@@ -49,8 +51,8 @@ def _reevaluated(
                                      gain={use: t.gain[use] + was[use] - now for use, now in left(fit).items()})
             for o, fit in zip(rivals, fits)}
     known = [anew.get(o.candidate.key, o) for o in r.trials]
-    best, taken = max(zip(fits, anew.values()), key=lambda f: f[1].gain["choose"] - LEAST_GAIN * len(f[0].x))
-    if taken.gain["choose"] - t.gain["choose"] < LEAST_GAIN * (1 + len(best.x) - len(current.x)):
+    best, taken = max(zip(fits, anew.values()), key=lambda f: f[1].gain["choose"] - FIT.least_gain * len(f[0].x))
+    if taken.gain["choose"] - t.gain["choose"] < FIT.least_gain * (1 + len(best.x) - len(current.x)):
         best, taken = current, t
     return best, replace(r, trials=tuple(sorted(known, key=lambda o: -o.gain["choose"])),
                          accepted=tuple(taken if a is t else a for a in r.accepted))

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Search
-from workbench.identify.fitting.levenberg_marquardt import HELD, WALKING, Asks, Solved, fit_blocks, through
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
+from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks, through
 from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import COARSE, RolloutEvaluator, RolloutRequest, take_of
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -168,7 +170,7 @@ class CandidateEvaluation:
         c = self.group[0]
         probes = scan(c, scan_sizes(c, self.walking, self.race.unheld), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
-        plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
+        plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse, until=self.until) for q in looks]
         before = self._left(plain)
         signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
         self.signatures[self._name] = probes, signatures, self.until
@@ -272,8 +274,8 @@ class CandidateEvaluation:
         """n steps of a fit of some of the group, at the strides that these takes need."""
         bounds = [self.group[b].bounds() for b in which]
         if not self.walking:
-            return fit_blocks(start, leaves, bounds, n, HELD, since)
-        return fit_blocks(start, leaves, bounds, n, WALKING, since, self.group[which[0]].magnitudes(start[0]))
+            return fit_blocks(start, leaves, bounds, n, FIT.stride_fixed, since)
+        return fit_blocks(start, leaves, bounds, n, FIT.stride_free, since, self.group[which[0]].magnitudes(start[0]))
 
     def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> CandidateFit:
         joint = self.joints[b]
@@ -287,7 +289,7 @@ class CandidateEvaluation:
     def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> RolloutRequest:
         """The robot with those of the group at these sizes, beside what there is already."""
         model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
-        return RolloutRequest(model, self.takes, COARSE if self.coarse else 1.0)
+        return RolloutRequest(model, self.takes, PROBLEM.coarse if self.coarse else 1.0)
 
     def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
         """What an answer leaves: the difference that coarse steps tell, beside what the search's step leaves."""

@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from workbench.identify.fitting.fits import Fit, Search, Sizes
-from workbench.identify.fitting.levenberg_marquardt import HELD, steps_of
-from workbench.identify.fitting.responses import SCANNED, scan
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Search
+from workbench.identify.fitting.levenberg_marquardt import steps_of
+from workbench.identify.fitting.responses import scan
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import RolloutRequest
 from workbench.identify.selection.best_subsets import AS_GOOD, Seen, possible, variants
@@ -46,7 +48,7 @@ def exchanges(
     if not mine or not others:
         return []
     moves = [_moved(c, there[c.key]) for c in mine]
-    probes = [scan(t.candidate, SCANNED, walking=False) for t in others]
+    probes = [scan(t.candidate, FIT.scanned, walking=False) for t in others]
     asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
     asked += [fit.sizes_without(c.key) for c in mine]
     asked += [[*fit.sizes(), (t.candidate, p)] for t, points in zip(others, probes) for p in points]
@@ -70,7 +72,7 @@ def exchanges(
 
 def _moved(c: Candidate, x: Array) -> list[Array]:
     """Sizes with one number moved at a time."""
-    return list(x + np.diag(steps_of(x, *c.bounds(), HELD)))
+    return list(x + np.diag(steps_of(x, *c.bounds(), FIT.stride_fixed)))
 
 
 def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],

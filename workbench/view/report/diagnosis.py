@@ -10,13 +10,14 @@ import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
-from workbench.identify.shooting import WINDOW
+from workbench.identify.options import PROBLEM
 from workbench.identify.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
     capital,
     change,
@@ -27,7 +28,6 @@ from workbench.view.report.words import (
     layers_of,
     left_row,
     listed,
-    name_of,
     next_said,
     quantity,
     rival_of,
@@ -39,8 +39,6 @@ from workbench.view.report.words import (
 from workbench.view.scene.marks import Errors
 from workbench.view.scene.replay import write_replay
 
-SHOWN = 6
-"""Rows of a table that stand open; the rest is folded away."""
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
 Progress = Callable[[str, float | None], None]
@@ -98,9 +96,9 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     if takes:
         report.add(_unseen(takes))
     report.add(_left(diagnosis))
-    others = [r for r in diagnosis.rejected if not any(_rivals(r, f) for f in diagnosis.findings)]
+    others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", _tried(others, "more that were tried")))
+        report.add(Section("What else was tried", tried(others, "more that were tried")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
@@ -113,8 +111,10 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
         what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
     if any(s.recorded.base == "free" for s in takes):
-        what.append(f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {WINDOW:g} s; "
-                    "paths and 3D show it left to itself.")
+        what.append(
+            f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
+            "paths and 3D show it left to itself."
+        )
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
@@ -170,7 +170,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
                              "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
-        parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
+        parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
@@ -182,7 +182,7 @@ def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
     if take.recorded.base == "free":
-        said += f", or the model's body had just been put back beside the recorded one, as every {WINDOW:g} s"
+        said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
 
@@ -192,7 +192,7 @@ def _worst(take: TakeReport) -> float:
 
 def _gap_row(g: GapEntry) -> list[str]:
     when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in g.when[:3]) + (" …" if len(g.when) > 3 else "")
-    return [g.layer, _place(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
+    return [g.layer, place_of(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
 
 
 def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[TakeReport], drawn: set[tuple[int, str]],
@@ -218,10 +218,10 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         drawn.add(shown)
         parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: what the robot did, and what each "
                                                               "model says it does."))
-    rivals = [r for r in rejected if _rivals(r, finding)]
-    if rivals:
+    instead = [r for r in rejected if rivals(r, finding)]
+    if instead:
         parts.append(Text("Tried in its place, and rejected:"))
-        parts += _tried(rivals, "more rivals")
+        parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
@@ -268,45 +268,13 @@ def _left(diagnosis: Diagnosis) -> Section:
     header = ["what is still off", "take", "by", "over noise", "and it goes"]
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
-                  "effect that was tried explains it."), *_folded(header, off, "more")] if off else []
+                  "effect that was tried explains it."), *folded(header, off, "more")] if off else []
     return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
     assert diagnosis.next_experiment is not None
     return Section("What to record next", [Text(next_said(diagnosis.next_experiment))])
-
-
-def _tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
-    """A table; without a column of errors where none was measured."""
-    measured = any(r.validation is not None for r in rejected)
-    header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
-    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
-            for r in rejected]
-    parts = _folded(header, rows, summary)
-    if any(r.reason.of_chi_squared for r in rejected):
-        parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
-    return parts
-
-
-def _left_by(r: Rejected) -> str:
-    return "–" if r.validation is None else unbroken(change(r.validation))
-
-
-def _place(where: Sequence[str]) -> str:
-    return unbroken(listed(where) or "whole robot")
-
-
-def _rivals(r: Rejected, finding: Finding) -> bool:
-    """Whether it was tried in this finding's place: at the same place, or the same effect elsewhere."""
-    return r.where == finding.where or r.effect == finding.effect
-
-
-def _folded(header: list[str], rows: list[list[str]], summary: str) -> list[Part]:
-    parts: list[Part] = [Table(header, rows[:SHOWN])]
-    if len(rows) > SHOWN:
-        parts.append(Details(f"{len(rows) - SHOWN} {summary}", [Table(header, rows[SHOWN:])]))
-    return parts
 
 
 def _finite(x: float) -> float:
