@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -49,7 +50,8 @@ def asked(task: Task) -> float:
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
     """Plans, plays, compares."""
-    machine, rows, numbers, plans = GaitMachine(puppy_model()), [], {}, {}
+    machine, rows, plans = GaitMachine(puppy_model()), [], {}
+    numbers: dict[str, dict[str, Any]] = {}
     tasks = bundled_tasks()[::7] if quick else bundled_tasks()
     count = 4 if quick else RANDOM
     for k, task in enumerate(tasks):

@@ -22,6 +22,7 @@ from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import (
     body_attitude,
     body_path,
+    by_joint,
     film_strip,
     footfalls,
     joint_grid,
@@ -114,7 +115,7 @@ def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | Non
         Picture(phase_portrait(busiest, take.resampled(take.time[take.time > last - 2.0])),
                 f"Speed over angle of {busiest}, the servo with most to do, in the last two seconds."),
         Details("Angles asked and reached, torques, attitude", [
-            Picture(joint_grid(take, stance=stance, span=(max(last - 1.5, 0.0), last)),
+            Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
                     "Each joint, asked (ramp) and reached; the foot's stance is shaded."),
             Picture(joint_torques(take.since_start, take.joints, {"on the link": take.torque}, limit=limit),
                     "Torque of each joint, and the servo's at full duty."),
