@@ -27,7 +27,7 @@ from tests.firmware import native  # noqa: E402
 
 PATIENCE = 150
 """Processor time of a whole run of the tests is about ten seconds [s]."""
-TESTS = [f"tests/firmware/test_{name}.py" for name in ("core_reactions", "core_play", "table_file", "link")]
+TESTS = [f"tests/firmware/test_{name}.py" for name in ("core_reactions", "core_play", "core_edges", "table_file", "link")]
 CHANGES = (
     (r"(?<![<>=!-])<(?![<=])", "<="), (r"<=", "<"), (r"(?<![->=])>(?![>=])", ">="), (r">=", ">"), (r"==", "!="), (r"!=", "=="),
     (r"&&", "||"), (r"\|\|", "&&"), (r"(?<=[\w)] )\+(?= [\w(])", "-"), (r"(?<=[\w)] )-(?= [\w(])", "+"),

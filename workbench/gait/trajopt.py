@@ -143,19 +143,18 @@ class _Programme:
         down = GRAVITY * np.array([-np.sin(self.task.slope), 0.0, -np.cos(self.task.slope)])
         for n in range(N):
             m = (n + 1) % N
-            force = sum(self.f[n, 3 * i:3 * i + 3] for i in range(len(legs)))
-            for axis in range(3):
-                prog.AddLinearConstraint(self.v[m, axis] - self.v[n, axis] == dt * (force[axis] / k.mass + down[axis]))
-                prog.AddLinearConstraint(
-                    self.p[m, axis] - self.p[n, axis] == dt * (self.v[m, axis] + self.v[n, axis]) / 2)
-                prog.AddLinearConstraint(
-                    self.tilt[m, axis] - self.tilt[n, axis] == dt * (self.w[m, axis] + self.w[n, axis]) / 2)
+            one = np.eye(3)
+            prog.AddLinearEqualityConstraint(np.hstack([one, -one, *[-dt / k.mass * one] * len(legs)]), dt * down,
+                                             [*self.v[m], *self.v[n], *self.f[n]])
+            for place, rate in ((self.p, self.v), (self.tilt, self.w)):
+                prog.AddLinearEqualityConstraint(np.hstack([one, -one, -dt / 2 * one, -dt / 2 * one]), np.zeros(3),
+                                                 [*place[m], *place[n], *rate[m], *rate[n]])
             feet = self.path.p[n] + np.array([0.0, 0.0, -self.shape.crouch])
             names = [*self.p[n], *self.w[n], *self.w[m], *self.f[n], *self.place.flatten()]
             prog.AddConstraint(_Turning(feet, inertia, dt, _com(self.machine)), np.zeros(3), np.zeros(3), names)
         for axis in (0, 1):  # the cycle has no place of its own on the floor
-            prog.AddLinearConstraint(self.p[0, axis] == 0)
-        prog.AddLinearConstraint(self.tilt[0, 2] == 0)
+            prog.AddBoundingBoxConstraint(0, 0, self.p[0, axis])
+        prog.AddBoundingBoxConstraint(0, 0, self.tilt[0, 2])
 
     def _bounds(self) -> None:
         prog, machine, law = self.prog, self.machine, self.machine.law

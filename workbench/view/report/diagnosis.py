@@ -118,6 +118,8 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    if why := diagnosis.provenance.get("engine", {}).get("because"):
+        what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)
