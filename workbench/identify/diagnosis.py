@@ -15,22 +15,26 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
+from workbench.compare.metrics import rms
 from workbench.compare.session import Base, Session
-from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
+from workbench.compare.session_takes import LeftOut, Progress, ReadTake, no_progress, read_takes
 from workbench.identify.conclusions import Residuals, change, finding, posterior, rejected, ties, unexplained, verdict_of
 from workbench.identify.estimators.dropped_again import Played, played_as
-from workbench.identify.estimators.dropped_commands import with_missed
+from workbench.identify.estimators.dropped_commands import Missed, with_missed
 from workbench.identify.estimators.geometry import Build, Measured, build_of
 from workbench.identify.estimators.stops_and_mounts import special
-from workbench.identify.findings import Diagnosis, Finding
+from workbench.identify.evidence.explain import explain, is_by_logs
+from workbench.identify.evidence.leftover import left_over
+from workbench.identify.findings import Diagnosis, Finding, GapEntry
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import hanging
 from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.ledger import channel_gaps, ledger
-from workbench.identify.preparation import check_duration, prepared
+from workbench.identify.parameters import Candidate
+from workbench.identify.preparation import Prepared, check_duration, prepared
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import FINE, Jury, Question
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import doubted
 from workbench.identify.selection.forward import select
@@ -40,7 +44,7 @@ from workbench.identify.subset import floors_everywhere, judged_fairly, searched
 from workbench.identify.take_report import TakeReport
 from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import Posterior, RobotModel
 from workbench.simulation import SimulationConfig
 
 STEP = 2e-3
@@ -98,6 +102,9 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     jury, missed = with_missed(sent, known.model, begun.residuals)
     pool = build.asked(candidates(known.model, evidence)) + special(known.model, evidence, begun.residuals)
 
+    if gap and is_by_logs(evidence):
+        return _by_evidence(session, known.model, seen, jury, pool, nominal, build, missed, gap, unreadable, progress, began)
+
     # 4. Which effects explain it: searched for on a part of long sessions, compared with their rivals, numbers refined
     looked_at = searched(judged_fairly(jury.evidence, begun.residuals), begun.residuals)
     chosen = select(Search(jury.on(looked_at), known.model), pool, progress, thorough, Played(sent, missed))
@@ -125,6 +132,29 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         stopped=chosen.stopped, left_out=unreadable + seen.left_out)
     reports = _reports(jury, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return DiagnosisResult(diagnosis, reports, ties(session.model, fit, explained.standings), observation_models(evidence))
+
+
+def _by_evidence(session: Session, known: RobotModel, seen: Prepared, jury: Jury, pool: Sequence[Candidate], nominal: Fit,
+                 build: Build, missed: Sequence[Missed], gap: tuple[GapEntry, ...], unreadable: LeftOut, progress: Progress,
+                 began: float) -> DiagnosisResult:
+    """Steps 4 to 6 of servo logs, by evidence."""
+    evidence, everywhere = jury.evidence, tuple(range(len(jury.evidence)))
+    told = explain(jury, known, pool, progress)
+    fitted = told.model
+    progress("rolling out the fitted model", None)
+    longer, after = (jury.residuals([Question(fitted, everywhere, step)])[0] for step in (2 * FINE, FINE))
+    floors = {i: np.nan_to_num(rms((longer[i] - after[i])[evidence[i].moving])) for i in everywhere}
+    findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
+                  for m in build.measured), *(m.finding() for m in missed), *told.findings(evidence, nominal.residuals, after))
+    left = left_over(evidence, after, floors)
+    diagnosis = Diagnosis(
+        verdict=verdict_of(bool(findings or left), findings, left),
+        model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
+        findings=findings, rejected=told.losers(), unexplained=left, posterior=told.posterior() if not missed else Posterior(),
+        provenance=provenance(session.model, jury.config, time.monotonic() - began) | {"seed": 0, "rollouts": jury.rollouts},
+        left_out=unreadable + seen.left_out, recalibrated=told.recalibrated)
+    reports = _reports(jury, seen.nominal, nominal.residuals, after, fitted)
+    return DiagnosisResult(diagnosis, reports, told.ties(), observation_models(evidence))
 
 
 def _believed(build: Build, jury: Jury, model: RobotModel, nominal: Fit) -> Build:

@@ -14,15 +14,17 @@ R. Kass and A. Raftery, JASA 90, 1995.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
 Array = NDArray[np.float64]
-GRID = 48
-"""Sizes of the discrepancy that are looked at: they are 15 % apart, and evidence hardly changes within that."""
+CLOSE = 0.02
+"""Share to which the discrepancy's size is found: a hundred samples tell it to a twentieth."""
 
 
 @dataclass(frozen=True)
@@ -75,18 +77,23 @@ class Likelihood:
 
     def discrepancy(self, r: Array) -> float:
         """The likeliest size of the discrepancy [rad]."""
-        sizes = np.geomspace(*self.between, GRID)
-        return float(sizes[int(np.argmax([self.log(r, s) for s in sizes]))])
+        return self._largest(lambda s: self.log(r, s))[1]
 
     def evidence(self, r: Array, J: Array, log_prior: float, prior_precision: Array) -> tuple[float, float]:
         """Log evidence [nats], and the discrepancy at which it is largest [rad]. J (n, k): of r by the model's numbers, there;
         log_prior: of the numbers; prior_precision (k,): its curvature."""
-        best = (-np.inf, self.between[0])
-        for s in np.geomspace(*self.between, GRID):
+        def log(s: float) -> float:
             H = (J.T * self.precision(r, s)) @ J + np.diag(prior_precision)
-            log = self.log(r, s) + log_prior + 0.5 * len(H) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(H)[1]
-            best = max(best, (float(log), float(s)))
-        return best
+            return self.log(r, s) + 0.5 * len(H) * float(np.log(2 * np.pi)) - 0.5 * float(np.linalg.slogdet(H)[1])
+
+        found, s = self._largest(log)
+        return found + log_prior, s
+
+    def _largest(self, value: Callable[[float], float]) -> tuple[float, float]:
+        """The most that a function of the discrepancy comes to, and where."""
+        ends = (float(np.log(self.between[0])), float(np.log(self.between[1])))
+        found = minimize_scalar(lambda x: -value(float(np.exp(x))), bounds=ends, method="bounded", options={"xatol": CLOSE})
+        return -float(found.fun), float(np.exp(found.x))
 
 
 def correlation_time(parts: list[tuple[Array, float]], window: float) -> float:

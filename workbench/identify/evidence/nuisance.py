@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from workbench.identify.findings import Recalibrated
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -25,21 +26,6 @@ class Uncertain:
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
-
-
-@dataclass(frozen=True)
-class Recalibrated:
-    """What a number became: nominal and fitted values, in `unit`; sigmas: standard deviations of what was known that it went."""
-
-    number: Uncertain
-    nominal: float
-    value: float
-    sigmas: float
-    unit: str
-
-    def to_json(self) -> dict[str, object]:
-        return {"number": self.number.name, "where": [self.number.joint], "nominal": self.nominal, "value": self.value,
-                "sd": self.number.sd * (self.nominal or 1.0), "sigmas": self.sigmas, "unit": self.unit}
 
 
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
@@ -77,7 +63,7 @@ def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recal
     for number, by in z.items():
         nominal = 0.0 if number.name == ZERO else _nominal(model.servo(number.joint), number.name)
         value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number, nominal, value, float(by), UNITS[number.name]))
+        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
     return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.likelihood import Likelihood, correlation_time
+from workbench.identify.evidence.logs import residuals_of
 from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
@@ -53,7 +54,7 @@ class Part:
         """By channel at even times, NaN where unseen; r (n,)."""
         values = np.full(self.seen.shape, np.nan)
         values[self.seen] = r
-        whole = np.full((len(self.rows), values.shape[1]), np.nan)
+        whole = np.full((len(self.rows), len(self.columns)), np.nan)
         whole[self.rows] = values
         return list(whole[::self.every].T)
 
@@ -78,6 +79,10 @@ class Region:
         """Of which take each residual of `vector` is (n,)."""
         return np.concatenate([np.full(p.size, p.take) for p in self.parts])
 
+    def of(self, takes: Sequence[int]) -> Mask:
+        """Which residuals are of some takes (n,)."""
+        return np.asarray(np.isin(self.takes, takes))
+
     def measured(self, r: Array, options: EvidenceOptions) -> Region:
         """The region with the correlation time that residuals (n,) show; the largest are cut, as an event is none of it."""
         series, at = [], 0
@@ -89,7 +94,7 @@ class Region:
 
     def of_takes(self, takes: Sequence[int]) -> Region:
         """The same judged by some takes alone."""
-        mine = np.isin(self.takes, takes)
+        mine = self.of(takes)
         likelihood = replace(self.likelihood, known=self.likelihood.known[mine], span=self.likelihood.span[mine])
         return replace(self, parts=tuple(p for p in self.parts if p.take in takes), likelihood=likelihood)
 
@@ -145,7 +150,7 @@ class Rollouts:
             questions.append(Question(self.model(hypotheses), takes))
             shared.append(here)
         out: list[Array] = [np.empty(0)] * len(wants)
-        for here, residuals in zip(shared, self.jury.residuals(questions)):
+        for here, residuals in zip(shared, residuals_of(self.jury, questions)):
             for region, k in here.items():
                 out[k] = self.regions[region].vector(residuals)
         return out
