@@ -37,7 +37,8 @@ def region(candidates: Sequence[Candidate], n: int = 400, takes: int = 4, noise:
 
 @dataclass(frozen=True)
 class Linear(Rollouts):
-    """truth (n,): what the nominal law leaves; does: by effect and number of the nominal law, what a unit of it takes off (n,)."""
+    """truth (n,): what the nominal law leaves; does: by effect and number of the nominal law, what a unit of it takes off
+    (n,)."""
 
     truth: np.ndarray = field(default_factory=lambda: np.empty(0))
     does: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -71,8 +71,8 @@ class Parameter:
 @dataclass(frozen=True)
 class Registers:
     """What the servos' own registers said in one log, NaN where they said nothing. duty, nominal_duty: by joint, (N,), what a
-    servo's H-bridge did, and what the nominal law does at the logged error, before it is cut at 1. voltage (N,) [V], None where it
-    was not logged."""
+    servo's H-bridge did, and what the nominal law does at the logged error, before it is cut at 1. voltage (N,) [V], None where
+    it was not logged."""
 
     duty: Mapping[str, Array]
     nominal_duty: Mapping[str, Array]

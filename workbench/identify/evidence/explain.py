@@ -1,4 +1,5 @@
-"""Servo logs explained by evidence: from recordings to a model with its names, their probabilities, and what speaks against others."""
+"""Servo logs explained by evidence: from recordings to a model with its names, their probabilities, and what speaks against
+others."""
 
 from __future__ import annotations
 
@@ -10,13 +11,13 @@ from numpy.typing import NDArray
 
 from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import WORTH_AN_EXPERIMENT, Residuals, change, estimates, value_slopes
-from workbench.identify.evidence.fit import Asks, Fitted, polished
+from workbench.identify.evidence.fit import Asks, Fitted, fitting
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.nuisance import as_mapping, uncertain_numbers, what_changed
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
-from workbench.identify.evidence.region import Rollouts, region_of
+from workbench.identify.evidence.region import Region, Rollouts, region_of
 from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.search import Found, lockstep, search, standing, without_names
 from workbench.identify.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected
@@ -38,8 +39,8 @@ WORTH_SAYING = 0.01
 
 @dataclass(frozen=True)
 class Explanation:
-    """The likeliest model, and all that was believed beside it. regions, fits, posteriors: alike, one a region; rejected: refuted by
-    registers or by takes kept back."""
+    """The likeliest model, and all that was believed beside it. regions, fits, posteriors: alike, one a region; rejected:
+    refuted by registers or by takes kept back."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -97,7 +98,8 @@ class Explanation:
         return Posterior(names, mean, whole)
 
     def losers(self) -> tuple[Rejected, ...]:
-        """Effects that were fitted and are not in the likeliest model, with the nats by which the best model with them is behind."""
+        """Effects that were fitted and are not in the likeliest model, with the nats by which the best model with them is
+        behind."""
         out = list(self.rejected)
         said = {(r.effect, r.where) for r in out}
         for p, found in zip(self.posteriors, self.found):
@@ -135,12 +137,13 @@ def explain(jury: Jury, nominal: RobotModel, pool: Sequence[Candidate], progress
             options: EvidenceOptions | None = None) -> Explanation:
     """Searches each joint's effects by evidence."""
     options = options or EvidenceOptions()
+    whole = jury
+    jury = whole.on(_begun(whole.evidence, options.seconds))
     evidence = jury.evidence
     joints = [j for j in nominal.joints if any(j in e.channels for e in evidence)]
     felt = [c for c in pool if c.where != (nominal.base,)]
     asked, refuted = within_registers(felt, [e.take for e in evidence], options)
-    regions = tuple(region_of([j], evidence, uncertain_numbers(nominal, j, zeroed=False), _acting(asked, j, nominal), options)
-                    for j in joints)
+    regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     rollouts = Rollouts(jury, nominal, regions, tuple(start(r.numbers) for r in regions))
     rollouts, found = search(rollouts, options, progress)
     rejected = list(refuted)
@@ -157,27 +160,51 @@ def explain(jury: Jury, nominal: RobotModel, pool: Sequence[Candidate], progress
             found = tuple(without_names(f, gains) if i == k else f for i, f in enumerate(found))
         rollouts = standing(rollouts, found)
     progress("numbers at a finer step", None)
-    fine = replace(rollouts, jury=Jury(evidence, replace(jury.config, time_step=FINE * jury.config.time_step), jury.n_jobs))
-    last = lockstep(fine, {k: _finished(f, options) for k, f in enumerate(found)})
+    fine = Jury(whole.evidence, replace(whole.config, time_step=FINE * whole.config.time_step), whole.n_jobs)
+    entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
+                   for j, f in zip(joints, found))
+    finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
+    last = lockstep(replace(rollouts, jury=fine, regions=entire), finishing)
     found = tuple(last[k] for k in range(len(found)))
-    return Explanation(nominal, standing(rollouts, found), found, tuple(posterior_of(list(f.fits.values()), options) for f in found),
-                       tuple(rejected), options)
+    whole.rollouts += jury.rollouts + fine.rollouts
+    believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
+    return Explanation(nominal, standing(rollouts, found), found, believed, tuple(rejected), options)
 
 
-def _finished(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """The best fit with the last numbers."""
+def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
+    """The beginnings of takes that are not for validation alone, of so many seconds together."""
+    told = [e for e in evidence if e.uses["fit"].any() or e.uses["choose"].any()]
+    lengths = sorted(float(e.since[-1]) for e in told)
+    until, left = np.inf, seconds
+    for k, length in enumerate(lengths):  # short takes are looked at to their end
+        if length * (len(lengths) - k) > left:
+            until = left / (len(lengths) - k)
+            break
+        left -= length
+    return [replace(e, until=until) if any(e is t for t in told) else replace(e, until=0.0) for e in evidence]
+
+
+def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
+            ) -> Region:
+    return region_of([joint], evidence, uncertain_numbers(nominal, joint, zeroed=False), _acting(pool, joint, nominal), options)
+
+
+def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:
+    """The best fit with the last numbers, from whole takes; among the others it stays as likely as the search found it."""
     best = found.best
     (r,) = yield [best.hypothesis]
-    begun = replace(best, r=r)
-    fit: Fitted = yield from polished(found.region, options, begun, options.polish)
-    fit = replace(fit, log_evidence=max(fit.log_evidence, best.log_evidence))  # the others were judged at the search's step
-    return replace(found, fits={**found.fits, best.hypothesis.key: fit})
+    region = entire.measured(r, options)
+    s = region.likelihood.discrepancy(r)
+    fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.polish, r)
+    fit = replace(fit, log_evidence=best.log_evidence, log_prior=best.log_prior)
+    return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 
 def _acting(pool: Sequence[Candidate], joint: str, model: RobotModel) -> list[Candidate]:
     """Candidates that act in one joint: there, in the link that it carries, or, of a robot of one joint, anywhere."""
-    if len(model.joints) == 1:
-        return list(pool)
+    if len(model.joints) == 1:  # where all joints are one, what all do is what it does
+        own = {c.name for c in pool if c.where == (joint,)}
+        return [c for c in pool if c.where or c.name not in own]
     link = model.kinematics.frames[joint].child
     return [c for c in pool if c.where in ((joint,), (link,))]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ cannot know where it ends."""
 
 
 def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tuple[int, ...]]:
-    """Groups of takes to be kept back in turn: by what differs in the servos' constants (the gain) where anything does, else take by
-    take. Empty where there is one take alone."""
+    """Groups of takes to be kept back in turn: by what differs in the servos' constants (the gain) where anything does, else
+    take by take. Empty where there is one take alone."""
     groups: dict[str, list[int]] = {}
     for i in takes:
         groups.setdefault(repr(sorted(evidence[i].take.spec.servos.items())), []).append(i)
@@ -35,9 +35,10 @@ def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tup
     return [tuple(takes[k::n]) for k in range(n)]
 
 
-def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]) -> Asks[dict[Candidate, float]]:
-    """The effects of a fit that unseen takes speak against, with by how much [nats]: log likelihood of takes kept back, of the fit
-    with them and without, each fitted to the other takes; summed over the folds that can tell."""
+def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]
+           ) -> Asks[dict[Candidate, float]]:
+    """The effects of a fit that unseen takes speak against, with by how much [nats]: log likelihood of takes kept back, of the
+    fit with them and without, each fitted to the other takes; summed over the folds that can tell."""
     effects = best.hypothesis.effects
     said = dict.fromkeys(range(len(effects)), 0.0)
     for fold in folds:
@@ -74,7 +75,3 @@ def _excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:
     told = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
     return bool(told[region.of([p.take for p in seen.parts])].sum() >= EXCITED * told.sum())
 
-
-def as_text(gains: Mapping[Candidate, float]) -> list[str]:
-    """For a person."""
-    return [f"{c}: takes kept back are {-gain:.0f} nats less likely with it" for c, gain in gains.items()]

@@ -23,8 +23,8 @@ FULL = 0.9
 
 
 class _Event(NamedTuple):
-    """From its first instant of the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad, rad/s],
-    and duty, NaN where it was not logged."""
+    """From its first instant of the take's clock [s], RMS error there [rad], median angle, speed and error of position [rad,
+    rad/s], and duty, NaN where it was not logged."""
 
     begin: float
     error: float
@@ -61,8 +61,8 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
     register = e.take.recording.channels.get(f"duty.{joint}")
     duty = np.full(len(time), np.nan) if register is None else np.interp(time, e.take.recording.time, register)
     with np.errstate(all="ignore"):
-        return _Event(float(time[at][0]), float(np.sqrt(np.nanmean(np.square(r[at])))), float(np.nanmedian(q[at])),
-                      float(np.nanmedian(np.abs(speed[at]))), float(np.nanmedian(np.abs(said[at]))), float(np.nanmedian(duty[at])))
+        middle = [float(np.nanmedian(x[at])) for x in (q, np.abs(speed), np.abs(said), duty)]
+        return _Event(float(time[at][0]), float(np.sqrt(np.nanmean(np.square(r[at])))), *middle)
 
 
 def _told(event: _Event) -> str:

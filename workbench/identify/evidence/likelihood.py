@@ -2,12 +2,14 @@
 
     r ~ t(0, sqrt(noise^2 + numerics^2 + s^2)),  each frame counting frame time / (2 tau)
 
-r: recorded less simulated angles of one joint. noise: of the recording; numerics: what the simulation's step leaves open; s: the
-model's own discrepancy (M. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63, 2001), estimated for each model by its evidence, so that a
-model that leaves less may be sure of more. tau: correlation time of what is left, measured, as neighbouring frames err alike; a
-log of a minute tells some hundred independent things, not ten thousand. The tails are Student's, as stick and slip are events.
+r: recorded less simulated angles of one joint. noise: of the recording; numerics: what the simulation's step leaves open; s:
+the model's own discrepancy (M. Kennedy and A. O'Hagan, J. R. Stat. Soc. B 63, 2001), estimated for each model by its evidence,
+so that a model that leaves less may be sure of more. tau: correlation time of what is left, measured, as neighbouring frames
+err alike; a log of a minute tells some hundred independent things, not ten thousand. The tails are Student's, as stick and slip
+are events.
 
-    log evidence = max over s of  log p(r | theta, s) + log p(theta) + k/2 log 2 pi - 1/2 log |H|         (Laplace, at the fitted theta)
+log evidence = max over s of  log p(r | theta, s) + log p(theta) + k/2 log 2 pi - 1/2 log |H|         (Laplace, at the fitted
+theta)
 
 R. Kass and A. Raftery, JASA 90, 1995.
 """
@@ -29,8 +31,8 @@ CLOSE = 0.02
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Of residuals (n,) [rad]. known (n,): noise and numerics together [rad]; span (n,): time that each frame stands for [s]; tau:
-    correlation time [s]; tails: degrees of freedom; between: least and most discrepancy [rad]."""
+    """Of residuals (n,) [rad]. known (n,): noise and numerics together [rad]; span (n,): time that each frame stands for [s];
+    tau: correlation time [s]; tails: degrees of freedom; between: least and most discrepancy [rad]."""
 
     known: Array
     span: Array
@@ -97,9 +99,9 @@ class Likelihood:
 
 
 def correlation_time(parts: list[tuple[Array, float]], window: float) -> float:
-    """Integrated autocorrelation time [s] of residuals, of takes (values with NaN where unseen, time between frames [s]) together:
-    half the frame time where frames are independent. Summed until it is `window` correlation times long (A. Sokal, Monte Carlo
-    methods in statistical mechanics, 1997)."""
+    """Integrated autocorrelation time [s] of residuals, of takes (values with NaN where unseen, time between frames [s])
+    together: half the frame time where frames are independent. Summed until it is `window` correlation times long (A. Sokal,
+    Monte Carlo methods in statistical mechanics, 1997)."""
     frame = float(np.median([dt for _, dt in parts]))
     longest = max(len(x) for x, _ in parts)
     products, pairs = np.zeros(longest), np.zeros(longest)

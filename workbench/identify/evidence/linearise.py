@@ -17,8 +17,8 @@ from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
 AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
-"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows nothing
-until it is met."""
+"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
+nothing until it is met."""
 SHAPES = (0.0, 2.0, -2.0)
 """Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
@@ -38,7 +38,8 @@ class Move:
 
 @dataclass(frozen=True)
 class _Probe:
-    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that leaves."""
+    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that
+    leaves."""
 
     candidate: Candidate
     x: Array

@@ -43,11 +43,11 @@ def _answer(jury: Jury, q: Question, held: object) -> dict[int, Array]:
         return jury.residuals([q])[0]
     jury.rollouts += len(jobs)
     out = {}
-    for i, job, q_servo in zip(q.takes, jobs, angles):
+    for i, q_servo in zip(q.takes, angles):
         e = jury.evidence[i]
         columns = [q.model.joints.index(j) for j in e.joints]
         simulated = np.full(e.recorded.shape, np.nan)
-        simulated[e.since >= 0] = q_servo[:, columns]
+        simulated[(e.since >= 0) & (e.since <= e.until)] = q_servo[:, columns]
         out[i] = (e.recorded - simulated - e.offset) / (e.sigma * e.rough)
     return out
 
@@ -55,11 +55,11 @@ def _answer(jury: Jury, q: Question, held: object) -> dict[int, Array]:
 def _job(jury: Jury, i: int, model: RobotModel, held: object) -> Job:
     take = jury.evidence[i].take
     times = jury.evidence[i].since
-    times = times[times >= 0]
+    times = times[(times >= 0) & (times <= jury.evidence[i].until)]
     return Job(model, held, take.commands, float(times[-1]) + 2e-3, 0.1, name=take.spec.name,  # type: ignore[arg-type]
                times=times, start=take.start_state())
 
 
 def _is_log(jury: Jury, i: int) -> bool:
     e = jury.evidence[i]
-    return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints and np.isinf(e.until)
+    return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints

@@ -11,14 +11,14 @@ from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)
-"""Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on it by
-eye."""
+"""Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
+it by eye."""
 
 
 @dataclass(frozen=True)
 class Uncertain:
-    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations make
-    it nominal · exp(sd z), and a zero of sd z."""
+    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
+    make it nominal · exp(sd z), and a zero of sd z."""
 
     joint: str
     name: str
@@ -30,12 +30,13 @@ class Uncertain:
 
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
          "reflected_inertia": "kg m^2", ZERO: "rad"}
-"""The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells apart."""
+"""The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
+apart."""
 
 
 def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncertain]:
-    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log tells
-    a zero."""
+    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
+    tells a zero."""
     servo = model.servo(joint)
     shares = {
         "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),

@@ -62,7 +62,8 @@ def posterior_of(fits: Sequence[Fitted], options: EvidenceOptions) -> RegionPost
         for family in {known_effects()[name].family for name, _ in _names(f)}:
             if family is not None:
                 families[family] = families.get(family, 0.0) + w
-    return RegionPosterior(tuple(zip(near, weights.tolist())), named, families)
+    sums = [{k: min(1.0, v) for k, v in each.items()} for each in (named, families)]  # of rounded weights
+    return RegionPosterior(tuple(zip(near, weights.tolist())), *sums)  # type: ignore[arg-type]
 
 
 def _names(f: Fitted) -> set[Named]:

@@ -30,8 +30,8 @@ LOST = 1.0
 
 @dataclass(frozen=True)
 class Part:
-    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording; scale
-    (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
+    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording;
+    scale (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
 
     take: int
     rows: Mask
@@ -106,7 +106,7 @@ def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: 
     for i, e in enumerate(evidence):
         columns = np.array([k for k, c in enumerate(e.channels) if c in joints], dtype=int)
         every = max(1, round(SPAN / e.frame_time))
-        rows = (e.uses["fit"] | e.uses["choose"]) & (np.arange(len(e.since)) % every == 0)
+        rows = (e.uses["fit"] | e.uses["choose"]) & (np.arange(len(e.since)) % every == 0) & (e.since <= e.until)
         if not len(columns) or not rows.any():
             continue
         seen = np.isfinite(e.recorded[rows][:, columns])

@@ -35,8 +35,8 @@ def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
 
 def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
-    """Candidates as far as the registers let them go, and those that they refute: of which not even LEAST_SIZE of the typical size
-    is within `sure` standard errors of what a register says."""
+    """Candidates as far as the registers let them go, and those that they refute: of which not even LEAST_SIZE of the typical
+    size is within `sure` standard errors of what a register says."""
     logs, kept, refuted = registers_of(takes), [], []
     for c in candidates:
         told = c.effect.in_registers(logs, c.where)
@@ -47,7 +47,8 @@ def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake],
         reach = abs(value - c.neutral[0]) + options.sure * error
         if reach < LEAST_SIZE * abs(c.typical[0] - c.neutral[0]):
             p = c.parameters[0]
-            refuted.append(Rejected(c.name, c.where, f"the servos' own registers say {p.name} {value:.3g} ± {error:.2g} {p.unit}".rstrip()))
+            said = f"the servos' own registers say {p.name} {value:.3g} ± {error:.2g} {p.unit}"
+            refuted.append(Rejected(c.name, c.where, said.rstrip()))
         else:
             kept.append(replace(c, reach=reach))
     return kept, refuted

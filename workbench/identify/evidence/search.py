@@ -24,8 +24,8 @@ Report = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class Found:
-    """What the search of one region fitted, by which effects there are, and which of these are as good as any more could make them
-    (extended)."""
+    """What the search of one region fitted, by which effects there are, and which of these are as good as any more could make
+    them (extended)."""
 
     region: Region
     fits: Mapping[Key, Fitted]
@@ -54,11 +54,11 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
         before = [f.best.log_posterior for f in found]
         levels = {i: _level(found[i], options) for i in sorted(open_)}
         found = _replaced(found, lockstep(rollouts, levels))
+        open_ = {i for i in open_ if found[i].best.log_posterior > before[i] + options.stop}
+        open_ = {i for i in open_ if len(found[i].best.hypothesis.effects) < options.most}
         rollouts = standing(rollouts, found)
         again = {i: _renewed(found[i], options) for i in range(len(found))}  # other joints moved, and what is left is shorter
         found = _replaced(found, lockstep(rollouts, again))
-        open_ = {i for i in open_ if found[i].best.log_posterior > before[i] + options.stop or not _all_extended(found[i], options)}
-        open_ = {i for i in open_ if len(found[i].best.hypothesis.effects) < options.most}
         if not open_:
             break
     report("taking effects out, and others in their place", None)
@@ -160,10 +160,6 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 def _dropped(region: Region, options: EvidenceOptions, f: Fitted, name: str) -> Asks[Fitted]:
     h, J = without(f, lambda c: c.name == name)
     return (yield from fitting(region, options, h, f.discrepancy, options.iterations, None, J))
-
-
-def _all_extended(found: Found, options: EvidenceOptions) -> bool:
-    return all(f.hypothesis.key in found.extended for f in found.beam(options)[:1])
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:

@@ -22,8 +22,8 @@ _schedules: OrderedDict[Any, tuple[Commands, Schedule]] = OrderedDict()
 
 
 def servo_angles(jobs: Sequence[Job]) -> list[Array]:
-    """Of each job the angles (M, n) [rad] of the servos at its `times`, as their own sensors tell them, NaN outside the run. Jobs of
-    one model share what is made of it. NotCoveredError says why a job has to be Drake's."""
+    """Of each job the angles (M, n) [rad] of the servos at its `times`, as their own sensors tell them, NaN outside the run.
+    Jobs of one model share what is made of it. NotCoveredError says why a job has to be Drake's."""
     machines: dict[Any, CompiledJob] = {}
     out = []
     for job in jobs:

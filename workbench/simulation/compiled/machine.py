@@ -77,7 +77,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         ceiling=ceiling, sag=np.array([t.sag for t in numbers if t.sag]), supply=_array(law.full_torque / law.torque_per_volt),
         fade=float(sum(t.fade for t in numbers)), sticking=_array([t.sticking for t in sticking]).reshape(len(sticking), n),
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,
-        still=_array([t.rubbing_still for t in still]).reshape(len(still), n), still_speed=_array([t.rubbing_speed for t in still]),
+        still=_array([t.rubbing_still for t in still]).reshape(len(still), n),
+        still_speed=_array([t.rubbing_speed for t in still]),
         backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n))
 
 
