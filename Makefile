@@ -13,10 +13,14 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
-.PHONY: demo test test-newest lint docs prove studies system clean
+.PHONY: firmware demo test test-newest lint docs prove studies system clean
 
 demo: $(STAMP)
 	$(BIN)/workbench demo
+
+# The robot's own program, with gcc-arm-none-eabi alone; image, sizes and the bound of its stack: runs/firmware.
+firmware:
+	@$(MAKE) --no-print-directory -C firmware
 
 test: lint
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile -m "not slow"

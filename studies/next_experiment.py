@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 
 from studies.common import publish, run_study, sign
 from studies.next_experiment_robot import Fitted, Hidden, Jury
-from workbench.experiment.design import SEPARATED, Experiment, design_experiment
+from workbench.experiment.design import Experiment, design_experiment
+from workbench.experiment.options import EXPERIMENT
 from workbench.motion import Motion
 from workbench.robot import EffectSpec, RobotModel
 from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, RECORDED, legend_above, new_figure, styled
@@ -90,7 +91,7 @@ def next_experiment(out: Path, quick: bool, progress: Callable[[str, float | Non
     outcomes = [run(case, out / "sessions" / case.hidden.effect, progress) for case in (CASES[:1] if quick else CASES)]
     model = outcomes[0].jury.nominal
     figures = {o.case.hidden.effect: draw(o) for o in outcomes} | {"likelihoods": draw_likelihoods(outcomes)}
-    reached = sum(o.ratios[1] >= SEPARATED for o in outcomes)
+    reached = sum(o.ratios[1] >= EXPERIMENT.separated for o in outcomes)
     report = Report(
         "The next experiment", f"{reached} of {len(outcomes)} ties resolved: the designed motion reaches the hidden name.",
         "Robots of another engine (MuJoCo), filmed with noise. What is designed knows the two fitted models, not the truth. "
@@ -202,7 +203,7 @@ def draw_likelihoods(outcomes: Sequence[Outcome]) -> Figure:
         for ratio, colour, dy, label in zip(o.ratios, (COMMAND, ACCENT), (-0.19, 0.19), labels):
             axes.barh(k + dy, ratio, 0.34, color=colour, label=label if k == 0 else None)
             axes.annotate(f"{sign(ratio)}", (max(ratio, 0.0), k + dy), xytext=(5, 0), textcoords="offset points", va="center")
-    axes.axvline(SEPARATED, color=RECORDED, lw=1.2, ls="--", label=f"separated ({SEPARATED:g})")
+    axes.axvline(EXPERIMENT.separated, color=RECORDED, lw=1.2, ls="--", label=f"separated ({EXPERIMENT.separated:g})")
     axes.set_xscale("symlog", linthresh=5)
     axes.set_yticks(range(len(outcomes)), [f"{o.case.hidden.effect}\nnot {o.case.rival.effect}" for o in outcomes])
     axes.invert_yaxis()

@@ -1,4 +1,4 @@
-"""Whether two runs of `workbench diagnose` say the same: findings.json and model.yaml, hashed without version, time and path.
+"""Whether two runs of `workbench diagnose` say the same: findings.json and model.yaml, hashed without version, time and settings.
 
     python -m studies.same_findings BEFORE AFTER
 
@@ -17,7 +17,7 @@ from typing import Any
 import yaml
 
 FILES = ("findings.json", "model.yaml")
-OF_THE_RUN = {"workbench", "drake", "seconds"}
+OF_THE_RUN = {"workbench", "drake", "seconds", "config"}
 """Keys of `provenance` that no result depends on."""
 
 

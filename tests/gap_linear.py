@@ -7,7 +7,7 @@ import numpy as np
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Fit
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import CandidateFit
 from workbench.robot import puppy_model
 
 COUNT = 900
@@ -23,7 +23,7 @@ def candidate(name):
 def trial(name, closed=0.5, joint="knee"):
     effect = known_effects()[name]
     c = Candidate.of(effect, ("knee",), effect.neutral(SimpleNamespace()))
-    return Trial(c, np.ones(c.size), {"fit": 1.0, "choose": 1.0}, joint, foretold=True, closed=closed)
+    return CandidateFit(c, np.ones(c.size), {"fit": 1.0, "choose": 1.0}, joint, screened_out=True, closed=closed)
 
 
 def names(sets):
@@ -39,7 +39,7 @@ class LinearSearch:
         self.does = does
         self.recorded = self.sum([(candidate(name), np.array(x)) for name, x in sizes.items()])
         self.asked = 0
-        self.jury = SimpleNamespace(
+        self.evaluator = SimpleNamespace(
             residuals=self.answers, vector=lambda left, use: left[0][:, 0],
             cost=lambda left, use: (2.0 if use == "fit" else 1.0) * float(sum(np.sum(r**2) for r in left.values())),
             by_channel=lambda left, use: (np.array([np.sum(left[0] ** 2)]), np.array([COUNT])))

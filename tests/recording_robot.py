@@ -91,5 +91,5 @@ def capture(model: RobotModel, yaw: float = 0.7, start: float = 0.4137, seconds:
         bodies[asset] = BodyTrack(capture_axes(turned(p_W, yaw) + offset),
                                   np.column_stack([quat[:, 0], capture_axes(quat[:, 1:])]), np.full(len(time), 1e-4))
     recording = Recording(source="synthetic.csv", kind="motive", version="1.23", time=time, frames=np.arange(len(time)),
-                          rate=rate, units="Meters", rigid_bodies=bodies)
+                          rate=rate, units="Meters", rigid_bodies=bodies, sensing="mocap")
     return Captured(recording, time, joints, q, p_WB, yaw, pivots, start)

@@ -110,7 +110,7 @@ def test_text_says_the_same(capsys: pytest.CaptureFixture[str]) -> None:
     ("", "empty"),
     ("time,neck\n0,0\n1,nan\n", "line 3, column neck: expected a finite number"),
     ("Format Version,1.23,Take Name,cut\n", "line"),
-    ("<sdf version='1.7'><model name='x'/>", "Drake cannot read this model"),
+    ("<sdf version='1.7'><model name='x'/>", "not whole XML"),
 ])
 def test_what_it_cannot_read_is_one_line(content: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file.csv").write_text(content)

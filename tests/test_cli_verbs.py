@@ -81,7 +81,7 @@ def test_export_is_refused_unless_forced(arm: Path, capsys: pytest.CaptureFixtur
     assert "rpm, beyond its no-load speed" in line
     assert not (arm / "out").exists()
     succeeds(capsys, "export", *_at(arm), "--force")
-    assert sorted(p.name for p in (arm / "out").iterdir()) == ["motion.h", "pos.txt", "speed.txt", "timeDiff.txt"]
+    assert sorted(p.name for p in (arm / "out").iterdir()) == ["motion.h", "motion.table", "pos.txt", "speed.txt", "timeDiff.txt"]
 
 
 BAD_MOTIONS = [

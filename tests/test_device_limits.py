@@ -122,7 +122,7 @@ def test_export_refuses_unless_forced(model: RobotModel, tmp_path: Path) -> None
     with pytest.raises(InputError, match="outside 0 to 1023"):
         export(replace(WALK, times=WALK.times / 4), model, tmp_path / "out", force=True)
     fair = export(WALK, model, tmp_path / "fair", take(0.1))
-    assert {f.name for f in fair.files} == {"pos.txt", "speed.txt", "timeDiff.txt", "motion.h"}
+    assert {f.name for f in fair.files} == {"pos.txt", "speed.txt", "timeDiff.txt", "motion.h", "motion.table"}
     assert all(v.warning for v in fair.violations)
 
 

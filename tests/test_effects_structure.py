@@ -364,7 +364,7 @@ def captured():
 
 
 def recorded(bodies, clock) -> Recording:
-    return Recording("made", "motive", "1.23", clock, np.arange(len(clock)), 120.0, rigid_bodies=bodies)
+    return Recording("made", "motive", "1.23", clock, np.arange(len(clock)), 120.0, rigid_bodies=bodies, sensing="mocap")
 
 
 def test_cameras_see_the_links_of_a_changed_robot(captured):

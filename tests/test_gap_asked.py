@@ -13,7 +13,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import candidates, heavy_links
 from workbench.identify.selection import forward as selection
 from workbench.identify.selection import scheduling as asked
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import CandidateFit
 from workbench.robot import puppy_model
 
 
@@ -28,20 +28,20 @@ from workbench.robot import puppy_model
 def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatch, gaps, expected):
     named = {c.replace(" across ", ACROSS): s for c, s in gaps.items()}
     monkeypatch.setattr(asked, "channel_gaps", lambda e, residual: named)
-    search = SimpleNamespace(grounded=lambda takes: takes, jury=SimpleNamespace(evidence=[None]),
+    search = SimpleNamespace(floating_base=lambda takes: takes, evaluator=SimpleNamespace(evidence=[None]),
                              nominal=SimpleNamespace(joints=("one", "two")))
     assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
-    search.grounded = lambda takes: ()
+    search.floating_base = lambda takes: ()
     assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
 
 
 @pytest.mark.parametrize(("base", "tier", "said"), [("fixed", 2, False), ("free", 2, False), ("free", asked.TIERS_OF_ALL, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
     """What a hand carries looks like a weak shoulder."""
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"), grounded=lambda takes: ())
+    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"), floating_base=lambda takes: ())
     shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
     for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
-        trial = Trial(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
+        trial = CandidateFit(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
         assert selection._says_it(search, None, trial, (0,), tier) is enough
 
 
@@ -51,8 +51,8 @@ def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_fr
     """A tail's, moved, looked like a load on the body."""
     effect = known_effects()[name]
     heard = Candidate.of(effect, () if name == "soft_ground" else ("body",), effect.neutral(None))
-    trial = Trial(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"))
+    trial = CandidateFit(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
+    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
     assert selection._tips(search, trial, (0,), tier) is tips
 
 
@@ -63,7 +63,9 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     known = known_effects()
     at_stop = Candidate.of(known["joint_stop"], ("one",), (-180.0, 57.0), (-180.0, 6.0), (True, False))
     stiff = Candidate.of(known["parallel_spring"], ("one",), (0.0,))
-    trials = [Trial(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))]
+    trials = [
+        CandidateFit(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))
+    ]
     choices = selection._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
     assert [[t.candidate.name for t in c] for c in choices] == [chosen]
 
@@ -76,7 +78,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     known = known_effects()
     soft = Candidate.of(known["soft_ground"], (), (1e5,))
     shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
-    trials = [Trial(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
+    trials = [CandidateFit(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
               for c, g, share in zip((soft, shifted), (565.0, gain), closed)]
     assert [[t.candidate.name for t in c] for c in selection._accepted(trials)] == [[name] for name in chosen]
 
@@ -87,10 +89,10 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
 def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_more_one_lacks(monkeypatch, base, shares, of_all):
     """Beside another clock rate, play in one joint kept joints and sets of effects being asked until the limit of work."""
     joints = [f"joint{n}" for n in range(len(shares))]
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: base == "free"))
+    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
     monkeypatch.setattr(selection, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
     for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
-        trial = Trial(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
+        trial = CandidateFit(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
         beyond = dict.fromkeys([*joints, "heading"], 9.0)
         assert selection._is_of_all(search, None, trial, (0,), beyond) is expected
 
@@ -110,7 +112,7 @@ def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while
     """A stop may lie beyond what was moved then, and gravity may have left a loose mount on one side."""
     _, search, nominal = worn
     well = next(iter(asked._when_held(search, nominal)[0]))
-    monkeypatch.setattr(search, "grounded", lambda takes: takes)
+    monkeypatch.setattr(search, "floating_base", lambda takes: takes)
     mount = Candidate.of(known_effects()["loose_mount"], (well,), (0.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0),
                          (False, True, True, True))
     band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
@@ -121,7 +123,7 @@ def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while
 
 def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn):
     session, search, nominal = worn
-    pool = candidates(session.model, search.jury.evidence)
+    pool = candidates(session.model, search.evaluator.evidence)
 
     def asked_of(*joints):
         return [[c for g in asked.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
@@ -140,9 +142,9 @@ def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn
 @pytest.mark.parametrize("zeroed", [True, False])
 def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(worn, zeroed):
     session, search, nominal = worn
-    e = search.jury.evidence[0]
+    e = search.evaluator.evidence[0]
     seen = replace(e, take=replace(e.take, recorded=replace(e.take.recorded, zeroed=zeroed)))
-    search = Search(search.jury.on([seen]), session.model)
+    search = Search(search.evaluator.on([seen]), session.model)
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
     groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
@@ -155,7 +157,7 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
     link = next(f.child for f in session.model.kinematics.frames.values() if f.name == well)
     shift = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
     trunk = Candidate.of(known_effects()["com_shift"], (session.model.base,), (0.0, 0.0, 0.0))
-    monkeypatch.setattr(search, "grounded", lambda takes: takes)
+    monkeypatch.setattr(search, "floating_base", lambda takes: takes)
 
     def tiers(heavy):
         monkeypatch.setattr(asked, "heavy_links", lambda model: heavy)

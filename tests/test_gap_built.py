@@ -10,8 +10,8 @@ from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
 from workbench.identify.estimators import geometry as built
 from workbench.identify.findings import Change
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.model_comparison import SUREST
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.mocap.tracks import capture_axes
 from workbench.recording.recording import Measurement, Recording
@@ -39,7 +39,7 @@ def filmed(kinematics, zeros=None, seed=0):
         noise = Rotation.from_rotvec(2e-3 * rng.standard_normal((ROWS, 3)))
         q = (noise * cameras * Rotation.from_matrix(R @ R0[0].T) * cameras.inv()).as_quat(scalar_first=True)
         bodies[asset] = BodyTrack(capture_axes(p), np.column_stack([q[:, 0], capture_axes(q[:, 1:])]))
-    recording = Recording("hand.csv", "motive", "1.23", t, np.arange(ROWS), 120.0, rigid_bodies=bodies)
+    recording = Recording("hand.csv", "motive", "1.23", t, np.arange(ROWS), 120.0, rigid_bodies=bodies, sensing="mocap")
     measurement = Measurement(0.0, yaw=YAW, rest_pose={"flm": DROOP, "frm": DROOP})
     return SimpleNamespace(take=SimpleNamespace(recording=recording, measurement=measurement, spec=SimpleNamespace(base="fixed")))
 
@@ -54,7 +54,7 @@ def pool():
 
 def seen(evidence, monkeypatch, ill=(), model=None):
     monkeypatch.setattr(built, "channel_gaps", lambda e, r: dict.fromkeys(ill, 9.0))
-    return built.build_of(model or puppy_model(), [evidence], {0: None})
+    return built.geometry_of(model or puppy_model(), [evidence], {0: None})
 
 
 def test_what_is_as_drawn_is_not_asked_about_and_what_cameras_do_not_see_is(monkeypatch):
@@ -81,7 +81,7 @@ def test_a_longer_thigh_and_a_turned_hip_are_measured(monkeypatch):
     finding = zero.finding(error, error)
     angle = finding.parameters["angle"]
     assert angle.low < zero.mean < angle.high
-    assert (finding.where, finding.confidence, angle.unit) == (("frm",), SUREST, "deg")
+    assert (finding.where, finding.confidence, angle.unit) == (("frm",), CONCLUSIONS.surest, "deg")
     assert "cameras" in finding.evidence
 
 

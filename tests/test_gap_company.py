@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit
+from workbench.identify.fitting.fits import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants
 
 
@@ -24,7 +25,7 @@ def test_two_are_named_where_both_together_explain_what_neither_does_though_a_th
     both, *_ = _best_sets(pool, r0)
     assert {t.candidate.name: float(t.x[0]) for t in both} == pytest.approx(
         {"coulomb_friction": 8.0, "backlash": 2.2}, rel=0.02)  # in the sizes at which they were looked at
-    assert not any(t.foretold for t in both)
+    assert not any(t.screened_out for t in both)
 
 
 def test_one_more_that_does_not_halve_what_is_left_is_not_asked_for_nor_one_that_would_have_to_be_less_than_nothing():
@@ -48,9 +49,9 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
 
 
 def test_a_walk_and_what_one_explains_are_left_to_single_effects():
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: True))
+    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: True))
     assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
-    held = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: False))
+    held = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: False))
     assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
     assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
 
@@ -85,7 +86,7 @@ def test_a_shaped_effect_is_fitted_from_elsewhere_too_and_goes_there_only_for_fa
     search = SimpleNamespace(side_by_side=lambda parts: list(together(dict(enumerate(parts)), lambda wanted: []).values()),
                              evaluating=lambda *starts: asks_nothing([fit_at(s, 1e4) for s in starts]),
                              refitting=lambda *a: asks_nothing(ended(*a)), refitted=ended)
-    here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + LEAST_GAIN * 3)
+    here = fit_at([(friction, np.array([1.0, 0.5])), (play, np.array([2.0]))], 100.0 + FIT.least_gain * 3)
     there = begun_again(search, here, (0,), 9)
     assert (there is not here) is again
     assert {tuple(np.sign(f.x[:2] - here.x[:2])) for f in begun} == {(-1, -1), (-1, 1), (1, -1), (1, 1)}

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.identify.conclusions import LEAST_RELATIVE, Z90, estimates, finding, rejected, verdict_of
+from workbench.effects.schedules import LOOP
+from workbench.identify.conclusions import estimates, finding, rejected, verdict_of
 from workbench.identify.findings import Alternative, Change, Finding, Unexplained
 from workbench.identify.fitting.fits import Fit
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
-from workbench.identify.problem import LOOP
-from workbench.identify.selection.model_comparison import Rival, Standing
+from workbench.identify.reasons import Dependence
+from workbench.identify.selection.model_comparison import NamePosterior, Rival
 
 FRAME = {0: np.ones((1, 1))}
 EVERY = np.ones(1, dtype=bool)
@@ -25,24 +27,24 @@ def test_where_a_mass_is_errs_with_its_moment_and_with_the_mass_together():
     x = np.array([4.0, 4.0, 8.0, -4.0])
     alone = estimates(c, x, np.diag([0.0, 0.04, 0.0, 0.0]))["position"]
     assert alone.value == pytest.approx((0.02, 0.04, -0.02))
-    assert alone.high[0] - alone.value[0] == pytest.approx(Z90 * 0.2 / 4 * 0.02, rel=1e-3)
-    assert alone.high[1] - alone.value[1] == pytest.approx(Z90 * LEAST_RELATIVE * 0.04, rel=1e-3)
+    assert alone.high[0] - alone.value[0] == pytest.approx(CONCLUSIONS.z90 * 0.2 / 4 * 0.02, rel=1e-3)
+    assert alone.high[1] - alone.value[1] == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.least_relative * 0.04, rel=1e-3)
     same_place = 0.25 * np.outer(x, x) / 16
     together = estimates(c, x, same_place)
-    assert together["mass"].high - together["mass"].value == pytest.approx(Z90 * 0.5 * 0.05, rel=1e-3)
-    assert together["position"].high[0] - 0.02 == pytest.approx(Z90 * LEAST_RELATIVE * 0.02, rel=1e-3)
+    assert together["mass"].high - together["mass"].value == pytest.approx(CONCLUSIONS.z90 * 0.5 * 0.05, rel=1e-3)
+    assert together["position"].high[0] - 0.02 == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.least_relative * 0.02, rel=1e-3)
 
 
 def test_no_number_is_known_better_than_a_share_of_what_it_differs_from_neutral_by():
     c = Candidate.of(known_effects()["clock_rate"], (), (1.0,))
     told = estimates(c, np.array([1.0]), np.zeros((1, 1)))["ratio"]
-    assert told.high - told.value == pytest.approx(Z90 * LEAST_RELATIVE * abs(told.value - 1.0), rel=1e-6)
+    assert told.high - told.value == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.least_relative * abs(told.value - 1.0), rel=1e-6)
 
 
 def test_no_delay_is_known_better_than_models_may_set_out_sooner_or_later():
     c = Candidate.of(known_effects()["command_delay"], ("knee",), (0.0,))
     told = estimates(c, np.array([3.0]), np.array([[1e-6]]))["delay"]
-    assert told.high - told.value == pytest.approx(Z90 * LOOP / np.sqrt(3.0), rel=1e-6)
+    assert told.high - told.value == pytest.approx(CONCLUSIONS.z90 * LOOP / np.sqrt(3.0), rel=1e-6)
     assert told.value - told.low == pytest.approx(told.high - told.value)
 
 
@@ -56,7 +58,7 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     other = Candidate.of(known_effects()["zero_offset"], ("knee",), (0.0,))
     rivals = [Rival(c, x, behind, p, fit)
               for c, behind, p in ((length("shank"), 10.0, 0.3), (other, 20.0, 0.2), (length("hip"), 90.0, 0.01))]
-    standing = Standing(0.45, tuple(rivals))
+    standing = NamePosterior(0.45, tuple(rivals))
     told = finding(SEEN, fit, 0, standing, FRAME, FRAME)
     assert told.where == ("thigh", "shank")
     assert told.confidence == pytest.approx(0.75)
@@ -71,7 +73,7 @@ def test_a_name_that_is_less_likely_than_not_explains_nothing():
         return Finding("ground_friction", (), confidence, {}, change, change, ties)
 
     tie = Alternative("ground_tilt", (), 0.3)
-    rest = Unexplained((), 1.0, 0.1, "deg", "goes with nothing tried")
+    rest = Unexplained((), 1.0, 0.1, "deg", Dependence("wave", "one"))
     assert verdict_of(False, [], []) == "no_gap"
     assert verdict_of(True, [], [rest]) == "unexplained"
     assert verdict_of(True, [named(0.9)], []) == verdict_of(True, [named(0.4, tie)], []) == "explained"

@@ -30,17 +30,17 @@ def test_friction_that_stays_shows_no_drift(worn, friction):
 
 def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     session, search, _ = worn
-    e = search.jury.evidence[0]
+    e = search.evaluator.evidence[0]
 
     def played(torque):
         unit = friction.values(np.ones(1))[0] - friction.neutral[0]
         model = with_effects(session.model, [(friction, np.array([(torque - friction.neutral[0]) / unit]))])
-        return e.simulated(run_job(search.jury.job(model, 0, CONFIG)), model)
+        return e.simulated(run_job(search.evaluator.job(model, 0, CONFIG)), model)
 
     late = np.clip(e.since / e.since[-1], 0.0, 1.0)[:, None]
     noise = np.random.default_rng(1).normal(size=e.recorded.shape) * e.sigma
     fading = replace(e, recorded=np.where(np.isfinite(e.recorded), (1 - late) * played(0.3) + late * played(0.1) + noise, np.nan))
-    search = Search(search.jury.on([fading]), session.model)
+    search = Search(search.evaluator.on([fading]), session.model)
     (drift,) = drifts(search, fitted(search, friction))
     assert drift.effect == friction
     assert drift.first == pytest.approx(0.3, abs=0.05)
@@ -49,4 +49,4 @@ def test_friction_that_fades_within_a_take_is_told_and_how_far(worn, friction):
     assert left.where == ("three",)
     assert left.unit == "deg"
     assert left.error > 5 * left.floor > 0.0
-    assert "coulomb_friction(three)" in left.description
+    assert "coulomb_friction(three)" in str(left.description)

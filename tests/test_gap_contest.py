@@ -8,18 +8,18 @@ import pytest
 
 from tests.gap_worn import HIDDEN, NOMINAL
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.covariance import TEMPER_WALKING
-from workbench.identify.fitting.downward_force import hanging
+from workbench.identify.fitting.downward_force import downward_pulls
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.proposals import candidates
 from workbench.identify.selection import calibration as doubts
-from workbench.identify.selection.calibration import doubted
+from workbench.identify.selection.calibration import calibrated
 from workbench.identify.selection.model_comparison import (
     TEMPER,
     WALKS_SAY,
+    NamePosterior,
     Rival,
-    Standing,
     _better_by_both,
     _better_held,
     _misfit,
@@ -29,43 +29,43 @@ from workbench.identify.selection.model_comparison import (
     _temper,
     _told,
     _twin,
-    contest,
+    compare_models,
 )
-from workbench.identify.selection.record import Chosen, Round
-from workbench.identify.selection.screening import Trial, tried
+from workbench.identify.selection.record import SelectionResult, SelectionStep
+from workbench.identify.selection.screening import CandidateFit, tried
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
     session, search, _ = worn
     nominal = search.evaluated([])
-    pool = [c for c in candidates(session.model, search.jury.evidence)
+    pool = [c for c in candidates(session.model, search.evaluator.evidence)
             if c.key in {("coulomb_friction", ("three",)), ("viscous_friction", ("three",))}]
     trials = [t for c in pool for t in tried(search, nominal, [[c]], {0: (0,)}, lambda share: None)]  # apart: none is given up
     trials.sort(key=lambda t: -t.gain["choose"])
     assert [t.candidate.name for t in trials] == ["coulomb_friction", "viscous_friction"]
     wrong = trials[1]
     first = search.refitted(search.evaluated([(wrong.candidate, wrong.x)]), (0,), 1)
-    chosen = Chosen(search, first, (Round(nominal, tuple(trials), (wrong,)),))
-    fit, standings = contest(search, chosen, lambda what, share: None)
+    chosen = SelectionResult(search, first, (SelectionStep(nominal, tuple(trials), (wrong,)),))
+    _, fit, posteriors = compare_models(search, chosen, lambda what, share: None)
     assert [str(c) for c in fit.effects] == ["coulomb_friction(three)"]
     assert NOMINAL + fit.model(session.model).effects[0].parameters["torque"] == pytest.approx(HIDDEN, rel=0.06)
     assert fit.cost["choose"] < first.cost["choose"]
-    assert standings[0].probability > 0.5
-    assert [r.candidate.name for r in standings[0].rivals] in ([], ["viscous_friction"])
+    assert posteriors[0].probability > 0.5
+    assert [r.candidate.name for r in posteriors[0].rivals] in ([], ["viscous_friction"])
 
 
 def test_what_leaves_much_at_its_place_is_less_sure(worn):
     session, search, _ = worn
-    friction = next(c for c in candidates(session.model, search.jury.evidence) if c.key == ("coulomb_friction", ("three",)))
+    friction = next(c for c in candidates(session.model, search.evaluator.evidence) if c.key == ("coulomb_friction", ("three",)))
     right = search.refitted(search.evaluated([(friction, np.array([1.0]))]), (0,), 3)
     far = search.evaluated([(friction, 3.0 * right.x)])
-    standings = [Standing(0.9, (Rival(friction, right.x, 10.0, 0.08),))]
-    floors = {0: np.zeros(len(search.jury.evidence[0].channels))}
-    assert doubted(search, right, standings, floors) == standings
-    (less,) = doubted(search, far, standings, floors)
+    posteriors = [NamePosterior(0.9, (Rival(friction, right.x, 10.0, 0.08),))]
+    floors = {0: np.zeros(len(search.evaluator.evidence[0].channels))}
+    assert calibrated(search, right, posteriors, floors) == posteriors
+    (less,) = calibrated(search, far, posteriors, floors)
     assert less.probability < 0.5
     assert less.rivals[0].probability == pytest.approx(0.08 / 0.9 * less.probability)
-    assert doubted(search, far, standings, {0: 100 + floors[0]}) == standings  # all below the fit's own floor
+    assert calibrated(search, far, posteriors, {0: 100 + floors[0]}) == posteriors  # all below the fit's own floor
 
 
 @pytest.mark.parametrize(("ill", "sure"), [(("one",), 0.9), (("one", "three"), 0.36)])
@@ -73,25 +73,27 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
     _, search, _ = worn
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = replace(search.evaluated([(fade, np.array([1.0]))]), covariance=np.full((1, 1), np.inf))
-    e = search.jury.evidence[0]
+    e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, [e.channels.index(j) for j in ill]] = 4.0
-    standing = doubted(search, replace(fit, residuals={0: residual}), [Standing(0.9, ())], {0: np.zeros(len(e.channels))})[0]
+    standing = calibrated(
+        search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())], {0: np.zeros(len(e.channels))}
+    )[0]
     assert standing.probability == pytest.approx(sure)
 
 
-@pytest.mark.parametrize(("lone", "sure"), [(False, 0.9), (True, 0.18)])
-def test_all_that_a_lone_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, lone, sure):
+@pytest.mark.parametrize(("single_joint", "sure"), [(False, 0.9), (True, 0.18)])
+def test_all_that_a_lone_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, single_joint, sure):
     _, search, _ = worn
-    monkeypatch.setattr(type(search), "lone", lone)
+    monkeypatch.setattr(type(search), "single_joint", single_joint)
     monkeypatch.setattr(doubts, "FEW", 3)  # none of three may err for itself
     sag = Candidate.of(known_effects()["supply_sag"], (), (0.0,))
     stiff = Candidate.of(known_effects()["coulomb_friction"], ("one",), (NOMINAL,))
     fit = replace(search.evaluated([(sag, np.ones(1)), (stiff, np.ones(1))]), covariance=np.full((2, 2), np.inf))
-    e = search.jury.evidence[0]
+    e = search.evaluator.evidence[0]
     residual = np.zeros_like(fit.residuals[0])
     residual[:, e.channels.index("one")] = 7.0
-    told = doubted(search, replace(fit, residuals={0: residual}), [Standing(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
+    told = calibrated(search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
     assert [t.probability for t in told] == pytest.approx([sure, 0.18])
 
 
@@ -101,7 +103,7 @@ def test_a_floor_that_is_nearly_the_models_may_be_what_engines_make_of_contact(w
     floor = Candidate.of(known_effects()["ground_friction"], (), (1.0,))
     x = np.array([(friction - 1.0) / (floor.typical[0] - 1.0)])
     fit = replace(search.evaluated([]), effects=(floor,), x=x, covariance=np.full((1, 1), np.inf))
-    (told,) = doubted(search, fit, [Standing(0.9, ())], {})
+    (told,) = calibrated(search, fit, [NamePosterior(0.9, ())], {})
     assert floor.values(x)[0] == pytest.approx(friction)
     assert told.probability == pytest.approx(sure)
 
@@ -111,7 +113,7 @@ def test_a_number_that_is_as_far_as_it_may_go_makes_up_for_something_else(worn):
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     for x, sure in ((tilt.bounds()[1] * [0.1, 1.0], 0.45), (tilt.bounds()[1] * [0.1, 0.9], 0.9), (np.zeros(2), 0.9)):
         fit = replace(search.evaluated([]), effects=(tilt,), x=x, covariance=np.full((2, 2), np.inf))
-        assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(sure)
+        assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(sure)
 
 
 def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_together(worn):
@@ -121,7 +123,7 @@ def test_what_may_be_nothing_is_less_sure_a_mass_by_itself_other_numbers_togethe
 
     def told(c, x, deviations):
         fit = replace(search.evaluated([]), effects=(c,), x=np.array(x), covariance=np.diag(np.square(deviations)))
-        return doubted(search, fit, [Standing(0.9, ())], {})[0].probability
+        return calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability
 
     assert told(tilt, [0.1, 2.0], [0.5, 0.5]) == pytest.approx(0.9)
     assert told(tilt, [0.1, 0.9], [0.5, 0.5]) == pytest.approx(0.45)
@@ -134,12 +136,12 @@ def test_a_load_that_may_weigh_nothing_is_another_centre_of_mass_where_that_stan
     _, search, _ = worn
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
     other = Candidate.of(known_effects()["com_shift"], ("two_link",), (0.0, 0.0, 0.0))
-    beside = Standing(0.6, (Rival(other, np.ones(3), 10.0, 0.3),))
+    beside = NamePosterior(0.6, (Rival(other, np.ones(3), 10.0, 0.3),))
 
     def told(deviations):
         fit = replace(search.evaluated([]), effects=(mass,), x=np.array([0.4, 3.0, 0.0, 1.0]),
                       covariance=np.diag(np.square(deviations)))
-        return doubted(search, fit, [beside], {})[0].probability
+        return calibrated(search, fit, [beside], {})[0].probability
 
     assert told([0.5, 0.1, 0.1, 0.1]) == pytest.approx(0.6)
     assert told([0.5, 4.0, 1.0, 2.0]) == pytest.approx(0.3)
@@ -153,14 +155,14 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
     mass = PointMass.of(known_effects()["payload"], (link,), (0.0, *k.centers[link]))
     other = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
     fit = search.evaluated([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
-    astray = Trial(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
+    astray = CandidateFit(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
     seen = []
     part = _put(search, fit, 0, astray)
     questions = next(part)
     try:
         while True:
             seen += [q.model.effects[0].parameters["offset"] for q in questions]
-            questions = part.send(search.jury.residuals(questions))
+            questions = part.send(search.evaluator.residuals(questions))
     except StopIteration:
         pass
     m, at = mass.values(fit.x)[0], np.array(mass.values(fit.x)[1:])
@@ -194,7 +196,7 @@ def test_a_name_that_only_the_price_of_its_numbers_keeps_out_stands_beside(name,
                                                     (0.0, "payload", False)])
 def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
     """Take 0 is held; chi squared of each take stands for its residuals."""
-    search = SimpleNamespace(held=(0,), fitted=(0, 1), jury=SimpleNamespace(
+    search = SimpleNamespace(held=(0,), fitted=(0, 1), evaluator=SimpleNamespace(
         cost=lambda residuals, use: sum(residuals.values()), expected=lambda takes, use: 1000.0))
     tilt, other = (SimpleNamespace(name=n, effect=known_effects()[n]) for n in ("ground_tilt", name))
     fit = SimpleNamespace(effects=(tilt,), residuals={0: 100.0, 1: 900.0}, cost={"choose": 1000.0})
@@ -205,8 +207,8 @@ def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
 @pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, WALKS_SAY), (-5000.0, -WALKS_SAY)])
 def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
     """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
-    search = SimpleNamespace(held=(0,), fitted=(0, 1), grounded=lambda takes: (1,),
-                             jury=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
+    search = SimpleNamespace(held=(0,), fitted=(0, 1), floating_base=lambda takes: (1,),
+                             evaluator=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
     fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})
     assert _better_held(search, fit, rival) == pytest.approx(adds - 20.0)
 
@@ -222,13 +224,13 @@ def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
 def test_where_nothing_stays_nothing_is_contested(worn):
     _, search, _ = worn
     nominal = search.evaluated([])
-    fit, standings = contest(search, Chosen(search, nominal, ()), lambda what, share: None)
+    _, fit, posteriors = compare_models(search, SelectionResult(search, nominal, ()), lambda what, share: None)
     assert fit is nominal
-    assert standings == []
+    assert posteriors == []
 
 
 def test_a_rival_must_lead_by_more_where_no_fit_is_right():
-    search = SimpleNamespace(fitted=(0,), jury=SimpleNamespace(expected=lambda takes, use: 100.0))
+    search = SimpleNamespace(fitted=(0,), evaluator=SimpleNamespace(expected=lambda takes, use: 100.0))
     assert _misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
     assert _misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0
 
@@ -236,13 +238,13 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
 def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
     """A cable hangs on another joint of a robot whose joint's names are contested with the base held."""
     left = {None: 40000.0, "knee": 130.0}
-    jury = SimpleNamespace(expected=lambda takes, use: 100.0, walks=lambda takes: True,
+    evaluator = SimpleNamespace(expected=lambda takes, use: 100.0, walks=lambda takes: True,
                            by_channel=lambda residuals, use, joint: (np.array([left[joint]]), np.array([100.0])))
-    search = SimpleNamespace(fitted=(0, 1), held=(0,), jury=jury, is_settled=lambda c: False)
+    search = SimpleNamespace(fitted=(0, 1), held=(0,), evaluator=evaluator, is_settled=lambda c: False)
     fit = SimpleNamespace(cost={"choose": left[None]}, residuals={0: None, 1: None})
     knee, whole = SimpleNamespace(joint="knee", gain={"choose": 100.0}), SimpleNamespace(joint=None, gain={"choose": 100.0})
     assert _temper(search, fit, None, knee) == pytest.approx(1.3 * TEMPER)
-    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * TEMPER_WALKING)
+    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * FIT.overdispersion_free)
 
 
 def test_twins_name_each_other():
@@ -254,8 +256,8 @@ def test_what_fine_steps_do_not_miss_is_hardly_believed(worn):
     _, search, _ = worn
     tilt = Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(tilt,), x=np.array([0.1, 2.0]), covariance=np.diag([0.01, 0.01]))
-    assert doubted(search, fit, [Standing(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
-    assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(0.9)
+    assert calibrated(search, fit, [NamePosterior(0.9, ())], {}, idle=[tilt])[0].probability == pytest.approx(0.18)
+    assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize(("force", "down"), [((0.05, -0.05, -0.7), True), ((0.05, -0.05, 0.7), False), ((0.3, 0.0, -0.7), False)])
@@ -264,12 +266,12 @@ def test_a_pull_straight_down_is_no_cable(worn, force, down):
     _, search, _ = worn
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(tether,), x=tether.sizes(force), covariance=np.diag([1e-4] * 3))
-    assert doubted(search, fit, [Standing(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
-    left = list(hanging(fit))
+    assert calibrated(search, fit, [NamePosterior(0.9, ())], {})[0].probability == pytest.approx(0.45 if down else 0.9)
+    left = list(downward_pulls(fit))
     assert bool(left) is down
     for u in left:
         assert (u.error, u.floor) == pytest.approx((0.7, 0.01 * tether.typical[2]))
-        assert "71 g" in u.description
+        assert "71 g" in str(u.description)
 
 
 @pytest.mark.parametrize(("likely", "sure"), [(0.4, 0.25), (0.2, 0.5)])
@@ -278,8 +280,8 @@ def test_a_load_is_less_sure_where_a_pull_straight_down_is_about_as_likely(worn,
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
     tether = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(mass,), x=np.array([2.0, 0.1, 0.1, 0.1]), covariance=np.diag([1e-4] * 4))
-    beside = Standing(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
-    assert doubted(search, fit, [beside], {})[0].probability == pytest.approx(sure)
+    beside = NamePosterior(0.5, (Rival(tether, tether.sizes((0.02, 0.04, -1.3)), 241.0, likely),))
+    assert calibrated(search, fit, [beside], {})[0].probability == pytest.approx(sure)
 
 
 @pytest.mark.parametrize(("joint", "walks", "near"), [(None, True, ["com_shift(tail)"]), ("one", True, []), (None, False, [])])
@@ -287,12 +289,12 @@ def test_what_moves_another_links_centre_of_mass_is_put_in_its_place_on_a_walk_h
     """A race ends before walks have told such numbers: a tail's was 568 of 2488 behind the body's and ahead when fitted."""
     com, mass = known_effects()["com_shift"], known_effects()["payload"]
 
-    def trial(effect, link, choose, foretold=False):
+    def trial(effect, link, choose, screened_out=False):
         c = Candidate.of(effect, (link,), effect.neutral(None))
-        return Trial(c, np.zeros(c.size), {"fit": 2 * choose, "choose": choose}, joint, foretold=foretold)
+        return CandidateFit(c, np.zeros(c.size), {"fit": 2 * choose, "choose": choose}, joint, screened_out=screened_out)
 
     body, tail, load, foot = (trial(com, "body", 2488.0), trial(com, "tail", 1920.0), trial(mass, "tail", 1941.0),
-                              trial(com, "foot", 0.0, foretold=True))
-    seats = {body.candidate.key: (Round(None, (body, load, tail, foot), (body,)), body)}
-    search = SimpleNamespace(jury=SimpleNamespace(walks=lambda takes: walks), fitted=(0,), is_settled=lambda c: False)
+                              trial(com, "foot", 0.0, screened_out=True))
+    seats = {body.candidate.key: (SelectionStep(None, (body, load, tail, foot), (body,)), body)}
+    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: walks), fitted=(0,), is_settled=lambda c: False)
     assert [str(t.candidate) for t in _near(search, seats, [body.candidate], body.candidate, body.x)] == near

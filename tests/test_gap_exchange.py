@@ -37,13 +37,13 @@ class LinearJury:
 @pytest.fixture
 def search(monkeypatch):
     monkeypatch.setattr(exchange, "with_effects", lambda nominal, sizes: list(sizes))
-    return SimpleNamespace(jury=LinearJury(), nominal=None)
+    return SimpleNamespace(evaluator=LinearJury(), nominal=None)
 
 
 def fit_of(search, **sizes):
     """A fit of effects at these sizes."""
     chosen = [(trial(name).candidate, np.array([x])) for name, x in sizes.items()]
-    left = search.jury.left(chosen)
+    left = search.evaluator.left(chosen)
     x = np.array(list(sizes.values()))
     return Fit(tuple(c for c, _ in chosen), x, np.eye(len(x)), {"choose": float(np.sum(left**2))}, {0: left})
 
@@ -55,7 +55,7 @@ def test_in_ones_place_another_is_offered_with_the_sizes_that_all_then_have(sear
     assert {"viscous_friction", "dead_band"} in names(sets)
     best = next(s for s in sets if {t.candidate.name for t in s} == {"viscous_friction", "dead_band"})
     assert {t.candidate.name: float(t.x[0]) for t in best} == pytest.approx({"viscous_friction": 1.5, "dead_band": 2.0}, rel=1e-3)
-    assert not any(t.foretold for t in best)
+    assert not any(t.screened_out for t in best)
     assert all(len(s) == 2 for s in sets)
 
 

@@ -20,6 +20,7 @@ from workbench.identify.findings import (
     Rejected,
     Unexplained,
 )
+from workbench.identify.reasons import Dependence, TooLittle
 from workbench.robot import EffectSpec, load_model, load_model_file, puppy_model
 
 BACKLASH = Finding(
@@ -28,8 +29,8 @@ BACKLASH = Finding(
 DIAGNOSIS = Diagnosis(
     "explained", puppy_model().with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.1})), puppy_model(),
     gap=(GapEntry("structure", ("flm",), "walk", ((1.2, 1.4),), 2.1, 0.2, "deg", "stance"),), findings=(BACKLASH,),
-    rejected=(Rejected("coulomb_friction", ("flm",), "no better than a placebo", Change(1.1, 1.0, "deg")),),
-    unexplained=(Unexplained(("frm",), 0.6, 0.2, "deg", "grows with load"),),
+    rejected=(Rejected("coulomb_friction", ("flm",), TooLittle(), Change(1.1, 1.0, "deg")),),
+    unexplained=(Unexplained(("frm",), 0.6, 0.2, "deg", Dependence("walk", "frm", "speed", 0.6)),),
     next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
     provenance={"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94})
 
@@ -46,9 +47,10 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
             "parameters": {"gap": {"value": 3.1, "low": 2.7, "high": 3.5, "unit": "deg"}},
             "alternatives": [{"effect": "joint_compliance", "where": ["flm"], "confidence": 0.02}],
             "fit": {"before": 1.12, "after": 0.21, "unit": "deg"}, "validation": {"before": 1.10, "after": 0.23, "unit": "deg"}}],
-        "rejected": [{"effect": "coulomb_friction", "where": ["flm"], "reason": "no better than a placebo",
+        "rejected": [{"effect": "coulomb_friction", "where": ["flm"], "reason": str(TooLittle()),
                       "validation": {"before": 1.1, "after": 1.0, "unit": "deg"}}],
-        "unexplained": [{"where": ["frm"], "error": 0.6, "floor": 0.2, "unit": "deg", "description": "grows with load"}],
+        "unexplained": [{"where": ["frm"], "error": 0.6, "floor": 0.2, "unit": "deg",
+                         "description": "walk: goes with speed (correlation 0.60)"}],
         "next_experiment": {"motion": "next_experiment.csv", "base": "fixed", "separates": [["backlash", "joint_compliance"]]},
         "provenance": {"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94}}
     assert load_model(paths[1]).effects == DIAGNOSIS.model.effects

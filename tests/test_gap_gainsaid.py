@@ -7,7 +7,7 @@ import pytest
 
 from tests.gap_linear import candidate
 from workbench.identify.fitting.fits import Fit
-from workbench.identify.selection.fixed_base_check import heard
+from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
 
 CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 
@@ -16,12 +16,12 @@ class TwoWorlds:
     """A held take (0) and a walk (1); what each leaves of a ceiling's size, None being without it."""
 
     held, fitted, settled = (0,), (0, 1), None
-    jury = SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values())))
+    evaluator = SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values())))
 
     def __init__(self, held, walk, as_held_takes_tell):
         self.leaves, self.tells = (held, walk), as_held_takes_tell
 
-    def grounded(self, takes):
+    def floating_base(self, takes):
         return tuple(i for i in takes if i)
 
     def is_settled(self, c):
@@ -48,7 +48,9 @@ def held(size):
                          ids=["walks hardly mind", "walks show less of it"])
 def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(there, size, settled):
     search = TwoWorlds(held, lambda x: {None: 49000.0, 1.42: 25600.0, 1.15: there}[x], 1.15)
-    search, fit = heard(search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING])
+    search, fit = checked_on_fixed_base(
+        search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING]
+    )
     assert fit.x.tolist() == [0.3, size]
     assert search.is_settled(CEILING) is settled
     assert not search.is_settled(FLOOR)
@@ -56,8 +58,8 @@ def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(ther
 
 def test_what_held_takes_do_not_gainsay_or_would_rather_not_have_stays():
     near = TwoWorlds(held, lambda x: {None: 49000.0, 1.2: 25600.0}[x], 1.15)
-    assert heard(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
+    assert checked_on_fixed_base(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
     never = TwoWorlds(lambda x: 26400.0 if x is None else 26800.0, lambda x: 49000.0 if x is None else 25600.0, 1.15)
-    same, fit = heard(never, never.evaluated([(CEILING, np.array([1.42]))]), [CEILING])
+    same, fit = checked_on_fixed_base(never, never.evaluated([(CEILING, np.array([1.42]))]), [CEILING])
     assert fit.x.tolist() == [1.42]
     assert same.settled is None

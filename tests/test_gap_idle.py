@@ -18,20 +18,20 @@ FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2
 class Search(LinearSearch):
     """A step goes most of the way."""
 
-    lone, held = True, ()
+    single_joint, held = True, ()
 
     def refitted(self, fit, takes, steps, free=None):
         end = self.run(self.refitting(fit, takes, steps))
         return self.evaluated(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
 
 
-@pytest.mark.parametrize(("lone", "against", "stay"), [
+@pytest.mark.parametrize(("single_joint", "against", "stay"), [
     (True, False, {"torque_ceiling", "payload"}), (False, False, set(FOUND)), (False, True, {"torque_ceiling", "payload"})])
 def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint_or_where_held_takes_gainsay_these(
-        monkeypatch, lone, against, stay):
+        monkeypatch, single_joint, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
-    search.lone = lone
-    monkeypatch.setattr(backward, "held_gainsay", lambda *a: against)
+    search.single_joint = single_joint
+    monkeypatch.setattr(backward, "contradicted_by_fixed_base", lambda *a: against)
     fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)
     assert {c.name for c in kept.effects} == stay

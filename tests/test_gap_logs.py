@@ -128,10 +128,10 @@ def test_a_log_is_foretold_as_it_was_recorded(tmp_path: Path, effect: EffectSpec
     session = load_session(_session(tmp_path, predict=True))
     model: RobotModel = session.model if effect is None else session.model.with_effect(effect)
     (path,) = predict_session(session, model, tmp_path / "out", n_jobs=1).paths
-    foretold = read_recording(path)
-    np.testing.assert_allclose(foretold.time, time, atol=1e-8)
-    np.testing.assert_allclose(foretold.channels["position.j"], channels["position.j"], atol=1e-4)
-    np.testing.assert_array_equal(foretold.channels["enabled.j"], channels["enabled.j"])
+    screened_out = read_recording(path)
+    np.testing.assert_allclose(screened_out.time, time, atol=1e-8)
+    np.testing.assert_allclose(screened_out.channels["position.j"], channels["position.j"], atol=1e-4)
+    np.testing.assert_array_equal(screened_out.channels["enabled.j"], channels["enabled.j"])
     if effect is None:
         assert "next.csv" in succeeds(capsys, "predict", str(tmp_path / "session.yaml"), "--out", str(tmp_path / "cli"))
 

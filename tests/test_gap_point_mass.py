@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from workbench.effects.registry import known_effects
-from workbench.identify.conclusions import Z90, estimates
-from workbench.identify.point_mass import DISTANCE, PointMass, SwungMass, point_mass
+from workbench.identify.conclusions import estimates
+from workbench.identify.options import CONCLUSIONS, FIT
+from workbench.identify.point_mass import PointMass, SwungMass, point_mass
 from workbench.robot import RobotModel
 from workbench.robot.kinematics import Kinematics
 
@@ -40,7 +41,7 @@ def test_what_swings_about_a_held_axis_is_sought_from_that_axis_on(rod):
             mass, *at = c.values(np.array([doublings, *x[1:]]))
             arm = np.array(at) - axis_at
             assert arm[1] == pytest.approx(0.0)
-            assert np.linalg.norm(arm) == pytest.approx(DISTANCE * 2**doublings)
+            assert np.linalg.norm(arm) == pytest.approx(FIT.swung_distance * 2**doublings)
             assert mass * np.linalg.norm(arm) == pytest.approx(0.05 * 0.02 * np.linalg.norm(x[1:]))
     assert c.values(np.zeros(3))[0] == 0.0
 
@@ -56,7 +57,7 @@ def test_where_along_its_axis_a_mass_swings_is_not_known(rod):
     x = np.array([0.0, 0.0, 4.0])
     told = estimates(c, x, np.diag([0.01, 0.0, 0.0]))
     mass, at = told["mass"], told["position"]
-    assert (mass.high - mass.value) / mass.value == pytest.approx(Z90 * 0.1 * np.log(2), rel=1e-3)
+    assert (mass.high - mass.value) / mass.value == pytest.approx(CONCLUSIONS.z90 * 0.1 * np.log(2), rel=1e-3)
     assert np.isinf(at.high[1])
     assert np.isfinite(at.high[0])
     assert np.isfinite(at.high[2])

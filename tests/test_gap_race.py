@@ -10,17 +10,18 @@ from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
 from workbench.identify.fitting.covariance import _scattered
 from workbench.identify.fitting.fits import Search
-from workbench.identify.fitting.levenberg_marquardt import WALKING, Solved, fit_blocks, lowest, together
-from workbench.identify.fitting.responses import SCANNED, SCANNED_GROUND, guess, scan, sizes_of
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest, together
+from workbench.identify.fitting.responses import linearised_estimate, scan, scan_sizes
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import STRETCHES, Jury, Question
+from workbench.identify.rollouts import STRETCHES, RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.scheduling import _when_held
-from workbench.identify.selection.screening import FAR_WALKING, LOOKED_SHARE, Race, Trying, _best, _tell
+from workbench.identify.selection.screening import FAR_WALKING, LOOKED_SHARE, CandidateEvaluation, Race, _best, _tell
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
 
 
-class Walking(Jury):
+class Walking(RolloutEvaluator):
     def walks(self, takes):
         return True
 
@@ -45,11 +46,11 @@ def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     r0 = np.ones(20)
     probes = scan(c, (0.7, 2.0), True)
     weak = [r0 - 0.01 * p[0] for p in probes]  # a line would say: a hundred times that
-    x, gain = guess(c, r0, probes, weak, FAR_WALKING)
+    x, gain = linearised_estimate(c, r0, probes, weak, FAR_WALKING)
     assert x[0] == pytest.approx(FAR_WALKING * 2.0)
     assert 0 < gain < 20
     slips = [r0, r0 - 1.0]  # nothing at the first size, all at the second
-    assert guess(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
+    assert linearised_estimate(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
 
 
 def test_between_sizes_that_were_seen_a_guess_stays_where_these_lead():
@@ -61,7 +62,7 @@ def test_between_sizes_that_were_seen_a_guess_stays_where_these_lead():
         return lag * (1 / c.values(np.atleast_1d(x))[0] - 1)
 
     r0 = -shown(2.6)  # a line through the first alone says 4.3, where four times as much is missing
-    x, gain = guess(c, r0, probes, [r0 + shown(p) for p in probes], 5.0)
+    x, gain = linearised_estimate(c, r0, probes, [r0 + shown(p) for p in probes], 5.0)
     assert 1.0 < x[0] < 2.6
     assert gain == pytest.approx(r0 @ r0)
     assert np.sum((r0 + shown(x)) ** 2) < 0.6 * (r0 @ r0)
@@ -74,7 +75,7 @@ def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_n
     assert {p[1] for p in scan(c, (1.0,), True)} == {0.0}  # walks are expensive
     r0 = np.linspace(-1.0, 1.0, 20)
     fades = [r0 * (1 - 0.3 * p[0]) if p[1] == 2.0 else r0 + 0.01 * p[0] for p in probes]
-    x, gain = guess(c, r0, probes, fades, 5.0)
+    x, gain = linearised_estimate(c, r0, probes, fades, 5.0)
     assert x == pytest.approx([1 / 0.3, 2.0])
     assert gain == pytest.approx(r0 @ r0)
 
@@ -86,15 +87,18 @@ def test_rivals_know_the_best_at_their_joint_and_of_all():
     assert (_best(race.reached, "flm"), _best(race.reached, "frm"), _best(race.reached, None)) == (5.0, 0.0, 8.0)
 
 
-@pytest.mark.parametrize(("foretold", "fitted"),
+@pytest.mark.parametrize(("screened_out", "fitted"),
                          [((310, 230, 100), (310,)), ((296, 230, 100), (296, 230)), ((170, 160, 0), ())])
-def test_where_no_rival_is_foretold_enough_the_best_of_those_near_it_are_fitted(foretold, fitted):
+def test_where_no_rival_is_foretold_enough_the_best_of_those_near_it_are_fitted(screened_out, fitted):
     race = Race(least=300.0)
-    asking = [Trying._worth_fitting(SimpleNamespace(race=race, joints=[None], walking=True, coarse=True), [g]) for g in foretold]
+    asking = [
+        CandidateEvaluation._worth_fitting(SimpleNamespace(race=race, joints=[None], walking=True, coarse=True), [g])
+        for g in screened_out
+    ]
     for a in asking:
         next(a)
     worth = []
-    for g, a in zip(foretold, asking):
+    for g, a in zip(screened_out, asking):
         with pytest.raises(StopIteration) as end:
             next(a)
         worth += [g] * len(end.value.value)
@@ -105,34 +109,42 @@ def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(qu
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
     current = search.evaluated([])
-    power = {i: search.jury.cost({i: r}, "fit") for i, r in current.residuals.items()}
+    power = {i: search.evaluator.cost({i: r}, "fit") for i, r in current.residuals.items()}
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
-    r0 = search.jury.vector(current.residuals, "fit")
+    r0 = search.evaluator.vector(current.residuals, "fit")
     assert power[0] > 0
     trials, asked = {}, []
     for best in (0.0, 1e9):  # of what rivals remember
         search.signatures[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]], np.inf
         race = Race({None: best})
-        parts = {0: Trying(search.jury, session.model, [], current.residuals, [c], race, False, search.signatures).run()}
+        parts = {
+            0: CandidateEvaluation(
+                search.evaluator, session.model, [], current.residuals, [c], race, False, search.signatures
+            ).run()
+        }
         asked.clear()
-        trials[best] = together(parts, lambda wanted: asked.extend(wanted) or search.jury.residuals([q for _, q in wanted]))[0]
+        trials[best] = together(parts, lambda wanted: asked.extend(wanted) or search.evaluator.residuals([q for _, q in wanted]))[
+            0
+        ]
         assert bool(asked) == (best == 0.0)
-    assert trials[1e9][0].foretold
+    assert trials[1e9][0].screened_out
     assert search.telling([c], (0,)) == (0,)  # the one take is held
 
 
 def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(quiet):
     session, evidence = quiet
-    jury = Jury(evidence, CONFIG, n_jobs=1)
-    whole, brief = (r[0] for r in jury.residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)]))
+    evaluator = RolloutEvaluator(evidence, CONFIG, n_jobs=1)
+    whole, brief = (
+        r[0] for r in evaluator.residuals([RolloutRequest(session.model, (0,)), RolloutRequest(session.model, (0,), until=1.5)])
+    )
     length = evidence[0].take.recorded.time[-1]
-    assert jury.work == pytest.approx((length + 1.5) / length * jury.seconds)
+    assert evaluator.work == pytest.approx((length + 1.5) / length * evaluator.seconds)
     since = evidence[0].since
     known = np.isfinite(brief).any(axis=1)
     assert since[known].max() == pytest.approx(1.5, abs=0.02)
     assert np.isfinite(whole[since > 1.6]).any()
     assert not np.isfinite(brief[since > 1.5]).any()
-    cut = jury.early({0: whole}, 1.5)[0]
+    cut = evaluator.early({0: whole}, 1.5)[0]
     both = np.isfinite(cut) & np.isfinite(brief)
     assert both.sum() > 0.9 * np.isfinite(cut).sum()
     assert np.sqrt(np.mean((cut - brief)[both] ** 2)) < 0.1  # of noise: both are shifted by what they show of the clock
@@ -141,10 +153,10 @@ def test_what_is_rolled_out_for_a_while_is_as_in_the_whole_and_nothing_after(qui
 def test_what_a_whole_take_says_of_the_start_is_not_what_its_beginning_says(quiet):
     session, evidence = quiet
     freely = replace(evidence[0], start_is_free=True)
-    jury = Jury([freely], CONFIG, n_jobs=1)
+    evaluator = RolloutEvaluator([freely], CONFIG, n_jobs=1)
     slow = replace(session.model, effects=(EffectSpec("clock_rate", (), {"ratio": 1.03}),))
-    whole, brief = (r[0] for r in jury.residuals([Question(slow, (0,)), Question(slow, (0,), until=1.0)]))
-    cut = jury.early({0: whole}, 1.0)[0]
+    whole, brief = (r[0] for r in evaluator.residuals([RolloutRequest(slow, (0,)), RolloutRequest(slow, (0,), until=1.0)]))
+    cut = evaluator.early({0: whole}, 1.0)[0]
     both = np.isfinite(cut) & np.isfinite(brief)
     assert both.sum() > 0.8 * np.isfinite(brief).sum()
     assert np.sqrt(np.mean((whole - brief)[both] ** 2)) > 1.0  # the end of the take moved its start
@@ -160,21 +172,23 @@ def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypa
 
     monkeypatch.setattr("workbench.identify.rollouts.simulate_stream", killed)
     with pytest.raises(KeyboardInterrupt):
-        Jury(evidence, CONFIG, 1, tmp_path).residuals([Question(session.model, (0,)), Question(session.model, (0,), until=1.5)])
+        RolloutEvaluator(evidence, CONFIG, 1, tmp_path).residuals(
+            [RolloutRequest(session.model, (0,)), RolloutRequest(session.model, (0,), until=1.5)]
+        )
     assert len(list(tmp_path.glob("*.npy"))) == 1
 
 
 def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monkeypatch):
     session, evidence = quiet
-    jury = Walking(evidence, CONFIG, n_jobs=1)
+    evaluator = Walking(evidence, CONFIG, n_jobs=1)
     since = evidence[0].since
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
     monkeypatch.setattr("workbench.identify.selection.screening.LOOKED", 0.8)  # these takes are short
     for begins, most in ((0.0, 0.8), (1.2, 2.0)):
         missing = np.where(since[:, None] >= begins, 5.0, 0.1) * np.isfinite(evidence[0].recorded)
-        t = Trying(jury, session.model, [], {0: missing}, [c], Race(), False, {})
+        t = CandidateEvaluation(evaluator, session.model, [], {0: missing}, [c], Race(), False, {})
         assert begins < t.until <= most
-        shown = jury.cost(jury.early({0: missing}, t.until), "fit") / jury.cost({0: missing}, "fit")
+        shown = evaluator.cost(evaluator.early({0: missing}, t.until), "fit") / evaluator.cost({0: missing}, "fit")
         assert shown >= LOOKED_SHARE
 
 
@@ -242,26 +256,26 @@ def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_toget
 
 def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):
     session, evidence = quiet
-    jury = Jury(evidence, CONFIG, n_jobs=1)
-    plain = jury.residuals([Question(session.model, (0,))])[0][0]
+    evaluator = RolloutEvaluator(evidence, CONFIG, n_jobs=1)
+    plain = evaluator.residuals([RolloutRequest(session.model, (0,))])[0][0]
     floor = replace(session.model, effects=(EffectSpec("ground_friction", (), {"friction": 0.2}),))
-    np.testing.assert_array_equal(jury.residuals([Question(floor, (0,))])[0][0], plain)
-    assert jury.rollouts == 1
+    np.testing.assert_array_equal(evaluator.residuals([RolloutRequest(floor, (0,))])[0][0], plain)
+    assert evaluator.rollouts == 1
     worn = replace(session.model, effects=(EffectSpec("coulomb_friction", ("three",), {"torque": 0.1}),))
-    assert np.nanmax(np.abs(jury.residuals([Question(worn, (0,))])[0][0] - plain)) > 1
-    assert jury.rollouts == 2
+    assert np.nanmax(np.abs(evaluator.residuals([RolloutRequest(worn, (0,))])[0][0] - plain)) > 1
+    assert evaluator.rollouts == 2
 
 
 def test_every_number_of_a_vector_has_its_stretch(quiet):
     _, evidence = quiet
-    jury = Jury(evidence, CONFIG, n_jobs=1)
+    evaluator = RolloutEvaluator(evidence, CONFIG, n_jobs=1)
     shape = {0: np.zeros_like(evidence[0].recorded)}
-    assert len(jury.stretches((0,), "fit")) == len(jury.vector(shape, "fit"))
+    assert len(evaluator.stretches((0,), "fit")) == len(evaluator.vector(shape, "fit"))
 
 
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     session, evidence = quiet
-    search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
+    search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
     well, ill = _when_held(search, search.evaluated([]))
     assert (well, ill) == (set(session.model.joints), set())
 
@@ -291,10 +305,10 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
 
     r0 = -shown(truth)
     seen = [r0 + shown(p) for p in probes]
-    x, gain = guess(c, r0, probes, seen, FAR_WALKING)
+    x, gain = linearised_estimate(c, r0, probes, seen, FAR_WALKING)
     assert x == pytest.approx(truth, abs=1e-3)
     assert gain == pytest.approx(r0 @ r0, rel=1e-6)
-    far, _ = guess(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
+    far, _ = linearised_estimate(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
     assert np.abs(far).max() <= 4 * FAR_WALKING
 
 
@@ -308,8 +322,8 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
     power = {0: float(calm @ calm), 1: float(wild @ wild)}
 
     def calmest(explained, least=0.0):
-        trying = Trying.__new__(Trying)
-        trying.jury = SimpleNamespace(expected=lambda takes, use: 60.0,
+        trying = CandidateEvaluation.__new__(CandidateEvaluation)
+        trying.evaluator = SimpleNamespace(expected=lambda takes, use: 60.0,
                                       stretches=lambda takes, use: np.repeat([0, STRETCHES], 60))
         trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
         trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
@@ -351,7 +365,9 @@ def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
 
     def ends(magnitudes: np.ndarray | None) -> np.ndarray:
         start = np.array([9.0, 0.05])
-        fit = fit_blocks([start], [left(start)], [(np.full(2, -99.0), np.full(2, 99.0))], 4, WALKING, magnitudes=magnitudes)
+        fit = fit_blocks(
+            [start], [left(start)], [(np.full(2, -99.0), np.full(2, 99.0))], 4, FIT.stride_free, magnitudes=magnitudes
+        )
         (solved,) = together({0: fit}, lambda wanted: [[left(p) for p in point] for _, point in wanted])[0]
         return solved.x
 
@@ -364,14 +380,14 @@ def test_slopes_of_a_small_number_come_of_moves_that_contact_does_not_drown():
 def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
     effect = known_effects()[name]
     c = Candidate.of(effect, ("two",), (np.inf if name == "torque_ceiling" else 0.0,))
-    assert [float(x[0]) for x in scan(c, SCANNED[:1] if walking else SCANNED, walking)] == sizes
+    assert [float(x[0]) for x in scan(c, FIT.scanned[:1] if walking else FIT.scanned, walking)] == sizes
 
 
 @pytest.mark.parametrize(("name", "walking", "unheld", "sizes"), [
-    ("coulomb_friction", False, False, SCANNED), ("coulomb_friction", True, False, SCANNED[:1]),
-    ("coulomb_friction", True, True, SCANNED), ("ground_friction", True, True, SCANNED_GROUND)])
+    ("coulomb_friction", False, False, FIT.scanned), ("coulomb_friction", True, False, FIT.scanned[:1]),
+    ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground)])
 def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, unheld, sizes):
     """Of a hip's friction six times the typical one nothing was foretold at once its size, and more of a wrong name."""
     effect = known_effects()[name]
     where = ("one",) if effect.places == ("joint",) else ()
-    assert sizes_of(Candidate.of(effect, where, (0.6,)), walking, unheld) == sizes
+    assert scan_sizes(Candidate.of(effect, where, (0.6,)), walking, unheld) == sizes

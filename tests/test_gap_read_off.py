@@ -13,23 +13,22 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
-from workbench.identify.estimators.dropped_again import Played, read_anew
+from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.estimators.dropped_commands import (
-    LEAST_CLOSED,
-    SURELY,
-    Missed,
+    DroppedCommands,
     _least_closed,
     _lost,
     _stands_at_an_end,
-    with_missed,
+    with_dropped_commands,
 )
-from workbench.identify.estimators.dropped_in_motion import _suspects, passed_over, played_without
-from workbench.identify.estimators.stops_and_mounts import _stop, special
+from workbench.identify.estimators.dropped_in_motion import _suspects, dropped_in_motion, played_without
+from workbench.identify.estimators.stops_and_mounts import _stop, read_off_candidates
 from workbench.identify.findings import Change
 from workbench.identify.fitting.fits import Search
+from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.problem import gather
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job
 
@@ -43,32 +42,32 @@ def quiet(tmp_path_factory):
     rollouts = roll_out([run_of(t) for t in takes], CONFIG, n_jobs=1, floors=False)
     registered, _ = register_takes(session, takes, {t.spec.name: r.nominal for t, r in zip(takes, rollouts)})
     evidence = gather(registered, {t.spec.name: r for t, r in zip(takes, rollouts)})
-    return session.model, Jury(evidence, CONFIG, n_jobs=1)
+    return session.model, RolloutEvaluator(evidence, CONFIG, n_jobs=1)
 
 
 def recorded_with(quiet, model, commands=None):
     """The jury's take as another robot, or other commands, would have made it, with the noise that it had."""
-    nominal, jury = quiet
-    e = jury.evidence[0]
-    noise = e.recorded - e.simulated(run_job(jury.job(nominal, 0, CONFIG)), nominal)
-    job = replace(jury.job(model, 0, CONFIG), commands=commands or e.take.commands)
-    return jury.on([replace(e, recorded=e.simulated(run_job(job), model) + noise)])
+    nominal, evaluator = quiet
+    e = evaluator.evidence[0]
+    noise = e.recorded - e.simulated(run_job(evaluator.job(nominal, 0, CONFIG)), nominal)
+    job = replace(evaluator.job(model, 0, CONFIG), commands=commands or e.take.commands)
+    return evaluator.on([replace(e, recorded=e.simulated(run_job(job), model) + noise)])
 
 
-def nominal_residuals(quiet, jury):
-    return jury.residuals([Question(quiet[0], (0,))])[0]
+def nominal_residuals(quiet, evaluator):
+    return evaluator.residuals([RolloutRequest(quiet[0], (0,))])[0]
 
 
 def test_a_quiet_arm_suggests_nothing(quiet):
     residuals = nominal_residuals(quiet, quiet[1])
-    assert special(quiet[0], quiet[1].evidence, residuals) == []
-    assert with_missed(quiet[1], quiet[0], residuals)[1] == ()
+    assert read_off_candidates(quiet[0], quiet[1].evidence, residuals) == []
+    assert with_dropped_commands(quiet[1], quiet[0], residuals)[1] == ()
 
 
 def test_a_stop_is_read_off_where_the_joint_stands_while_the_model_goes_on(quiet):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 18.0}),))
-    jury = recorded_with(quiet, stopped)
-    (found,) = special(quiet[0], jury.evidence, nominal_residuals(quiet, jury))
+    evaluator = recorded_with(quiet, stopped)
+    (found,) = read_off_candidates(quiet[0], evaluator.evidence, nominal_residuals(quiet, evaluator))
     assert found.key == ("joint_stop", ("two",))
     assert found.size == 1
     assert found.values(np.ones(1))[1] == pytest.approx(18.0, abs=0.7)
@@ -78,8 +77,8 @@ def test_what_a_joint_passed_elsewhere_is_no_stop(quiet):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 18.0}),))
     evidence = [recorded_with(quiet, stopped).evidence[0], quiet[1].evidence[0]]
     residuals = {i: nominal_residuals(quiet, quiet[1].on([e]))[0] for i, e in enumerate(evidence)}
-    assert [c.key for c in special(quiet[0], evidence[:1], {0: residuals[0]})] == [("joint_stop", ("two",))]
-    assert special(quiet[0], evidence, residuals) == []
+    assert [c.key for c in read_off_candidates(quiet[0], evidence[:1], {0: residuals[0]})] == [("joint_stop", ("two",))]
+    assert read_off_candidates(quiet[0], evidence, residuals) == []
 
 
 @pytest.mark.parametrize(("stop", "asked"), [(np.inf, 0), (34.0, 1)], ids=["it turns there", "it stands there"])
@@ -94,19 +93,23 @@ def test_a_peak_of_few_frames_is_no_stop(stop, asked):
 @pytest.mark.parametrize("upper", [18.0, 1.0])
 def test_a_stop_stays_where_the_joint_was_seen_to_end(quiet, upper):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": upper}),))
-    jury = recorded_with(quiet, stopped)
-    (found,) = special(quiet[0], jury.evidence, nominal_residuals(quiet, jury))
+    evaluator = recorded_with(quiet, stopped)
+    (found,) = read_off_candidates(quiet[0], evaluator.evidence, nominal_residuals(quiet, evaluator))
     least, most = sorted(found.values(x)[1] for x in found.bounds())
-    lowest = min(np.rad2deg(np.nanmin(e.recorded[:, e.joints.index("two")] + e.zero("two"))) for e in jury.evidence)
+    lowest = min(np.rad2deg(np.nanmin(e.recorded[:, e.joints.index("two")] + e.zero("two"))) for e in evaluator.evidence)
     assert lowest < least < upper < most
     for x in found.bounds():  # each can be built
-        jury.residuals([Question(with_effects(quiet[0], [(found, x)]), (0,))])
+        evaluator.residuals([RolloutRequest(with_effects(quiet[0], [(found, x)]), (0,))])
 
 
 def test_a_loose_mount_is_read_off_with_its_axis(quiet):
     loose = replace(quiet[0], effects=(EffectSpec("loose_mount", ("two",), {"play": 6.0, "axis": (1.0, 0.0, 0.0)}),))
-    jury = recorded_with(quiet, loose)
-    found = [c for c in special(quiet[0], jury.evidence, nominal_residuals(quiet, jury)) if c.name == "loose_mount"]
+    evaluator = recorded_with(quiet, loose)
+    found = [
+        c
+        for c in read_off_candidates(quiet[0], evaluator.evidence, nominal_residuals(quiet, evaluator))
+        if c.name == "loose_mount"
+    ]
     assert [c.where for c in found] == [("two",)]
     assert np.abs(found[0].values(np.ones(1))[1:]) == pytest.approx([1, 0, 0], abs=0.04)
 
@@ -115,28 +118,28 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
-    jury = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    before = nominal_residuals(quiet, jury)
-    jury, (missed,) = with_missed(jury, quiet[0], before)
+    evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
+    before = nominal_residuals(quiet, evaluator)
+    evaluator, (missed,) = with_dropped_commands(evaluator, quiet[0], before)
     assert (missed.joint, missed.count, missed.of) == ("one", 1, len(commands.times))
     finding = missed.finding()
     share = finding.parameters["probability"]
     assert share.low < share.value < share.high
-    after = nominal_residuals(quiet, jury)
+    after = nominal_residuals(quiet, evaluator)
     assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))
 
 
 def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet):
     slow = Candidate.of(known_effects()["command_delay"], ("one",), (0.0,))
     x = np.array([6.0])
-    jury = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
-    wrong = Missed("dropped_command", "one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
-    search = Search(played_without(jury, {(0, "one"): (1,)}), quiet[0])
+    evaluator = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
+    wrong = DroppedCommands("dropped_command", "one", {0: (1,)}, 4, Change(2.0, 1.0, "deg"), Change(2.0, 1.0, "deg"))
+    search = Search(played_without(evaluator, {(0, "one"): (1,)}), quiet[0])
     current = search.evaluated([(slow, x)])
-    search, played = read_anew(search, current, Played(jury, (wrong,)))
+    search, played = reestimated(search, current, TakesAsPlayed(evaluator, (wrong,)))
     assert played.missed == ()
-    assert search.jury.cost(search.evaluated([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
-    assert search.jury.evidence[0].take.commands is jury.evidence[0].take.commands
+    assert search.evaluator.cost(search.evaluated([(slow, x)]).residuals, "fit") < 0.2 * current.cost["fit"]
+    assert search.evaluator.evidence[0].take.commands is evaluator.evidence[0].take.commands
 
 
 def quick_session(quiet, lost):
@@ -162,16 +165,16 @@ def test_what_comes_after_a_missed_pose_is_judged_beside_a_robot_that_missed_it_
     first = np.zeros(len(times), dtype=int)
     slow = replace(commands, times=times, goals=goals, speeds=np.full(goals.shape, np.deg2rad(60.0)),
                    enabled=commands.enabled[first], poses=commands.poses[first])
-    jury = recorded_with(quiet, quiet[0], without_poses(slow, slow.column("one"), (1, 4)))
-    jury = jury.on([replace(jury.evidence[0], take=replace(e.take, commands=slow))])
-    (missed,) = with_missed(jury, quiet[0], nominal_residuals(quiet, jury))[1]
+    evaluator = recorded_with(quiet, quiet[0], without_poses(slow, slow.column("one"), (1, 4)))
+    evaluator = evaluator.on([replace(evaluator.evidence[0], take=replace(e.take, commands=slow))])
+    (missed,) = with_dropped_commands(evaluator, quiet[0], nominal_residuals(quiet, evaluator))[1]
     assert (missed.poses, missed.of) == ({0: (1, 4)}, 5)
 
 
 @pytest.mark.parametrize("lost", [(), (2,), (2, 6, 7)])
 def test_poses_missed_on_the_way_are_those_without_which_the_joint_goes_so(quiet, lost):
-    jury = quick_session(quiet, lost)
-    found = passed_over(jury, quiet[0], nominal_residuals(quiet, jury))
+    evaluator = quick_session(quiet, lost)
+    found = dropped_in_motion(evaluator, quiet[0], nominal_residuals(quiet, evaluator))
     assert found == ({(0, "one"): lost} if lost else {})
 
 
@@ -188,28 +191,28 @@ def test_of_poses_in_a_row_that_may_be_missed_the_first_is_asked_alone(quiet):
 
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 6.0}),))
-    jury = recorded_with(quiet, stopped)
-    kept = _lost(jury, quiet[0], "two", {0: ()}, nominal_residuals(quiet, jury))[0][0]
+    evaluator = recorded_with(quiet, stopped)
+    kept = _lost(evaluator, quiet[0], "two", {0: ()}, nominal_residuals(quiet, evaluator))[0][0]
     assert len(kept) == 2
-    assert all(_stands_at_an_end(jury.evidence, 0, "two", k) for k in kept)
+    assert all(_stands_at_an_end(evaluator.evidence, 0, "two", k) for k in kept)
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
-    jury = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    ((lost,),) = _lost(jury, quiet[0], "one", {0: ()}, nominal_residuals(quiet, jury))[0].values()
-    assert not _stands_at_an_end(jury.evidence, 0, "one", lost)
+    evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
+    ((lost,),) = _lost(evaluator, quiet[0], "one", {0: ()}, nominal_residuals(quiet, evaluator))[0].values()
+    assert not _stands_at_an_end(evaluator.evidence, 0, "one", lost)
 
 
 def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):
     loose = replace(quiet[0], effects=(EffectSpec("backlash", ("two",), {"gap": 4.0}),))
-    jury = recorded_with(quiet, loose)
-    (e,) = jury.evidence
+    evaluator = recorded_with(quiet, loose)
+    (e,) = evaluator.evidence
     column = e.channels.index("two")
 
     def left(turned, model):
         recorded = e.recorded.copy()
         recorded[:, column] += np.deg2rad(turned)
-        residuals = jury.on([replace(e, recorded=recorded)]).residuals([Question(model, (0,))])[0][0]
+        residuals = evaluator.on([replace(e, recorded=recorded)]).residuals([RolloutRequest(model, (0,))])[0][0]
         return float(np.nanmean(residuals[:, column] * e.sigma[column]))
 
     assert left(1.5, loose) == pytest.approx(left(0.0, loose), abs=np.deg2rad(0.05))
@@ -218,10 +221,10 @@ def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the
 
 
 def test_poses_missed_on_the_ground_alone_must_explain_nearly_all():
-    def jury(*bases):
+    def evaluator(*bases):
         return SimpleNamespace(evidence=[SimpleNamespace(take=SimpleNamespace(spec=SimpleNamespace(base=b))) for b in bases])
 
-    assert _least_closed(jury("fixed", "free"), {0: 1, 1: 0}) == LEAST_CLOSED
-    assert _least_closed(jury("fixed", "free"), {0: 0, 1: 2}) == SURELY
-    assert _least_closed(jury("free", "free"), {0: 1, 1: 1}) == LEAST_CLOSED
-    assert _least_closed(jury("fixed", "free"), {0: 0, 1: 1}) is None
+    assert _least_closed(evaluator("fixed", "free"), {0: 1, 1: 0}) == READ_OFF.dropped_explains
+    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 2}) == READ_OFF.dropped_explains_free
+    assert _least_closed(evaluator("free", "free"), {0: 1, 1: 1}) == READ_OFF.dropped_explains
+    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 1}) is None

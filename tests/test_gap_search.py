@@ -16,27 +16,27 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass, SwungMass
 from workbench.identify.problem import ratios, smoothed
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection import forward as selection
 from workbench.identify.selection.screening import tried
 
 
 def test_residuals_are_as_large_as_noise_where_nothing_is_hidden(tmp_path):
     session, evidence = gathered(tmp_path, NOMINAL)
-    residual = Jury(evidence, CONFIG, n_jobs=1).residuals([Question(session.model, (0,))])[0][0]
+    residual = RolloutEvaluator(evidence, CONFIG, n_jobs=1).residuals([RolloutRequest(session.model, (0,))])[0][0]
     assert list(ratios(evidence[0], residual).values()) == pytest.approx([1.0] * len(evidence[0].channels), abs=0.3)
     assert ledger(evidence, {0: residual}) == ()
 
 
 def test_stretches_for_fitting_choosing_and_validating_do_not_meet(worn):
-    uses = worn[1].jury.evidence[0].uses
+    uses = worn[1].evaluator.evidence[0].uses
     assert all(m.any() for m in uses.values())
     assert (sum(m.astype(int) for m in uses.values()) <= 1).all()
 
 
 def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
     session, search, _ = worn
-    pool = [c for c in candidates(session.model, search.jury.evidence) if c.name == "viscous_friction"]
+    pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name == "viscous_friction"]
     monkeypatch.setattr(selection, "MOST_WORK", 0.0)
     monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
     chosen = selection.select(search, pool, lambda what, share: None)
@@ -47,9 +47,9 @@ def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
 
 def test_what_was_tried_when_the_limit_of_work_came_decides(worn, monkeypatch):
     session, search, _ = worn
-    pool = [c for c in candidates(session.model, search.jury.evidence) if c.name == "coulomb_friction"]
+    pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name == "coulomb_friction"]
     monkeypatch.setattr(selection, "_says_it", lambda *a: False)  # it would ask for more
-    monkeypatch.setattr(selection, "MOST_WORK", search.jury.work + 2 * search.jury.seconds)
+    monkeypatch.setattr(selection, "MOST_WORK", search.evaluator.work + 2 * search.evaluator.seconds)
     monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
     chosen = selection.select(search, pool, lambda what, share: None)
     assert chosen.stopped
@@ -57,10 +57,10 @@ def test_what_was_tried_when_the_limit_of_work_came_decides(worn, monkeypatch):
 
 
 def test_work_is_counted_in_seconds_of_a_puppys_rollout(worn):
-    jury = worn[1].jury
-    (e,) = jury.evidence
+    evaluator = worn[1].evaluator
+    (e,) = evaluator.evidence
     assert len(e.joints) == 3
-    assert jury.seconds == pytest.approx(float(e.take.recorded.time[-1]) * 20 / 32)
+    assert evaluator.seconds == pytest.approx(float(e.take.recorded.time[-1]) * 20 / 32)
 
 
 def test_only_walks_tell_what_held_takes_were_asked_before(worn):
@@ -75,7 +75,7 @@ def test_only_walks_tell_what_held_takes_were_asked_before(worn):
 
 
 def test_the_ledger_books_the_worn_joint_alone_before_any_fit(worn):
-    entries = ledger(worn[1].jury.evidence, worn[2].residuals)
+    entries = ledger(worn[1].evaluator.evidence, worn[2].residuals)
     assert entries[0].where == ("three",)
     assert entries[0].layer == "actuator"
     assert entries[0].error > 2 * entries[0].floor
@@ -99,7 +99,7 @@ def test_running_means_of_noise_stay_one_and_those_of_an_offset_grow():
 def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_its_size(worn):
     session, search, nominal = worn
     names = {"coulomb_friction", "viscous_friction", "servo_gain", "backlash"}  # a dead band does the same, to a hundredth
-    pool = [c for c in candidates(session.model, search.jury.evidence) if c.name in names]
+    pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name in names]
     groups = [[c for c in pool if c.name == name] for name in sorted(names)]
     assert all(len(g) == 3 for g in groups)
     trials = tried(search, nominal, groups, dict.fromkeys(range(len(groups)), (0,)), lambda share: None)
@@ -107,7 +107,7 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
     assert str(best.candidate) == "coulomb_friction(three)"
     assert NOMINAL + best.candidate.values(best.x)[0] == pytest.approx(HIDDEN, rel=0.06)
     refined = search.refined(search.refitted(search.evaluated([(best.candidate, best.x)]), (0,), 2))
-    noise = np.count_nonzero(search.jury.vector(nominal.residuals, "validate"))
+    noise = np.count_nonzero(search.evaluator.vector(nominal.residuals, "validate"))
     assert refined.cost["validate"] - noise < 0.2 * (nominal.cost["validate"] - noise)
     (sd,) = np.sqrt(np.diag(refined.covariance))
     assert 0 < sd < 0.2 * refined.x[0]
@@ -115,16 +115,16 @@ def test_one_rollout_tries_an_effect_at_all_joints_and_the_hidden_one_wins_at_it
 
 def test_what_a_jury_remembers_it_does_not_simulate_again(worn, tmp_path):
     session, search, nominal = worn
-    first = Jury(search.jury.evidence, CONFIG, n_jobs=1, memory=tmp_path)
-    first.residuals([Question(session.model, (0,))])
-    again = Jury(search.jury.evidence, CONFIG, n_jobs=1, memory=tmp_path)
-    residual = again.residuals([Question(session.model, (0,))])[0][0]
+    first = RolloutEvaluator(search.evaluator.evidence, CONFIG, n_jobs=1, memory=tmp_path)
+    first.residuals([RolloutRequest(session.model, (0,))])
+    again = RolloutEvaluator(search.evaluator.evidence, CONFIG, n_jobs=1, memory=tmp_path)
+    residual = again.residuals([RolloutRequest(session.model, (0,))])[0][0]
     assert (first.rollouts, again.rollouts) == (1, 0)
     np.testing.assert_array_equal(residual, nominal.residuals[0])
 
 
 def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(worn):
-    for c in candidates(worn[0].model, worn[1].jury.evidence):
+    for c in candidates(worn[0].model, worn[1].evaluator.evidence):
         if not c.neutral or isinstance(c, SwungMass):  # of that, test_gap_point_mass
             continue
         neutral = c.values(np.zeros(c.size))
@@ -196,8 +196,8 @@ def test_channels_across_an_axis_belong_to_their_joint():
 
 
 def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn):
-    session, evidence = worn[0], worn[1].jury.evidence
-    search = Search(Jury(evidence, CONFIG, n_jobs=1), session.model)
+    session, evidence = worn[0], worn[1].evaluator.evidence
+    search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
     pool = {c.key: c for c in candidates(session.model, evidence)}
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
     told = search.refitted(search.evaluated([(first, np.array([1.0]))]), (0,), 2)
@@ -221,19 +221,24 @@ def test_walks_say_when_commands_come_unless_held_takes_speak_against_it(left, l
     def fit(x, held):
         return Fit((delay,), np.array([x]), np.eye(1), {}, {0: np.array([[held]]), 1: np.zeros((1, 1))})
 
-    search = SimpleNamespace(held=(0,), fitted=(0, 1), grounded=lambda takes: (1,), refitted=lambda *_: fit(3.4, left),
-                             jury=SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values()))))
-    assert Search.retimed(search, fit(2.5, 10.0)).x.tolist() == [late]
+    search = SimpleNamespace(
+        held=(0,),
+        fitted=(0, 1),
+        floating_base=lambda takes: (1,),
+        refitted=lambda *_: fit(3.4, left),
+        evaluator=SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values()))),
+    )
+    assert Search.with_timing_refitted(search, fit(2.5, 10.0)).x.tolist() == [late]
 
 
 def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
     session, search, _ = worn
-    pool = {c.key: c for c in candidates(session.model, search.jury.evidence)}
+    pool = {c.key: c for c in candidates(session.model, search.evaluator.evidence)}
     first, second = pool["coulomb_friction", ("three",)], pool["viscous_friction", ("two",)]
     zero = Candidate.of(known_effects()["zero_offset"], ("one",), (0.0,))
-    before = search.jury.rollouts
+    before = search.evaluator.rollouts
     fit = search.refitted(search.evaluated([(first, np.array([1.3])), (second, np.array([0.2]))]), (0,), 1)
-    assert search.jury.rollouts - before == 3  # as they are, both moved, where that leads
+    assert search.evaluator.rollouts - before == 3  # as they are, both moved, where that leads
     assert [(s.joint, s.numbers.tolist()) for s in fit.slopes] == [("three", [0]), ("two", [1])]
     assert np.isfinite(np.diag(fit.covariance)).all()
     assert 0.06 + first.values(fit.x[:1])[0] == pytest.approx(HIDDEN, rel=0.1)
@@ -243,12 +248,12 @@ def test_joints_of_a_held_robot_are_fitted_side_by_side(worn):
 
 def test_a_number_is_as_unsure_as_it_differs_between_contact_models(worn):
     session, search, _ = worn
-    (e,) = search.jury.evidence
+    (e,) = search.evaluator.evidence
     effect = next(c for c in candidates(session.model, (e,)) if c.key == ("coulomb_friction", ("three",)))
     alike = search.refitted(search.evaluated([(effect, np.array([2.0]))]), (0,), 2)
     assert not e.contact.any()
     moved = search.evaluated([(effect, alike.x + 0.5)]).residuals[0] - alike.residuals[0]
-    differing = Search(search.jury.on([replace(e, contact=np.nan_to_num(moved) * e.sigma)]), session.model)
+    differing = Search(search.evaluator.on([replace(e, contact=np.nan_to_num(moved) * e.sigma)]), session.model)
     unsure = differing.refitted(differing.evaluated([(effect, np.array([2.0]))]), (0,), 2)
     assert unsure.x == pytest.approx(alike.x)
     assert np.sqrt(unsure.covariance[0, 0] - alike.covariance[0, 0]) == pytest.approx(0.5, rel=0.15)

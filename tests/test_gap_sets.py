@@ -8,8 +8,8 @@ import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
 from workbench.identify.selection import single_joint as sets
-from workbench.identify.selection.record import Round
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.screening import CandidateFit
 
 RNG = np.random.default_rng(5)
 SLOW, HEAVY = RNG.normal(size=(2, COUNT))
@@ -20,8 +20,8 @@ class Search(LinearSearch):
     def __init__(self, **sizes):
         super().__init__(DOES, **sizes)
         self.nominal = SimpleNamespace(joints=("swing",))
-        by_all = self.jury.by_channel
-        self.jury.by_channel = lambda left, use, joint: by_all(left, use)
+        by_all = self.evaluator.by_channel
+        self.evaluator.by_channel = lambda left, use, joint: by_all(left, use)
 
 
 def found(search, **sizes):
@@ -29,11 +29,11 @@ def found(search, **sizes):
     fit = search.evaluated([(candidate(name), np.array(x)) for name, x in sizes.items()])
     rounds = []
     for c, x in fit.sizes():
-        trials = [Trial(c, x, {"fit": 2e5, "choose": 1e5}, None)]
+        trials = [CandidateFit(c, x, {"fit": 2e5, "choose": 1e5}, None)]
         if c.name == "supply_voltage":
-            trials += [Trial(candidate(name), np.array([size]), {"fit": 2 * gain, "choose": gain}, None)
+            trials += [CandidateFit(candidate(name), np.array([size]), {"fit": 2 * gain, "choose": gain}, None)
                        for name, size, gain in (("viscous_friction", 3.0, 9e4), ("dead_band", 6.0, 4e4))]
-        rounds.append(Round(fit, tuple(trials), (trials[0],)))
+        rounds.append(SelectionStep(fit, tuple(trials), (trials[0],)))
     return fit, rounds
 
 
@@ -65,7 +65,7 @@ def test_a_set_that_is_not_right_replaces_what_leaves_twenty_times_more(monkeypa
     search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
     search.recorded = search.recorded + 1.3 * RNG.normal(size=COUNT)
     monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
-    other = [Trial(candidate(name), np.array([1.0]), {}, None) for name in ("supply_voltage", "parallel_spring")]
+    other = [CandidateFit(candidate(name), np.array([1.0]), {}, None) for name in ("supply_voltage", "parallel_spring")]
     monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [other])
     monkeypatch.setattr(sets, "_shared", lambda *a: [])
     monkeypatch.setattr(sets, "_fitted", fitted)

@@ -1,5 +1,7 @@
 """Of long recordings a search looks at a share."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,10 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify import subset as share
 from workbench.identify.diagnosis import diagnose_session
-from workbench.identify.problem import JUDGES, gather, part_of
-from workbench.identify.rollouts import Jury, Question
-from workbench.identify.subset import floors_everywhere, judged_fairly, searched, share_of
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import gather, part_of
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
 from workbench.simulation import SimulationConfig
 
 CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=2e-3)
@@ -37,40 +40,39 @@ def evidence_of(session):
 def two(tmp_path_factory):
     session = write_two_takes(tmp_path_factory.mktemp("two"))
     evidence = evidence_of(session)
-    jury = Jury(evidence, CONFIG, n_jobs=1)
-    return session.model, jury, jury.residuals([Question(session.model, (0, 1))])[0]
+    evaluator = RolloutEvaluator(evidence, CONFIG, n_jobs=1)
+    return session.model, evaluator, evaluator.residuals([RolloutRequest(session.model, (0, 1))])[0]
 
 
 @pytest.fixture
 def shorter(monkeypatch):
     """What counts as long."""
-    for name, seconds in (("LONG", 3.0), ("SEARCHED", 1.7), ("PIECE", 0.8)):
-        monkeypatch.setattr(share, name, seconds)
+    monkeypatch.setattr(share, "PROBLEM", replace(PROBLEM, long=3.0, looked_at=1.7, piece=0.8))
 
 
 def test_short_sessions_are_looked_at_whole(two):
-    _, jury, residuals = two
-    assert searched(jury.evidence, residuals) == list(jury.evidence)
-    assert share_of(jury.evidence) == {}
+    _, evaluator, residuals = two
+    assert data_subset(evaluator.evidence, residuals) == list(evaluator.evidence)
+    assert subset_used(evaluator.evidence) == {}
 
 
 def test_what_is_looked_at_is_where_most_is_missing_and_no_more_than_asked(two, shorter):
-    _, jury, residuals = two
-    worn, well = searched(jury.evidence, residuals)
+    _, evaluator, residuals = two
+    worn, well = data_subset(evaluator.evidence, residuals)
     assert 0.8 <= worn.until <= 1.7
     assert worn.until + well.until <= 1.7 + 1e-6
-    assert share_of([worn, well])["searched"]["worn"] == pytest.approx(worn.until, abs=0.05)
+    assert subset_used([worn, well])["searched"]["worn"] == pytest.approx(worn.until, abs=0.05)
     assert not any(mask[worn.since > worn.until].any() for mask in worn.uses.values())
     assert worn.uses["fit"].any()
     assert worn.uses["choose"].any()
 
 
 def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(two):
-    model, jury, residuals = two
-    early, never = (share._until(e, until) for e, until in zip(jury.evidence, (1.0, 0.0)))
-    other = jury.on([early, never])
-    told = other.residuals([Question(model, (0, 1))])[0]
-    assert other.rollouts - jury.rollouts == 1
+    model, evaluator, residuals = two
+    early, never = (share._until(e, until) for e, until in zip(evaluator.evidence, (1.0, 0.0)))
+    other = evaluator.on([early, never])
+    told = other.residuals([RolloutRequest(model, (0, 1))])[0]
+    assert other.rollouts - evaluator.rollouts == 1
     assert np.isnan(told[1]).all()
     assert np.isnan(told[0][early.since > 1.0]).all()
     well_before = early.moving & (early.since < 0.9)
@@ -82,17 +84,17 @@ def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(t
 
 @pytest.mark.parametrize("long", [1.0, 60.0])
 def test_takes_that_validate_are_not_looked_at(tmp_path, monkeypatch, long):
-    monkeypatch.setattr(share, "LONG", long)
+    monkeypatch.setattr(share, "PROBLEM", replace(share.PROBLEM, long=long))
     session = write_two_takes(tmp_path, {"worn": "fit", "well": "validate"})
     evidence = evidence_of(session)
-    residuals = Jury(evidence, CONFIG, n_jobs=1).residuals([Question(session.model, (0, 1))])[0]
-    looked_at = searched(evidence, residuals)
+    residuals = RolloutEvaluator(evidence, CONFIG, n_jobs=1).residuals([RolloutRequest(session.model, (0, 1))])[0]
+    looked_at = data_subset(evidence, residuals)
     assert [e.until > 0 for e in looked_at] == [True, False]
-    assert ("searched" in share_of(looked_at)) is (long < 60)
+    assert ("searched" in subset_used(looked_at)) is (long < 60)
 
 
 def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter, monkeypatch):
-    monkeypatch.setattr(share, "SEARCHED", 3.0)
+    monkeypatch.setattr(share, "PROBLEM", replace(share.PROBLEM, looked_at=3.0))
     for k, name in enumerate(("wave", "again")):
         record_arm(tmp_path, name, 0.16, seed=k)
     wave = session_content()["takes"][0]
@@ -109,15 +111,15 @@ def test_a_stiff_joint_is_named_from_a_share_and_judged_on_all(tmp_path, shorter
 
 def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two):
     """A joint met its stop but twice, while the frames that judge looked away."""
-    _, jury, residuals = two
-    e = jury.evidence[0]
+    _, evaluator, residuals = two
+    e = evaluator.evidence[0]
     k = e.channels.index("three")
     part = part_of(e.since)
 
     def judging(third):
         met = residuals[0].copy()
         met[:, k] = np.where(e.moving & (third == part), 40.0, 0.1)
-        (seen, _) = judged_fairly(jury.evidence, {0: met, 1: residuals[1]})
+        (seen, _) = rebalanced(evaluator.evidence, {0: met, 1: residuals[1]})
         assert (seen.uses["validate"] == e.uses["validate"]).all()
         assert not (seen.uses["fit"] & seen.uses["choose"]).any()
         assert ((seen.uses["fit"] | seen.uses["choose"]) == (e.uses["fit"] | e.uses["choose"])).all()
@@ -125,6 +127,6 @@ def test_another_third_of_the_frames_judges_what_the_usual_one_hardly_shows(two)
 
     assert judging(0) == {0}
     assert judging(2) == {2}
-    assert judging(JUDGES) == {JUDGES}
-    assert judged_fairly(jury.evidence, residuals) == list(jury.evidence)
-    assert judged_fairly(jury.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(jury.evidence)
+    assert judging(PROBLEM.deciding_part) == {PROBLEM.deciding_part}
+    assert rebalanced(evaluator.evidence, residuals) == list(evaluator.evidence)
+    assert rebalanced(evaluator.evidence, {i: 0.1 * np.ones_like(r) for i, r in residuals.items()}) == list(evaluator.evidence)

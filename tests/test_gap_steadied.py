@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from workbench.identify.shooting import SETTLES, WINDOW, base_states, edges, unsettled
+from workbench.identify.options import PROBLEM
+from workbench.identify.shooting import base_states, edges, unsettled
 from workbench.recording.take import Take
 
 SPEED, TURNING = np.array([0.05, -0.02, 0.01]), np.array([0.1, -0.2, 0.8])
@@ -42,12 +43,12 @@ def test_noise_of_cameras_is_smoothed(walk: Take):
 
 def test_a_window_whose_beginning_was_not_seen_goes_on_from_the_one_before(walk: Take):
     p_WB = walk.p_WB.copy()
-    p_WB[np.abs(walk.since_start - 2 * WINDOW) < 0.01] = np.nan
+    p_WB[np.abs(walk.since_start - 2 * PROBLEM.window) < 0.01] = np.nan
     states, whole = base_states(replace(walk, p_WB=p_WB)), base_states(walk)
     assert states is not None
     assert whole is not None
     assert len(states.times) == len(whole.times) - 1
-    assert np.abs(states.times - 2 * WINDOW).min() > WINDOW / 2
+    assert np.abs(states.times - 2 * PROBLEM.window).min() > PROBLEM.window / 2
 
 
 @pytest.mark.parametrize("changes", [{"base": "fixed"}, {"p_WB": None}, {"quat_WB": None}])
@@ -61,5 +62,5 @@ def test_frames_after_an_edge_tell_nothing_until_feet_have_found_the_floor(walk:
     since = walk.since_start
     told = since[~unsettled(states, since)]
     after = told[:, None] - states.times
-    assert not ((after >= 0) & (after < SETTLES)).any()
+    assert not ((after >= 0) & (after < PROBLEM.settles)).any()
     assert len(told) > 0.75 * len(since)

@@ -25,12 +25,13 @@ from workbench.identify.findings import (
     Unexplained,
     Verdict,
 )
+from workbench.identify.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
 from workbench.identify.take_report import TakeReport
 from workbench.robot import EffectSpec, RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.report.diagnosis import diagnosis_report, write_diagnosis
-from workbench.view.report.words import headline, interval, intervals_of, left_row, next_said, reason_of, sentence_of, title_of
+from workbench.view.report.words import headline, in_words, interval, intervals_of, left_row, next_said, sentence_of, title_of
 
 SIGMA = np.deg2rad(0.1)
 
@@ -66,9 +67,9 @@ def diagnosis(model: RobotModel, verdict: Verdict = "explained") -> Diagnosis:
         verdict, model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 2.0})), model,
         gap=tuple(GapEntry("structure", ("flm",), "walk", ((0.5 + k, 1.2 + k),), 2.0, 0.1, "deg", "stance") for k in range(8)),
         findings=(finding(),),
-        rejected=(Rejected("coulomb_friction", ("flm",), "a placebo at frm does as well", Change(2.0, 1.9, "deg")),
-                  Rejected("payload", ("body_link",), "it does not show")),
-        unexplained=(Unexplained(("frb",), 0.6, 0.2, "deg", "grows with <load>"),),
+        rejected=(Rejected("coulomb_friction", ("flm",), Outdone("dead_band", ("flm",), 900.0, 40.0), Change(2.0, 1.9, "deg")),
+                  Rejected("payload", ("body_link",), ScreenedOut())),
+        unexplained=(Unexplained(("frb",), 0.6, 0.2, "deg", Dependence("a <take>", "frb", "angle", 0.6)),),
         next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
         provenance={"seed": 7, "seconds": 94.0}, left_out=(("trot", "line 9: the file is cut"),))
 
@@ -180,32 +181,36 @@ def test_a_vector_has_a_row_for_each_component_in_a_unit_that_suits_the_largest(
 
 
 @pytest.mark.parametrize(("entry", "row"), [
-    (Unexplained(("brm",), 0.567, 0.206, "deg", "sway: goes with angle (correlation 0.55)"),
+    (Unexplained(("brm",), 0.567, 0.206, "deg", Dependence("sway", "brm", "angle", 0.55)),
      ["joint brm", "sway", "0.567 deg", "2.8×", "partly with its angle (0.55)"]),
-    (Unexplained((), 0.00546, 0.00178, "m", "walk: forward, goes with nothing tried"),
+    (Unexplained((), 0.00546, 0.00178, "m", Dependence("walk", "forward")),
      ["how far the body goes", "walk", "5.46 mm", "3.1×", "not with time"]),
-    (Unexplained(("flm",), 1.0, 0.5, "deg", "walk: across its axis (flm~z), goes with time (correlation 0.80)"),
+    (Unexplained(("flm",), 1.0, 0.5, "deg", Dependence("walk", "flm~z", "time", 0.8)),
      ["flm, across its axis (z)", "walk", "1 deg", "2.0×", "closely with time (0.80)"]),
-    (Unexplained(("frb",), 0.6, 0.2, "deg", "grows with the load"), ["frb", "", "0.6 deg", "3.0×", "grows with the load"]),
+    (Unexplained(("frb",), 0.6, 0.2, "deg", ParameterDrift("com_shift", ("frb_link",), "offset", 1.0, 2.0, "m")),
+     ["frb", "", "0.6 deg", "3.0×", "offset of centre of mass shift at frb_link would have to go from 1 to 2 m within a take: "
+                                     "something that changes looks like it"]),
 ])
 def test_what_is_left_is_said_in_plain_words(entry: Unexplained, row: list[str]) -> None:
     assert left_row(entry) == row
 
 
 def test_a_doubt_about_a_name_is_said_but_not_as_an_error_of_the_fitted_model(model: RobotModel, take: TakeReport) -> None:
-    hangs = Unexplained((), 0.75, 0.12, "N", "the tether force is a pull straight down, with the weight of 76 g")
-    off = Unexplained(("brm",), 0.567, 0.206, "deg", "sway: goes with nothing tried")
+    hangs = Unexplained((), 0.75, 0.12, "N", DownwardPull("tether_force", 0.0762))
+    off = Unexplained(("brm",), 0.567, 0.206, "deg", Dependence("sway", "brm"))
     told = {n: diagnosis_report(replace(diagnosis(model), unexplained=left), [take], "Session small").html()
             for n, left in enumerate([(hangs,), (hangs, off)])}
-    assert all("The tether force is a pull straight down, with the weight of 76 g." in page for page in told.values())
+    assert all("The tether force is a pull straight down, with the weight of 76 g that does" in page for page in told.values())
     assert ["still off by more than noise" in page for page in told.values()] == [False, True]
 
 
 def test_reasons_name_effects_as_people_do() -> None:
-    assert reason_of("in place of com_shift(body_link) it leaves 686 more") == (
-        "in place of centre of mass shift at body_link it leaves 686 more")
-    assert reason_of("ground_friction() takes 40 off") == "ground friction takes 40 off"
-    assert reason_of("a rise (of 3) in f(x)") == "a rise (of 3) in f(x)"
+    worse = WorseInPlace("com_shift", ("body_link",), 686.4)
+    assert in_words(worse).startswith("in place of centre of mass shift at body_link it leaves 686 more of chi squared on")
+    assert str(worse).startswith("in place of com_shift(body_link) it leaves 686 more")
+    assert "it leaves only 3 less" in str(replace(worse, behind=-3.2))
+    other = Outdone("a_plug_in", (), 40.0, 7.0)
+    assert in_words(other) == "a plug in takes 40 off chi squared on the choosing stretches, this 7"
 
 
 def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
@@ -263,9 +268,9 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
              "Where the recordings leave the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
-             "Tried in its place", "a placebo at frm does as well", "Before and after, on what nothing saw", "What is left",
-             "grows with &lt;load&gt;", "What else was tried", "it does not show", "What to record next", "next_experiment.csv",
-             "See it move", "<b>seed</b> 7"]
+             "Tried in its place", "dead band at flm takes 900 off", "Before and after, on what nothing saw",
+             "What is left", "a &lt;take&gt;", "What else was tried", "its signature is not that of what is missing",
+             "What to record next", "next_experiment.csv", "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]
     assert -1 not in places, order[places.index(-1)]
     assert places == sorted(places)

@@ -18,6 +18,8 @@
 #define CHECK_TRIES 5u        /* of one read before torque goes on */
 #define CHECK_SPREAD 6u       /* counts: two readings of a joint at rest agree within this before torque goes on */
 
+#define LIMIT_SPREAD 2u       /* counts by which a servo's angle limits may be narrower than the table's bounds: rounding */
+
 #define DEAD_ROUNDS 4u        /* rounds without an answer: about 100 ms, 300 ms are allowed; four by chance: 1e-12 at 0.1 % flips */
 #define SUPPLY_ROUNDS 2u      /* rounds that more than half of the servos missed: not a servo has died, but the supply */
 #define ALARM_READINGS 3u     /* readings one after another that say the same before it is believed */

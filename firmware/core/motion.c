@@ -42,7 +42,7 @@ void ramp_to_neutral(struct robot *r, uint8_t state, uint8_t after) {
 void begin_play(struct robot *r) {
     if (upload_ready(&r->upload)) upload_take(&r->upload);
     r->pose = r->cycle = 0;
-    r->next_pose = r->now + 1u;
+    r->next_pose = r->now + POSE_GUARD_MS; /* on the tick, as all that follow: what is under way on the bus is over by then */
 }
 
 static void ramp_to_table(struct robot *r) {

@@ -98,7 +98,8 @@ static uint8_t objection(const struct robot *r, uint32_t j, const uint8_t *all, 
     const uint8_t *t = playing(r);
     const struct servo *s = &r->servo[j];
     if (get16(all + DXL_MODEL) != table_model(t, j)) return REASON_WRONG_MODEL;
-    if (get16(all + DXL_CW_LIMIT) > table_low(t, j) || get16(all + DXL_CCW_LIMIT) < table_high(t, j)) return REASON_NARROW_LIMITS;
+    uint32_t cw = get16(all + DXL_CW_LIMIT), ccw = get16(all + DXL_CCW_LIMIT);
+    if (cw > table_low(t, j) + LIMIT_SPREAD || ccw + LIMIT_SPREAD < table_high(t, j)) return REASON_NARROW_LIMITS;
     if (error & DXL_ERROR_OVERLOAD || get16(all + DXL_TORQUE_LIMIT) == 0) return REASON_OVERLOAD;
     if (error & DXL_ERROR_HEAT || all[DXL_HEAT] >= HOT_CELSIUS) return REASON_HOT;
     if (r->check_pass == 1 && distance(get16(all + DXL_POSITION), s->position) > CHECK_SPREAD) return REASON_MOVED_BY_HAND;

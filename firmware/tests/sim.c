@@ -1,12 +1,7 @@
 #include "sim.h"
 
-#include <stdlib.h>
-#include <string.h>
 
 #include "../core/crc.h"
-
-struct sim *sim_new(void) { return calloc(1, sizeof(struct sim)); }
-void sim_free(struct sim *s) { free(s); }
 
 uint32_t sim_random(struct sim *s, uint32_t below) {
     s->rng ^= s->rng << 13;
@@ -97,7 +92,7 @@ static void reply(struct sim *s, struct sim_servo *v, const uint8_t *parameters,
     a[2] = v->table[DXL_ID];
     a[3] = (uint8_t)(n + 2u);
     a[4] = error;
-    memcpy(a + 5, parameters, n);
+    if (n) memcpy(a + 5, parameters, n);
     a[5 + n] = dxl_sum(a, n + DXL_OVERHEAD);
     s->answer_length = n + DXL_OVERHEAD;
     if (v->twin) a[5 + sim_random(s, n + 1u)] ^= (uint8_t)(1u + sim_random(s, 255));
@@ -161,6 +156,7 @@ static void begin_transaction(struct sim *s) {
     struct bus *b = &s->r.bus;
     b->start = false;
     b->busy = true;
+    if (s->sent) s->sent(s);
     if (b->tx[4] == DXL_SYNC_WRITE) note(s, LOG_GOALS);
     if (b->tx[4] == DXL_SYNC_WRITE && s->r.state == STATE_PLAY && s->r.resends == 0) s->poses++;
     if (b->tx[4] == DXL_WRITE && b->tx[5] == DXL_TORQUE && b->tx[6] == 0) note(s, LOG_OFF);
@@ -235,7 +231,8 @@ void sim_frame(struct sim *s, uint32_t link, uint32_t type, const uint8_t *paylo
     uint8_t bytes[RING_BYTES];
     uint32_t k = 0;
     ring.in = ring.out = 0;
-    frame_send(&ring, (uint8_t)type, 1, payload, n);
+    static const uint8_t nothing;
+    frame_send(&ring, (uint8_t)type, 1, payload ? payload : &nothing, n);
     while (ring_used(&ring)) bytes[k++] = ring_get(&ring);
     sim_send(s, link, bytes, k);
 }
@@ -244,56 +241,4 @@ void sim_remote(struct sim *s, uint32_t buttons) {
     uint8_t low = (uint8_t)buttons, high = (uint8_t)(buttons >> 8);
     uint8_t p[6] = {0xFF, 0x55, low, (uint8_t)~low, high, (uint8_t)~high};
     sim_send(s, LINK_ZIGBEE, p, 6);
-}
-
-/* --- for callers that know no struct --- */
-
-static uint32_t *number(struct sim *s, const char *what) {
-    const struct { const char *name; uint32_t *at; } fields[] = {
-        {"poses", &s->poses}, {"goal_errors", &s->goal_errors}, {"wrong_longest", &s->wrong_longest}, {"events", &s->events},
-        {"flip_to", &s->flip_to}, {"flip_from", &s->flip_from}, {"cycle", &s->r.cycle}, {"pose", &s->r.pose}};
-    for (size_t k = 0; k < sizeof fields / sizeof *fields; k++)
-        if (!strcmp(what, fields[k].name)) return fields[k].at;
-    return NULL;
-}
-
-static uint8_t *byte_of(struct sim *s, const char *what, uint32_t k) {
-    const struct { const char *name; uint8_t *at; } fields[] = {
-        {"state", &s->r.state}, {"reason", &s->r.reason}, {"servo_named", &s->r.servo_named}, {"table_fault", &s->r.table_fault},
-        {"volts", &s->volts}, {"heat", &s->servo[k].heat}, {"glitch", &s->glitch}, {"torque", &s->servo[k].table[DXL_TORQUE]},
-        {"slope", &s->servo[k].table[28]}, {"model", &s->servo[k].table[DXL_MODEL]}, {"id", &s->servo[k].table[DXL_ID]},
-        {"upload_state", &s->r.upload.state}};
-    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
-        if (!strcmp(what, fields[i].name)) return fields[i].at;
-    return NULL;
-}
-
-static bool *flag(struct sim *s, const char *what, uint32_t k) {
-    const struct { const char *name; bool *at; } fields[] = {
-        {"mute", &s->servo[k].mute}, {"twin", &s->servo[k].twin}, {"overload", &s->servo[k].overload}, {"babble", &s->babble},
-        {"start", &s->r.start_pressed}, {"powered", &s->servo[k].powered}};
-    for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
-        if (!strcmp(what, fields[i].name)) return fields[i].at;
-    return NULL;
-}
-
-uint64_t sim_get(struct sim *s, const char *what, uint32_t k) {
-    if (!strcmp(what, "goal")) return get16(s->servo[k].table + DXL_GOAL);
-    if (!strcmp(what, "position")) return (uint64_t)(s->servo[k].milli / 1000);
-    if (!strcmp(what, "event_us")) return s->log[k].us;
-    if (!strcmp(what, "event_kind")) return s->log[k].kind;
-    if (!strcmp(what, "event_state")) return s->log[k].state;
-    if (!strcmp(what, "event_pose")) return s->log[k].pose;
-    if (!strcmp(what, "event_resends")) return s->log[k].resends;
-    if (!strcmp(what, "us")) return s->us;
-    if (number(s, what)) return *number(s, what);
-    if (byte_of(s, what, k)) return *byte_of(s, what, k);
-    return flag(s, what, k) ? *flag(s, what, k) : UINT64_MAX;
-}
-
-void sim_set(struct sim *s, const char *what, uint32_t k, uint32_t value) {
-    if (!strcmp(what, "position")) s->servo[k].milli = 1000 * (int64_t)value;
-    if (number(s, what)) *number(s, what) = value;
-    if (byte_of(s, what, k)) *byte_of(s, what, k) = (uint8_t)value;
-    if (flag(s, what, k)) *flag(s, what, k) = value != 0;
 }

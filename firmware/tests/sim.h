@@ -35,6 +35,7 @@ struct sim {
     uint32_t poses, goal_errors; /* Sync Writes in play; goals a servo took that were out of the table's bounds */
     uint32_t wrong_since, wrong_longest; /* ms for which some servo's goal was not the one meant */
     uint8_t state_seen;
+    void (*sent)(const struct sim *s); /* called at each transaction, where set */
 };
 
 struct sim *sim_new(void);

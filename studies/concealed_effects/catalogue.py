@@ -127,9 +127,11 @@ CATALOGUE: dict[str, Entry] = {
     "viscous_friction": Entry("coefficient", Range(0.05, 0.25), _joint),
     "stribeck_friction": Entry("torque", Range(0.08, 0.25), _knee_or_hip, _also(speed=(8, 40))),
     "load_friction": Entry("coefficient", Range(0.25, 0.8), _knee_or_hip),
+    "friction_asymmetry": Entry("ratio", Range(2.0, 5.0), _knee_or_hip),
     "supply_voltage": Entry("voltage", Range(0.65, 0.88), _whole),  # a share of the nominal supply
     "supply_sag": Entry("drop", Range(0.25, 0.9), _whole, logged=False),
     "torque_ceiling": Entry("torque", Range(0.12, 0.4), _knee_or_hip),
+    "torque_saturation": Entry("torque", Range(0.15, 0.8), _knee_or_hip),
     "thermal_fade": Entry("rate", Range(0.02, 0.1), _whole),
     "servo_gain": Entry("ratio", Range(0.35, 0.75), _joint),
     "dead_band": Entry("margin", Range(0.8, 3.0), _joint),

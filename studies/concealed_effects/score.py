@@ -33,14 +33,15 @@ CHANCE = frozenset({"dropped_command", "power_dips"})
 SIZE = {
     "backlash": "gap", "joint_compliance": "stiffness", "coulomb_friction": "torque", "viscous_friction": "coefficient",
     "stribeck_friction": "torque", "load_friction": "coefficient", "supply_voltage": "voltage", "supply_sag": "drop",
-    "torque_ceiling": "torque", "thermal_fade": "rate", "servo_gain": "ratio", "dead_band": "margin",
+    "torque_ceiling": "torque", "torque_saturation": "torque", "thermal_fade": "rate", "servo_gain": "ratio",
+    "dead_band": "margin", "friction_asymmetry": "ratio",
     "reflected_inertia": "inertia", "joint_stop": "upper", "zero_offset": "angle", "parallel_spring": "stiffness",
     "command_delay": "delay", "timing_drift": "per_pose", "clock_rate": "ratio", "dropped_command": "probability",
     "loose_mount": "play", "link_length": "change", "payload": "mass", "ground_friction": "friction",
     "foot_friction": "friction", "ground_tilt": "forward",
 }
 """The scalar parameter by which an effect's size is judged."""
-ZERO = {"clock_rate": 1.0}
+ZERO = {"clock_rate": 1.0, "friction_asymmetry": 1.0}
 """Value at which an effect vanishes, where errors relative to the value itself would say nothing."""
 PARENTS = {"tail": "body"} | {
     f"{leg}{part}": f"{leg}{above}" if above else "tail" if leg[0] == "B" else "body"

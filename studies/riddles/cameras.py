@@ -53,7 +53,7 @@ def film(rollout: Take, model: RobotModel, seconds: float, seed: int, yaw: float
     noise = np.random.default_rng(seed)
     _, bodies = observe(rollout, how, model, frames / RATE)
     seen = {asset: _noisy(body, noise) for asset, body in bodies.items()}
-    return Recording(rollout.name, "motive", "1.23", frames / RATE, frames, RATE, rigid_bodies=seen)
+    return Recording(rollout.name, "motive", "1.23", frames / RATE, frames, RATE, rigid_bodies=seen, sensing="mocap")
 
 
 def record(rollout: Take, model: RobotModel, seconds: float, predicted: Take, seed: int = 1, yaw: float = YAW) -> Recorded:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from studies.so101.programmes import Clock, Programme, clock, jaw_range
 from studies.so101.response import Response, response
-from studies.so101.rest import Current, Fastest, Standing, current, fastest, standing
+from studies.so101.rest import Current, Fastest, NamePosterior, current, fastest, standing
 from studies.so101.rows import Rows, rows_of
 from studies.so101.zero import Zero, zeros
 from workbench.recording.formats.sage import JOINTS
@@ -22,7 +22,7 @@ class Measured:
     jaw_range: float
     training: list[Rows]
     moving: dict[str, Response]
-    resting: dict[str, Standing | None]
+    resting: dict[str, NamePosterior | None]
     zeros: dict[str, Zero]
     currents: list[Current]
     speeds: list[Fastest]

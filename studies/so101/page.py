@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studies.so101.programmes import Clock, Programme
 from studies.so101.response import Response
-from studies.so101.rest import Current, Fastest, Standing
+from studies.so101.rest import Current, Fastest, NamePosterior
 from studies.so101.zero import Zero
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
@@ -43,7 +43,7 @@ def response_table(moving: Sequence[Response]) -> Table:
                  "and lag. The jaw's error in shares of its range, as if they were radians.")
 
 
-def rest_table(resting: Mapping[str, Standing | None], scale: float) -> Table:
+def rest_table(resting: Mapping[str, NamePosterior | None], scale: float) -> Table:
     """At rest."""
     rows = []
     for joint in JOINTS:

@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from studies.so101.response import Response
-from studies.so101.rest import Standing
+from studies.so101.rest import NamePosterior
 from studies.so101.zero import Zero
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
 
 
-def read_off(nominal: RobotModel, moving: Mapping[str, Response], resting: Mapping[str, Standing | None],
+def read_off(nominal: RobotModel, moving: Mapping[str, Response], resting: Mapping[str, NamePosterior | None],
              zeros: Mapping[str, Zero]) -> RobotModel:
     """The nominal model with servo_gain, coulomb_friction and viscous_friction at every joint."""
     law = ServoLaw.of([nominal.servo(j) for j in nominal.joints])

@@ -44,7 +44,7 @@ def holds(joint: str, rows: Sequence[Rows]) -> Holds:
 
 
 @dataclass(frozen=True)
-class Standing:
+class NamePosterior:
     """One joint at rest. up, down: mean error after the goal rose or fell [rad]; width: half their distance [rad]; load: mean
     size of gravity's torque [N m]; over so many holds."""
 
@@ -56,7 +56,7 @@ class Standing:
     count: int
 
 
-def standing(joint: str, rows: Sequence[Rows], seed: int = 0) -> Standing | None:
+def standing(joint: str, rows: Sequence[Rows], seed: int = 0) -> NamePosterior | None:
     """Errors at rest of one joint; None where it hardly ever stood."""
     h = holds(joint, rows)
     if min((h.approach > 0).sum(), (h.approach < 0).sum()) < LEAST_HOLDS:
@@ -70,7 +70,7 @@ def standing(joint: str, rows: Sequence[Rows], seed: int = 0) -> Standing | None
             drawn.append(_levels(h, picked))
     low, high = np.quantile(drawn, [0.05, 0.95], axis=0)
     up, down, width = (Value(*map(float, v)) for v in zip(_levels(h, np.arange(len(h.error))), low, high))
-    return Standing(joint, up, down, width, float(h.load.mean()), len(h.error))
+    return NamePosterior(joint, up, down, width, float(h.load.mean()), len(h.error))
 
 
 def _levels(h: Holds, use: NDArray[np.int_]) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from studies.xl330 import effects
 from studies.xl330.bam import Logs
-from studies.xl330.questions import Question
+from studies.xl330.questions import RolloutRequest
 from studies.xl330.selection import Model, mean_errors
 from workbench.robot import RobotModel
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
@@ -32,7 +32,7 @@ class Results:
     published: Mapping[str, Array]
     refitted: Mapping[str, Mapping[int, Array]]
     chains: Mapping[int, Sequence[Model]]
-    questions: Sequence[Question]
+    questions: Sequence[RolloutRequest]
     station: Mapping[str, Mapping[int, Mapping[str, float]]]
     supply: tuple[float, float, int]
 
@@ -155,7 +155,7 @@ def _reading(r: Results) -> str:
         "that slides there is wrong until the arm is let go.")
 
 
-def _chosen(r: Results, q: Question) -> list[int]:
+def _chosen(r: Results, q: RolloutRequest) -> list[int]:
     return [g for g in r.gains if q.taken in r.chains[g][-1].effects]
 
 

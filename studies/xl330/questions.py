@@ -18,7 +18,7 @@ RIVALS = {"load_friction": ("coulomb_friction", "stribeck_friction"), "supply_sa
 
 
 @dataclass(frozen=True)
-class Question:
+class RolloutRequest:
     """One change of a model and what it costs on the validated gain: mean absolute errors [rad] by gain, before and after."""
 
     taken: str
@@ -32,7 +32,7 @@ class Question:
         return "supported" if min(change) > 1.1 else "not wanted" if max(change) < 0.9 else "open"
 
 
-def ask(models: Mapping[int, Model], logs: Logs, m1: Mapping[str, float]) -> list[Question]:
+def ask(models: Mapping[int, Model], logs: Logs, m1: Mapping[str, float]) -> list[RolloutRequest]:
     """Refits each model, by the gain that it did not see, without each of its effects, and with its rivals in its place."""
     changes = [(taken, given) for taken in dict.fromkeys(e for m in models.values() for e in m.effects)
                for given in ("", *RIVALS.get(taken, ()))]
@@ -48,7 +48,9 @@ def ask(models: Mapping[int, Model], logs: Logs, m1: Mapping[str, float]) -> lis
         return float(mean_errors(m, logs, m1)[np.array(logs.gains) == gain].mean())
 
     before = {g: validated(m, g) for g, m in models.items()}
-    return [Question(taken, given, before, {g: validated(fits[taken, given, g], g) for g in models}) for taken, given in changes]
+    return [
+        RolloutRequest(taken, given, before, {g: validated(fits[taken, given, g], g) for g in models}) for taken, given in changes
+    ]
 
 
 def full_duty(logs: Sequence[Log]) -> tuple[float, float, int]:

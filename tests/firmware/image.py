@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.firmware.native import walk
+from workbench.device import decode_table
 from workbench.device.link import FrameReader, Message, message
 from workbench.device.virtual import AX12A, MILLISECOND, SECOND, Clock, RampBody, ServoBus, VirtualServo, bit_flips
 from workbench.device.virtual.cm530 import Board
@@ -67,8 +69,9 @@ class Robot:
                             bit_flips(from_servos, seed + 1) if from_servos else None)
         self.body = RampBody({i: 0.05 * ((i * 7 + seed) % 5 - 2) for i in IDS})
         self.servos = {i: VirtualServo(self.bus, AX12A, i, self.body, seed=seed) for i in IDS}
-        for servo in self.servos.values():
-            servo["cw_angle_limit"], servo["ccw_angle_limit"] = 150, 880
+        for bounds in decode_table(walk()).joints:
+            servo = self.servos[bounds.bus_id]
+            servo["cw_angle_limit"], servo["ccw_angle_limit"] = bounds.low, bounds.high
         self.board = Board(data or image(), self.clock, self.bus, seed)
         self.ear = Ear(self.board)
         self._reader = FrameReader()

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import subprocess
 import tempfile
 from functools import lru_cache
 from pathlib import Path
 
-from workbench.device.firmware_tables import BUS_IDS
 from workbench.device.link import FrameReader, Message, message
-from workbench.device.table_file import JointBounds, TableFile, encode_table
+from workbench.device.table_file import TableFile, bounds_of, encode_table
 from workbench.motion import load_motion
-from workbench.robot import data_file
+from workbench.robot import data_file, puppy_model
 
-FIRMWARE = Path(__file__).parents[2] / "firmware"
+FIRMWARE = Path(os.environ.get("WORKBENCH_FIRMWARE", Path(__file__).parents[2] / "firmware"))
 LINK_PC, LINK_ZIGBEE = 0, 1
 POWER_ON = 1
 NONE = 2**64 - 1
@@ -34,7 +34,7 @@ class CellRun(ctypes.Structure):
 
 def compile_core(source: Path = FIRMWARE, flags: tuple[str, ...] = ("-O2",)) -> Path:
     """A shared library of core and tests, made anew where a source has changed."""
-    sources = sorted([*source.glob("core/*.c"), *source.glob("tests/*.c")])
+    sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in ("sim", "cells", "access"))])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):
         digest.update(path.read_bytes())
@@ -61,10 +61,9 @@ def core() -> ctypes.CDLL:
 
 
 def walk(**options: object) -> bytes:
-    """The ROBOTIS walk as a binary table, goals kept between 150 and 880."""
+    """The ROBOTIS walk as `export` writes it."""
     table = load_motion(data_file("robotis_walk.csv")).as_table()
-    joints = tuple(JointBounds(BUS_IDS[j], low=150, high=880, fastest=500) for j in table.joints)
-    return encode_table(TableFile(table, joints, **options))  # type: ignore[arg-type]
+    return encode_table(TableFile(table, bounds_of(table, puppy_model()), **options))  # type: ignore[arg-type]
 
 
 class Sim:
@@ -114,7 +113,7 @@ class Sim:
         self.to_neutral()
         self.remote(1)
         self.remote(0)
-        self.run(2)
+        self.run(8)
         assert self.get("state") == 5
 
 

@@ -126,7 +126,7 @@ def test_remote_needs_two_words_and_one_returns_to_neutral() -> None:
     sim.run(20)
     assert sim.get("state") == 6
     sim.to_neutral()
-    sim.run(300)
+    sim.run(1500)
     assert all(abs(sim.get("position", j) - 512) <= 1 for j in range(15))
     sim.send(b"\xff\x55\x01\xfe\x00\xfe" * 3, LINK_ZIGBEE)  # a wrong complement
     sim.run(50)

@@ -15,8 +15,8 @@ from workbench.bench.figure import Figure
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes
 from workbench.experiment.next_experiment import with_next_experiment
-from workbench.identify.diagnosis import STEP, diagnose_session
-from workbench.identify.rollouts import REST
+from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.options import PROBLEM
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
 
@@ -82,17 +82,17 @@ def _one_rollout(mine: Session, duration: float) -> dict[str, float]:
     """Processor seconds of one rollout of the nominal robot in the search's step, of building and settling its station, and of
     one step, without joint friction too, which is a constraint of each joint in Drake's contact solver."""
     (take,), _ = read_takes(mine)
-    steps = round((duration + REST) / STEP)
+    steps = round((duration + PROBLEM.rest) / PROBLEM.time_step)
     servos = {j: replace(mine.model.servo(j), coulomb_friction=0.0) for j in mine.model.joints}
     spent = {}
     for name, model in (("as it is", mine.model), ("frictionless", replace(mine.model, servos=servos))):
         # a time to settle that no rollout had so far, so that the first of these builds its station and the others find it
-        config = SimulationConfig(settle=0.6 + STEP, base="fixed", contact_period=0, time_step=STEP)
-        job = Job(model, config, take.commands, duration, REST, start=take.start_state())
+        config = SimulationConfig(settle=0.6 + PROBLEM.time_step, base="fixed", contact_period=0, time_step=PROBLEM.time_step)
+        job = Job(model, config, take.commands, duration, PROBLEM.rest, start=take.start_state())
         first, *more = (_spent(job) for _ in range(1 + REPEATS))
         spent[name] = first, float(np.median(more))
     first, again = spent["as it is"]
-    return {"step_seconds": STEP, "steps": steps, "building_seconds": first - again, "seconds": again,
+    return {"step_seconds": PROBLEM.time_step, "steps": steps, "building_seconds": first - again, "seconds": again,
             "microseconds_per_step": again / steps * 1e6,
             "microseconds_per_step_without_joint_friction": spent["frictionless"][1] / steps * 1e6}
 

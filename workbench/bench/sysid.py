@@ -17,11 +17,11 @@ from workbench.bench.figure import Figure, in_turns, median_and_quartiles
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes, register_takes
-from workbench.identify.diagnosis import STEP
 from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, gather
 from workbench.identify.proposals import candidates
-from workbench.identify.rollouts import FINE, Jury
+from workbench.identify.rollouts import RolloutEvaluator
 from workbench.identify.selection.best_subsets import MOST_STEPS
 from workbench.simulation import SimulationConfig
 
@@ -35,7 +35,7 @@ MEANING = ("wall seconds of this library's fit of two frictions of one joint ove
 FRICTION = SERVO["coulomb_friction"], SERVO["viscous_friction"]
 """Nominal [N m, N m s/rad]."""
 TRUTH = FRICTION[0] + EXTRA[0], FRICTION[1] + EXTRA[1]
-CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=STEP)
+CONFIG = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
 """As `diagnose` fits."""
 
 
@@ -61,8 +61,8 @@ def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iteration
         model, told = arm(folder), goals(duration)
         truth = Identification(model, ODD, told.commands, TRUE_STEP).played(TRUTH, told.time)
         log = measured(told, truth, seed)
-        theirs = Identification(model, ODD, log.commands, STEP)
-        finer = Identification(model, ODD, log.commands, STEP * FINE)
+        theirs = Identification(model, ODD, log.commands, PROBLEM.time_step)
+        finer = Identification(model, ODD, log.commands, PROBLEM.time_step * PROBLEM.fine)
         mine = session(folder, log)
         began = time.perf_counter()
         evidence = _evidence(mine)
@@ -96,12 +96,12 @@ def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iteration
 
     spent = {n: float(np.median(c)) for n, c in cpu.items()}
     details = {
-        "log_seconds": duration, "turns": repeats, "n_jobs": 1, "step_seconds": STEP,
+        "log_seconds": duration, "turns": repeats, "n_jobs": 1, "step_seconds": PROBLEM.time_step,
         "truth": {"coulomb": TRUTH[0], "viscous": TRUTH[1]}, "nominal": {"coulomb": FRICTION[0], "viscous": FRICTION[1]},
         "residual_rms_deg_before": float(np.degrees(nominal_rms)),
         "ours": row(our) | clocks("ours", our.rollouts), "mujoco_sysid": row(their) | clocks("theirs", their.rollouts),
         "process_seconds_ratio": spent["ours"] / spent["theirs"], "our_preparation_wall_seconds": before,
-        f"at_{1e3 * STEP * FINE:g}_ms": {"ours": row(last) | {"wall_seconds_more": last_seconds},
+        f"at_{1e3 * PROBLEM.time_step * PROBLEM.fine:g}_ms": {"ours": row(last) | {"wall_seconds_more": last_seconds},
                                          "mujoco_sysid": row(fine) | {"wall_seconds": fine_seconds}},
         "differs": f"the log is MuJoCo's at {1e3 * TRUE_STEP:g} ms. Ours: a damped Gauss-Newton with long differences and "
                    "Broyden updates, few rollouts, each of a Drake station that is built anew; what its step is wrong by on the "
@@ -122,22 +122,22 @@ def _evidence(mine: Session) -> list[TakeEvidence]:
 
 def _fitted(mine: Session, evidence: list[TakeEvidence], iterations: int) -> Ours:
     """From nominal, all rollouts anew."""
-    jury = Jury(evidence, CONFIG, 1)
-    search = Search(jury, mine.model)
+    evaluator = RolloutEvaluator(evidence, CONFIG, 1)
+    search = Search(evaluator, mine.model)
     pool = {c.name: c for c in candidates(mine.model, evidence) if c.joint == ODD}
     start = search.evaluated([(pool[name], np.zeros(1)) for name in ("coulomb_friction", "viscous_friction")])
-    return _told(jury, search.refitted(start, search.fitted, iterations))
+    return _told(evaluator, search.refitted(start, search.fitted, iterations))
 
 
 def _refined(mine: Session, evidence: list[TakeEvidence], fit: Fit) -> Ours:
-    jury = Jury(evidence, CONFIG, 1)
-    return _told(jury, Search(jury, mine.model).refined(fit))
+    evaluator = RolloutEvaluator(evidence, CONFIG, 1)
+    return _told(evaluator, Search(evaluator, mine.model).refined(fit))
 
 
-def _told(jury: Jury, fit: Fit) -> Ours:
+def _told(evaluator: RolloutEvaluator, fit: Fit) -> Ours:
     (coulomb,), (viscous,) = (c.values(x) for c, x in fit.sizes())
-    left = np.sqrt(np.nanmean(np.square(fit.residuals[0] * jury.evidence[0].sigma)))
-    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), jury.rollouts)
+    left = np.sqrt(np.nanmean(np.square(fit.residuals[0] * evaluator.evidence[0].sigma)))
+    return Ours(fit, (FRICTION[0] + coulomb, FRICTION[1] + viscous), float(left), evaluator.rollouts)
 
 
 def _timed(run: Callable[[], Any]) -> tuple[Any, float]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import AbstractContextManager, closing
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from workbench.cli.options import load_model
@@ -23,6 +24,7 @@ def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None
                         help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {said})")
     parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S", help="of the servos' bus (default: 1000000)")
     parser.add_argument("--echo", action="store_true", help="the adapter is known to hear what it sends itself")
+    parser.add_argument("--bridge", action="store_true", help="the port is the PC link of a CM-530 with the workbench's program")
     parser.add_argument("--robot", metavar="FILE",
                         help=f"with --port {VIRTUAL}: the robot as it really is, a model.yaml with effects (default: the model)")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="the robot stands on its feet, or is held")
@@ -39,26 +41,36 @@ def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | 
     return VirtualRobot(real, base, args.rate)
 
 
-def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> AbstractContextManager[Bus]:
+@contextmanager
+def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> Iterator[Bus]:
     """The bus, whose port is closed at the end; BusError in one line where there is none."""
-    from workbench.device.bus import Bus, BusError, open_port, serial_ports
+    from workbench.device.bus import Bus, open_port
+    from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
+    from workbench.device.bus.ports import GONE
     from workbench.device.bus.survey import bus_ids, family_of
 
     profile = family_of(model)
     joints = {i: joint for joint, i in bus_ids(model).items()}
-    if virtual is not None:
-        return closing(Bus(virtual.port, profile, joints, strip_echo=args.echo))
-    name = args.port
-    if name is None:
-        ports = serial_ports(usb=True)
-        if len(ports) != 1:
-            raise BusError(f"{len(ports)} USB adapters with a serial port{': ' if ports else ''}{', '.join(ports)}; say which "
-                           f"with --port, of {', '.join(serial_ports()) or 'none'}")
-        name = ports[0]
-    port = open_port(name, args.rate)
+    port = virtual.port if virtual is not None else open_port(_port_name(args), RATE if args.bridge else args.rate)
     try:
-        return closing(Bus(port, profile, joints, strip_echo=args.echo))
-    except BaseException:
-        port.closePort()
-        raise
+        if args.bridge:
+            enter_bridge(port)
+        bus = Bus(port, profile, joints, strip_echo=args.echo)
+        yield bus
+        if args.bridge:
+            leave_bridge(port)
+    finally:
+        with suppress(*GONE):
+            port.closePort()
 
+
+def _port_name(args: argparse.Namespace) -> str:
+    from workbench.device.bus import BusError, serial_ports
+
+    if args.port is not None:
+        return str(args.port)
+    ports = serial_ports(usb=True)
+    if len(ports) != 1:
+        raise BusError(f"{len(ports)} USB adapters with a serial port{': ' if ports else ''}{', '.join(ports)}; say which "
+                       f"with --port, of {', '.join(serial_ports()) or 'none'}")
+    return ports[0]

@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 
+from workbench.cli.check import add_yes, check_files, check_session
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
+
+STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -23,6 +26,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of A and B; a session says it itself")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_yes(parser)
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     add_out(parser)
     parser.set_defaults(run=run)
 
@@ -37,17 +42,20 @@ def run(args: argparse.Namespace) -> int:
     from workbench.simulation import SimulationConfig
     from workbench.view.report.comparison import write_comparison
 
-    config = SimulationConfig(contact=args.contact)
-    with output_directory(args.out) as folder, Progress("compare") as progress:
+    config = SimulationConfig(contact=args.contact, engine="drake")
+    with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:
         if args.b is None:
             session = load_session(args.a)
             if args.model != PUPPY:
-                session = session.with_model(load_model(args.model))
+                session = session.with_model(load_model(args.model, args.packages))
+            check_session("compare", session, args.yes)
             model, title = session.model, f"Session {session.path}"
-            comparison = compare_session(session, config, progress=progress)
+            comparison = compare_session(session, config, progress=progress, n_jobs=args.jobs)
         else:
-            model, title = load_model(args.model), f"{args.a} and {args.b}"
-            comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base, progress=progress)
+            model, title = load_model(args.model, args.packages), f"{args.a} and {args.b}"
+            check_files("compare", (args.a, args.b), model, args.cycles, args.yes)
+            comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base, progress=progress,
+                                       n_jobs=args.jobs)
         written = write_comparison(comparison, model, folder, title, progress)
     print(comparison.table())
     for name, reason in comparison.left_out:

@@ -6,10 +6,15 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from workbench.cli.check import add_yes, check_session
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
     from workbench.identify.findings import Finding
+
+
+STAGES = ("reading", "simulating", "looking anew", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
+"""Of a search that goes back and forth, the last begun."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,6 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "the session's predictions and report.html. A run that was stopped goes on where it was.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
+    add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     parser.add_argument("--thorough", action="store_true",
@@ -42,7 +48,9 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
-    with output_directory(args.out) as folder, Progress("diagnose") as progress, rollout_memory(args.out, session) as memory:
+    check_session("diagnose", session, args.yes)
+    with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
+          rollout_memory(args.out, session) as memory):
         result = diagnose_session(session, progress, args.jobs, memory, args.thorough)
         diagnosis, motion = with_next_experiment(result, args.jobs, progress)
         paths = write_diagnosis(diagnosis, result.takes, folder, str(args.session), progress)

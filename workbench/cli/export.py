@@ -6,6 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from workbench.cli.check import add_yes, check_model, check_motion
 from workbench.cli.options import add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "export",
         help="turn a motion into the robot's firmware tables",
-        description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt and motion.h. The motion is "
+        description="Turns a motion table into the firmware's pos.txt, speed.txt, timeDiff.txt, motion.h and motion.table. "
+        "The motion is "
         "played on the simulated robot first; what breaks a servo's range, speed or torque, or was made by optimize and lacks "
         "its certificate, is refused unless --force.",
     )
@@ -26,6 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser)
     parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="played in simulation (default: 3)")
     parser.add_argument("--force", action="store_true", help="write the tables although a limit is broken, with a warning")
+    add_yes(parser)
     add_out(parser)
     parser.set_defaults(run=run)
 
@@ -39,14 +42,16 @@ def run(args: argparse.Namespace) -> int:
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
 
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    check_model("export", model)
+    check_motion("export", motion, args.cycles, args.yes)
     motion.as_table()  # refused before the simulation
-    uncertified = _uncertified(args.motion, motion, model)
+    uncertified = uncertified_by(args.motion, motion, model)
     if uncertified is not None and not args.force:
         raise uncertified
     base = "fixed" if model.kinematics.fixed_to_world else "free"
-    with output_directory(args.out) as folder, Progress("export") as progress:
+    with output_directory(args.out) as folder, Progress("export", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, args.cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)
@@ -58,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _uncertified(path: str, motion: Motion, model: RobotModel) -> InputError | None:
+def uncertified_by(path: str, motion: Motion, model: RobotModel) -> InputError | None:
     """What is wrong with the certificate of a motion that `optimize` made."""
     from workbench.gait.certificate import check_certificate, has_mark
     from workbench.robot import InputError

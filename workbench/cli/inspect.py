@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
+from workbench.cli.options import add_packages
+
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Registers the verb."""
@@ -17,6 +19,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "a session.yaml, model.yaml or servo.yaml, or a folder of firmware tables.",
     )
     parser.add_argument("file", metavar="FILE")
+    add_packages(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=run)
 
@@ -25,6 +28,6 @@ def run(args: argparse.Namespace) -> int:
     """Prints the inspection."""
     from workbench.view.report.inspection import inspect_file
 
-    inspection = inspect_file(args.file)
+    inspection = inspect_file(args.file, dict(args.packages))
     print(json.dumps(inspection.as_dict(), indent=2, allow_nan=False) if args.json else inspection.as_text())
     return 0

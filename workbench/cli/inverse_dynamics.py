@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from workbench.cli.check import add_yes, check_files, check_session
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 
@@ -23,6 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "the bundled puppy; with --take the session's own")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of a motion or recording (default: free)")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_yes(parser)
     add_out(parser, default="runs/inverse-dynamics")
     parser.set_defaults(run=run)
 
@@ -32,16 +34,23 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.forces import forces_of_file, forces_of_take
+    from workbench.compare.session import load_session
     from workbench.dynamics import save_inverse_dynamics
     from workbench.view.figures import save_figure
     from workbench.view.report.forces import force_figures, margin_table
 
-    with output_directory(args.out) as folder, Progress("inverse-dynamics") as progress:
+    if args.take:
+        check_session("inverse-dynamics", load_session(args.input), args.yes)
+    else:
+        check_files("inverse-dynamics", (args.input, *([args.motion] if args.motion else [])),
+                    load_model(args.model, args.packages), args.cycles, args.yes)
+    stages = ("simulating", "inverse dynamics", "writing")
+    with output_directory(args.out) as folder, Progress("inverse-dynamics", stages=stages) as progress:
         if args.take:
-            other = None if args.model == PUPPY else load_model(args.model)
+            other = None if args.model == PUPPY else load_model(args.model, args.packages)
             model, result = forces_of_take(args.input, args.take, progress, other)
         else:
-            model = load_model(args.model)
+            model = load_model(args.model, args.packages)
             result = forces_of_file(args.input, model, args.base, args.cycles, args.motion, progress)
         progress("writing")
         written = [save_inverse_dynamics(result, folder / "inverse_dynamics.csv")]

@@ -6,18 +6,21 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
 import workbench
+from workbench.cli.progress import forget_warnings, show_warnings
 
 VERBS = (
-    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "servos", "play",
-    "record", "bench",
+    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
+    "servos", "play", "record", "run", "bench",
 )
 
 
@@ -41,9 +44,15 @@ def make_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one verb; `argv` without the program's name. Returns the exit code."""
     args = make_parser().parse_args(argv)
+    logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
+    forget_warnings()
+    if argv is None and not sys.warnoptions:  # of the libraries, to those who develop with them
+        warnings.simplefilter("ignore")
+        os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
     try:
         code: int = args.run(args)
+        show_warnings()
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
@@ -52,6 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except MemoryError as e:
+        print(f"workbench {args.verb}: error: out of memory ({' '.join(str(e).split()) or 'no more is free'})", file=sys.stderr)
+        return 2
     except (OSError, ValueError) as e:
         problem = _readable(e)
         if problem is None:
@@ -60,6 +72,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     finally:
         signal.signal(signal.SIGTERM, previous)
+
+
+def _only_errors(record: logging.LogRecord) -> bool:
+    return record.levelno >= logging.ERROR
 
 
 def _readable(error: OSError | ValueError) -> str | None:

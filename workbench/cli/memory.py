@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import hashlib
 import os
@@ -11,7 +12,10 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
+from workbench.cli.output import runs
 from workbench.compare.session import Session
+from workbench.robot import InputError
+from workbench.robot.numerals import whole_of
 
 STAYS = 16
 """Letters of the digest in the folder's name."""
@@ -24,8 +28,21 @@ def rollout_memory(out: Path, session: Session) -> Iterator[Path]:
     beside = Path(os.path.abspath(out))
     kept = f".{beside.name}.resume-"
     folder = beside.parent / f"{kept}{_digest(session)}"
-    folder.mkdir(parents=True, exist_ok=True)
-    yield folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as e:
+        raise InputError(out, f"cannot be written ({e.strerror})") from None
+    for part in folder.glob("*.part.npy"):
+        process = whole_of(part.name.split(".")[-3])
+        if process is None or not runs(process):
+            part.unlink(missing_ok=True)
+    try:
+        yield folder
+    except OSError as e:
+        if not isinstance(e, InputError) and e.filename is None and e.errno in (None, errno.ENOSPC, errno.EDQUOT):
+            shutil.rmtree(folder, ignore_errors=True)  # it would keep the disk full
+            raise InputError(out, "the disk is full; what was worked out so far is cleared") from None
+        raise
     for done in beside.parent.glob(f"{glob.escape(kept)}*"):
         shutil.rmtree(done, ignore_errors=True)
 

@@ -7,6 +7,7 @@ import math
 import sys
 from typing import TYPE_CHECKING
 
+from workbench.cli.check import check_model
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
@@ -57,7 +58,8 @@ def run(args: argparse.Namespace) -> int:
     from workbench.robot.model_file import load_model_file
     from workbench.view.report.gait import write_gait_page
 
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
+    check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
     machine, ensemble, options = GaitMachine(model), load_ensemble(args.ensemble, posterior), options_of(args.effort, args.seed)
     request = _request(args, model)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,10 @@ if TYPE_CHECKING:
     from workbench.robot import RobotModel
 
 PUPPY = "package://puppy/puppy.sdf"
+MOST = 10_000
+"""Of cycles, processes and the like."""
+SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
+"""Of the simulation [s]: a walk of 10 s takes a million of the one, and feet sink in with the other."""
 
 
 def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy") -> None:
@@ -18,6 +23,13 @@ def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy
         "--model", metavar="FILE", default=PUPPY,
         help="robot: a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos and ground are taken "
         f"(default: {default})")
+    add_packages(parser)
+
+
+def add_packages(parser: argparse.ArgumentParser) -> None:
+    """--package: where package:// URIs of a model's meshes point."""
+    parser.add_argument("--package", metavar="NAME=DIR", dest="packages", type=_package, action="append", default=[],
+                        help="folder of a ROS package that the model's meshes name; may be given several times")
 
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
@@ -35,7 +47,7 @@ def _folder(text: str) -> Path:
     return Path(text)
 
 
-def load_model(name: str) -> RobotModel:
+def load_model(name: str, packages: Sequence[tuple[str, str]] = ()) -> RobotModel:
     """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
     from workbench.compare.session import load_session
     from workbench.effects.apply import resolved
@@ -55,20 +67,39 @@ def load_model(name: str) -> RobotModel:
         except InputError as e:
             raise InputError(name, f"effects: {e.problem}") from None
         return model
-    return RobotModel(name)
+    return RobotModel(name, packages=dict(packages))
 
 
 def positive(text: str) -> int:
     """A whole number of at least 1, for argparse."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected 1 or more, got {value}")
+    from workbench.robot.numerals import whole_of
+
+    value = whole_of(text)
+    if value is None or not 1 <= value <= MOST:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to {MOST}, got {text[:40]}")
     return value
 
 
 def seconds(text: str) -> float:
     """A positive finite number, for argparse."""
-    value = float(text)
-    if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text}")
+    from workbench.robot.numerals import number_of
+
+    value = number_of(text)
+    if value is None or not value > 0:
+        raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text[:40]}")
     return value
+
+
+def time_step(text: str) -> float:
+    """A step of the simulation [s], for argparse: with longer ones contact and servos mean nothing, shorter ones never end."""
+    value = seconds(text)
+    if not SHORTEST_STEP <= value <= LONGEST_STEP:
+        raise argparse.ArgumentTypeError(f"expected {SHORTEST_STEP:g} to {LONGEST_STEP:g} s, got {text[:40]}")
+    return value
+
+
+def _package(text: str) -> tuple[str, str]:
+    name, equals, folder = text.partition("=")
+    if not name or not equals or not Path(folder).is_dir():
+        raise argparse.ArgumentTypeError(f"expected NAME=DIR with a folder that is there, got {text[:80]}")
+    return name, str(Path(folder).resolve())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -10,14 +11,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from workbench.robot.errors import InputError
+from workbench.robot.numerals import whole_of
+
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+LEFT = ".workbench-"
+"""Folders that are being filled begin so; then the process that fills them."""
 
 
 @contextmanager
-def output_directory(out: Path) -> Iterator[Path]:
+def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
     """A folder to fill, on the same disk as `out`; when the block ends well its files appear in `out`, whole.
 
-    Whether `out` can be written is found out on entry, before the long work. If the block raises, nothing remains.
-    Files that already lie in `out` stay, except those of the same name. InputError where `out` cannot be written.
+    Whether `out` can be written, and `need` bytes are free there, is found out on entry, before the long work; what killed runs
+    left beside it is cleared. If the block raises, nothing remains. Files that already lie in `out` stay, except those of the
+    same name. InputError, with the user's own path, where `out` cannot be written or the disk is full.
     """
     out = Path(os.path.abspath(out))
     anchor = out
@@ -25,19 +34,48 @@ def output_directory(out: Path) -> Iterator[Path]:
         anchor = anchor.parent
     if not anchor.is_dir():
         raise InputError(out, f"expected a directory, but {anchor} is a file")
+    _clear(anchor)
     try:
-        partial = Path(tempfile.mkdtemp(prefix=".workbench-", dir=anchor))
+        partial = Path(tempfile.mkdtemp(prefix=f"{LEFT}{os.getpid()}-", dir=anchor))
+        free = shutil.disk_usage(anchor).free
     except OSError as e:
         raise InputError(out, f"cannot be written ({anchor}: {e.strerror})") from None
+    if free < need:
+        partial.rmdir()
+        raise InputError(out, f"cannot be written ({free / 1e6:.1f} MB are free on the disk; expected {need / 1e6:.0f} MB)")
     try:
         partial.chmod(0o777 & ~_umask())
         yield partial
-        try:
-            _publish(partial, out)
-        except OSError as e:
+        _publish(partial, out)
+    except InputError as e:
+        if e.source is None or not Path(e.source).is_relative_to(partial):
+            raise
+        raise InputError(out / Path(e.source).relative_to(partial), e.problem) from None
+    except OSError as e:
+        if e.errno in _FULL or (e.filename is not None and str(e.filename).startswith(str(partial))):
             raise InputError(out, f"cannot be written ({e.strerror})") from None
+        raise
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _clear(folder: Path) -> None:
+    """Removes what runs that were killed left unfinished in `folder`."""
+    for left in folder.glob(f"{LEFT}[0-9]*-*"):
+        process = whole_of(left.name.removeprefix(LEFT).partition("-")[0])
+        if process is not None and not runs(process):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def runs(process: int) -> bool:
+    """Whether a process of this number is there."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # another user's
+        return True
+    return True
 
 
 def _publish(partial: Path, out: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from workbench.cli.options import add_out, load_model
+from workbench.cli.check import add_yes, check_session
+from workbench.cli.options import add_out, add_packages, load_model, positive
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -19,6 +20,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     parser.add_argument("--model", metavar="M.yaml", help="fitted model (default: the session's own, with nothing added)")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
+    add_packages(parser)
+    add_yes(parser)
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     add_out(parser)
     parser.set_defaults(run=run)
 
@@ -32,9 +36,11 @@ def run(args: argparse.Namespace) -> int:
     from workbench.simulation import SimulationConfig
 
     session = load_session(args.session)
-    model = session.model if args.model is None else load_model(args.model)
-    with output_directory(args.out) as folder, Progress("predict") as progress:
-        predicted = predict_session(session, model, folder, progress, config=SimulationConfig(contact=args.contact))
+    model = session.model if args.model is None else load_model(args.model, args.packages)
+    check_session("predict", session, args.yes)
+    with output_directory(args.out) as folder, Progress("predict", stages=("finding", "simulating")) as progress:
+        config = SimulationConfig(contact=args.contact, engine="drake")
+        predicted = predict_session(session, model, folder, progress, config=config, n_jobs=args.jobs)
     for name, reason in predicted.left_out:
         print(f"workbench predict: warning: take '{name}' left out: {reason}", file=sys.stderr)
     print(f"wrote {args.out}: {', '.join(path.name for path in predicted.paths)}")

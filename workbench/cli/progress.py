@@ -5,22 +5,49 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections.abc import Iterable, Sequence
 from typing import TextIO
 
+_WAITING: list[str] = []
+"""Warnings that were not shown yet."""
 QUIET = 1.5
 """Runs shorter than this say nothing [s], so that their errors stand alone."""
+BEAT = 10.0
+"""Longest silence [s]."""
+
+
+def warn(verb: str, lines: Iterable[str]) -> None:
+    """Lines for stderr, shown once the run turns out to be long, or when it has ended well: where it is refused, the error stands
+    alone."""
+    _WAITING.extend(f"workbench {verb}: warning: {line}" for line in lines)
+
+
+def show_warnings(stream: TextIO | None = None) -> None:
+    """Shows what waits."""
+    for line in _WAITING:
+        print(line, file=stream or sys.stderr)
+    _WAITING.clear()
+
+
+def forget_warnings() -> None:
+    """Of a run that was refused, or has not begun."""
+    _WAITING.clear()
 
 
 class Progress:
     """Call it as `progress(what)` or `progress(what, done)` with done in 0..1, inside its `with` block.
 
     On a terminal one line that is rewritten at most ten times a second and cleared at the end; elsewhere a plain line for each
-    new `what`, and one every five seconds within it.
+    new `what`, one every five seconds within it, and one every `BEAT` seconds in which nothing is said. stages: what the run does
+    one after the other, by how each `what` begins, so that a line says which of how many it is; where `done` is told, it says how
+    long that stage has still to go.
     """
 
-    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None) -> None:
+    def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None, stages: Sequence[str] = ()) -> None:
         quiet = QUIET if quiet is None else quiet
         self._verb = verb
+        self._stages, self._stage, self._entered = tuple(stages), 0, time.monotonic()
+        self._ended = threading.Event()
         self._stream = sys.stderr if stream is None else stream
         self._tty = self._stream.isatty()
         self._started = time.monotonic()
@@ -38,6 +65,7 @@ class Progress:
 
     def __exit__(self, *_: object) -> None:
         self._timer.cancel()
+        self._ended.set()
         with self._lock:
             self._speaks = False
             if self._tty and self._shown:
@@ -46,7 +74,12 @@ class Progress:
 
     def __call__(self, what: str, done: float | None = None) -> None:
         with self._lock:
+            if what.partition(" ")[0] != self._now[0].partition(" ")[0]:
+                self._entered = time.monotonic()
             self._now = what, done
+            for k, begins in enumerate(self._stages):
+                if what.startswith(begins):
+                    self._stage = max(self._stage, k + 1)
             if self._speaks:
                 self._show()
 
@@ -54,8 +87,17 @@ class Progress:
         """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
         with self._lock:
             self._speaks = True
+            show_warnings(self._stream)
             if self._now[0]:
                 self._show()
+        threading.Thread(target=self._beats, daemon=True).start()
+
+    def _beats(self) -> None:
+        """Says from time to time what the run is still at."""
+        while not self._ended.wait(BEAT):
+            with self._lock:
+                if self._speaks and self._now[0] and time.monotonic() - self._last >= BEAT:
+                    self._show()
 
     def _show(self) -> None:
         what, done = self._now
@@ -64,6 +106,10 @@ class Progress:
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"
-        line = f"workbench {self._verb}: {what}{share} ({now - self._started:.0f} s)"
+        stage = f"{self._stage} of {len(self._stages)}, " if self._stage else ""
+        spent = now - self._entered
+        told = done is not None and 0.05 < done < 1 and spent > 5
+        left = f", about {spent * (1 / done - 1):.0f} s left of this" if done is not None and told else ""
+        line = f"workbench {self._verb}: {stage}{what}{share} ({now - self._started:.0f} s{left})"
         self._stream.write(f"\r\x1b[2K{line[:110]}" if self._tty else f"{line}\n")
         self._stream.flush()

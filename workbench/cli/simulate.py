@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from workbench.cli.options import add_model, add_out, load_model, positive, seconds
+from workbench.cli.check import add_yes, check_model, check_motion
+from workbench.cli.options import add_model, add_out, load_model, positive, time_step
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -22,7 +23,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
                         help="full servo law; its fast approximation; joints that follow the motion exactly")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often the motion is played (default: 1)")
-    parser.add_argument("--time-step", type=seconds, default=1e-3, metavar="S", help="of the simulation (default: 0.001)")
+    parser.add_argument("--time-step", type=time_step, default=1e-3, metavar="S", help="of the simulation (default: 0.001)")
+    add_yes(parser)
     add_out(parser, default="runs/simulate")
     parser.set_defaults(run=run)
 
@@ -39,11 +41,13 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.figures.rollout import rollout_figures
     from workbench.view.scene.replay import write_replay
 
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
     model.check_base(floating=args.base == "free")
     motion = load_motion(args.motion, model)
+    check_model("simulate", model)
+    check_motion("simulate", motion, args.cycles, args.yes)
     config = SimulationConfig(time_step=args.time_step, base=args.base, drive=args.drive, contact=args.contact)
-    with output_directory(args.out) as folder, Progress("simulate") as progress:
+    with output_directory(args.out) as folder, Progress("simulate", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
         progress("writing")
         title = f"{motion.name}, {args.contact} contact, {args.drive} drive"

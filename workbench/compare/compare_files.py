@@ -32,7 +32,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     numerical floor and the contact spread are known, else not. InputError names the file that does not fit.
     """
     began = time.monotonic()
-    config = config or SimulationConfig()
+    config = config or SimulationConfig(engine="drake")
     model.check_base(floating=base == "free")
     kinds = file_kind(a), file_kind(b)
     if kinds[1] == "recording" and kinds[0] != "recording":
@@ -68,7 +68,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
 
 def _by_first_motion(read: ReadTake) -> RegisteredTake:
     """A recording of which nothing is known but itself: its start is where its first joint leaves rest."""
-    if read.recording.kind != "motive" or read.commands is not None:
+    if read.recording.sensing == "encoders" or read.commands is not None:
         return register_take(read, None, None)
     start = float(read.recording.time[0])
     for _ in range(2):  # the zero is taken before the start, and the start found from zeroed angles

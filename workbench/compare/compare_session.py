@@ -52,7 +52,7 @@ def compare_session(session: Session, config: SimulationConfig | None = None, *,
     contact models run over `n_jobs` processes. progress: called with (what, share done or None).
     """
     began = time.monotonic()
-    config = config or SimulationConfig()
+    config = config or SimulationConfig(engine="drake")
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
     rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)

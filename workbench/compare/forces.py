@@ -56,7 +56,7 @@ def _of_recording(session: Session, spec: TakeSpec, progress: Progress) -> Inver
     about the vertical, and changes no torque."""
     (read,), _ = read_takes(replace(session, takes=(spec,)))
     run = Run(spec.name, read.model, read.commands, read.duration, spec.base)
-    (rollouts,) = roll_out([run], SimulationConfig(), progress=progress, n_jobs=1, floors=False)
+    (rollouts,) = roll_out([run], SimulationConfig(engine="drake"), progress=progress, n_jobs=1, floors=False)
     (take,), _ = register_takes(session, [read], {spec.name: rollouts.nominal}, progress)
     progress("inverse dynamics", None)
     m = take.measurement

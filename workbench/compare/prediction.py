@@ -49,7 +49,7 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
     units, its assets, axes, pivots and clock. A prediction of `commands` becomes a joint log with their times, from the state
     in their first row. InputError where a file does not fit, there is nothing to predict, or no yaw can be found.
     """
-    config = config or SimulationConfig(contact_period=0)  # nobody asks for contact forces
+    config = config or SimulationConfig(contact_period=0, engine="drake")  # nobody asks for contact forces
     if not session.predict:
         raise InputError(session.path, "predict: expected at least one entry")
     models = {"": model} if nominal is None else {"": model, ".nominal": nominal}
@@ -76,7 +76,7 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
 def read_start(path: Path) -> Recording:
     """The first frames of a captured take."""
     start = read_recording(path)
-    if start.kind != "motive" or not start.rigid_bodies:
+    if start.sensing != "mocap" or not start.rigid_bodies:
         raise InputError(path, "expected the start of a Motive take with rigid bodies")
     return start
 

@@ -13,6 +13,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.formats.read import recording_of_take
 from workbench.robot import InputError, RobotModel
 from workbench.robot.robot_section import read_model
+from workbench.robot.servo_registers import ServoRegisters, load_registers
 from workbench.robot.yaml_file import Fields, read_yaml
 
 Base = Literal["free", "fixed"]
@@ -58,12 +59,14 @@ class PredictSpec:
 
 @dataclass(frozen=True)
 class Session:
-    """One robot, one day of recordings. model: the nominal robot. All files named exist; all names fit the model."""
+    """One robot, one day of recordings. model: the nominal robot. registers: what its servos' registers say, where they were
+    read. All files named exist; all names fit the model."""
 
     path: Path
     model: RobotModel
     takes: tuple[TakeSpec, ...] = ()
     predict: tuple[PredictSpec, ...] = ()
+    registers: ServoRegisters | None = None
 
     def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
         """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
@@ -93,6 +96,7 @@ def load_session(path: str | Path) -> Session:
     model = read_model(top)
     takes = tuple(_take(f, model) for f in top.sequence("takes"))
     predict = tuple(_predict(f, model) for f in top.sequence("predict"))
+    registers = top.file("registers")
     top.done()
     for key, entries in (("takes", takes), ("predict", predict)):
         names = [e.name for e in entries]
@@ -101,7 +105,7 @@ def load_session(path: str | Path) -> Session:
                 raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
     if not takes and not predict:
         raise top.error("takes", "expected at least one take")
-    return Session(path, model, takes, predict)
+    return Session(path, model, takes, predict, None if registers is None else load_registers(registers, model))
 
 
 def _take(f: Fields, model: RobotModel) -> TakeSpec:

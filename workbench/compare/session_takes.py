@@ -43,7 +43,7 @@ class ReadTake:
     @property
     def duration(self) -> float:
         """Time from the first command to the recording's end, if it began with the recording [s]."""
-        logged = self.recording.kind != "motive"
+        logged = self.recording.sensing == "encoders"
         begin = first_command(self.recording, self.spec.starts_at) if logged else self.spec.starts_at or 0.0
         return float(self.recording.time[-1] - begin)
 
@@ -51,7 +51,7 @@ class ReadTake:
         """What the joints did at the first command, where a rollout cannot begin at rest in neutral: of a log of a held robot, as
         its servos told it. None for captured takes, for a robot on the ground, and for a log that begins at rest in neutral to
         within its resolution."""
-        if self.recording.kind == "motive" or self.spec.base != "fixed":
+        if self.recording.sensing == "mocap" or self.spec.base != "fixed":
             return None
         state = state_at(self.recording, self.model.joints, first_command(self.recording, self.spec.starts_at))
         return None if state is None else Start(*state, logged=True)

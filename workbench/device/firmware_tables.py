@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.device.limits import Violation, refuse_broken_limits
+from workbench.device.table_file import JointBounds, TableFile, bounds_of, encode_table
 from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, InputError, RobotModel
@@ -20,7 +21,7 @@ from workbench.robot.numerals import whole_of
 
 Counts = NDArray[np.int64]
 
-GOALS, SPEEDS, DWELLS, HEADER = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h"
+GOALS, SPEEDS, DWELLS, HEADER, BINARY = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h", "motion.table"
 ORDER = "# joints:"
 _MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the table
 
@@ -43,11 +44,15 @@ def export(
     """
     table = motion.as_table()
     violations = refuse_broken_limits(table, model, force, simulated, "not exported")
-    return Export(tuple(write_tables(table, out_dir, model.bus_ids or BUS_IDS)), tuple(violations))
+    ids = model.bus_ids or BUS_IDS
+    return Export(tuple(write_tables(table, out_dir, ids, lambda: bounds_of(table, model))), tuple(violations))
 
 
-def write_tables(table: PoseTable, folder: str | Path, bus_ids: Mapping[str, int] = BUS_IDS) -> list[Path]:
-    """Writes pos.txt, speed.txt, timeDiff.txt and motion.h, all or none.
+def write_tables(
+    table: PoseTable, folder: str | Path, bus_ids: Mapping[str, int] = BUS_IDS,
+    bounds: Callable[[], tuple[JointBounds, ...]] | None = None,
+) -> list[Path]:
+    """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where the joints' bounds are known, motion.table; all or none.
 
     The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
     line that says the order of joints, the same in all files. InputError for a joint without a bus ID.
@@ -63,11 +68,13 @@ def write_tables(table: PoseTable, folder: str | Path, bus_ids: Mapping[str, int
     def text(rows: Counts) -> str:
         return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
 
+    binary = {BINARY: encode_table(TableFile(table, bounds()))} if bounds else {}
     return write_together(folder, {
         GOALS: text(table.goals),
         SPEEDS: text(table.speeds),
         DWELLS: text(table.dwells_ms[:, None]),
         HEADER: _c_header(table, bus_ids),
+        **binary,
     })
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 from workbench.motion import PoseTable
 from workbench.motion.table import CENTRE, LARGEST
 from workbench.robot import BUS_IDS, COUNT, SPEED_UNIT, InputError, RobotModel
+from workbench.robot.ranges import joint_ranges
 
 MAGIC = b"WBTB"
 VERSION = 1
@@ -56,11 +58,12 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
 
     numbers: model number of each joint's servo (default: the AX-12A's).
     """
-    ids = model.bus_ids or BUS_IDS
+    ids, ranges = model.bus_ids or BUS_IDS, joint_ranges(model)
     bounds = []
     for i, joint in enumerate(table.joints):
-        frame, servo = model.kinematics.frames[joint], model.servo(joint)
-        low, high = (min(max(round(CENTRE + limit / COUNT), 0), LARGEST) for limit in (frame.lower, frame.upper))
+        servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)
+        low, high = (min(max(round(CENTRE + limit / COUNT), 0), LARGEST) if math.isfinite(limit) else edge
+                     for limit, edge in zip(limits, (0, LARGEST)))
         no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
         bounds.append(JointBounds(
             ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),

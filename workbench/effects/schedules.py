@@ -37,7 +37,11 @@ def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands
     column = np.arange(len(commands.joints))
     waiting = row < 0  # still in neutral
     held = np.maximum(row, 0)
-    return Commands(times, commands.joints, np.where(waiting, 0.0, commands.goals[held, column]),
-                    np.where(waiting, 0.0, commands.speeds[held, column]),
-                    np.where(waiting, True, commands.enabled[held, column]), commands.end + late,
-                    commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)])
+    goals, speeds, enabled = (np.where(waiting, neutral, rows[held, column]) for rows, neutral in (
+        (commands.goals, 0.0), (commands.speeds, 0.0), (commands.enabled, True)))
+    poses = commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)]
+    told = np.isin(times, commands.times)  # else instants would double with each joint that is late by a delay of its own
+    for values in (goals, speeds, enabled):
+        told[1:] |= (values[1:] != values[:-1]).any(axis=1)
+    told[0] |= not waiting[0].all()
+    return Commands(times[told], commands.joints, goals[told], speeds[told], enabled[told], commands.end + late, poses[told])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
 from workbench.robot import InputError, JointFrame, Kinematics
+from workbench.robot.model_source import named
 
 Array = NDArray[np.float64]
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
@@ -36,12 +37,12 @@ class SdfRobot:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self.source = path, named(path)
         ElementTree.register_namespace("drake", "http://drake.mit.edu")
         self._tree = ElementTree.parse(path)
         model = self._tree.getroot().find("model")
         if model is None:
-            raise InputError(path, "no <model>: effects that change the robot's build need an SDF file")
+            raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
         self._model = model
         self.stages: dict[str, tuple[str, ...]] = {}
         self.moved = self.ends = False
@@ -68,7 +69,7 @@ class SdfRobot:
         frame = Kinematics.from_text(self.text(), self.path).frames[joint]
         across = np.asarray(axis) / np.linalg.norm(axis) if np.any(axis) else np.zeros(3)
         if not np.linalg.norm(np.cross(across, frame.axis_B)) > 0.02:
-            raise InputError(self.path, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
+            raise InputError(self.source, f"loose mount of '{joint}': axis: expected a direction other than the servo's own axis")
         xyz = Element("xyz", {"expressed_in": self._carried_by(joint)})
         xyz.text = written(across)
         if play > 0:
@@ -82,7 +83,7 @@ class SdfRobot:
         limit = SubElement(axis, "limit") if limit is None else limit
         lower, upper = max(lower, float(limit.findtext("lower", "-inf"))), min(upper, float(limit.findtext("upper", "inf")))
         if not lower < upper:
-            raise InputError(self.path, f"stop of '{joint}': expected lower below upper, and both within the joint's own range")
+            raise InputError(self.source, f"stop of '{joint}': expected lower below upper, and both within the joint's own range")
         set_child(limit, "lower", lower)
         set_child(limit, "upper", upper)
         self.ends = True
@@ -118,7 +119,7 @@ class SdfRobot:
         way = self.way(k, link)
         length = float(np.linalg.norm(way))
         if length < 1e-6 or length + change <= 0:
-            raise InputError(self.path, f"length of '{link}': {length:g} m from joint to joint cannot change by {change:g} m")
+            raise InputError(self.source, f"length of '{link}': {length:g} m from joint to joint cannot change by {change:g} m")
         following, foot = self._ends(k, link)
         shift = way / length * change
         for shape in foot:
@@ -132,12 +133,12 @@ class SdfRobot:
         k: of this robot."""
         joint = k.parent_joint[link]
         if joint is None:
-            raise InputError(self.path, f"length of '{link}': the root link has no joint; expected a link that hangs on one")
+            raise InputError(self.source, f"length of '{link}': the root link has no joint; expected a link that hangs on one")
         carrier = k.frames[joint]
         following, foot = self._ends(k, link)
         ends = [f.X_PF_p for f in following] or [numbers(s.find("pose"), 6)[:3] for s in foot if s.tag == "collision"]
         if not ends:
-            raise InputError(self.path, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
+            raise InputError(self.source, f"length of '{link}': it ends in neither a joint nor a shape that touches the ground")
         return np.asarray(np.mean(ends, axis=0) - carrier.p_BM, dtype=float)
 
     def _ends(self, k: Kinematics, link: str) -> tuple[list[JointFrame], list[Element]]:
@@ -204,7 +205,7 @@ class SdfRobot:
         for element in self._model.findall(tag):
             if element.get("name") == name:
                 return element
-        raise InputError(self.path, f"expected a <{tag}> '{name}' in the model itself, not in a nested one")
+        raise InputError(self.source, f"expected a <{tag}> '{name}' in the model itself, not in a nested one")
 
     def _joint(self, name: str) -> Element:
         return self._named("joint", name)
@@ -220,7 +221,7 @@ class SdfRobot:
     def inertial(self, link: str) -> Element:
         inertial = self._link(link).find("inertial")
         if inertial is None:
-            raise InputError(self.path, f"link '{link}' has no <inertial>, to which mass could be added")
+            raise InputError(self.source, f"link '{link}' has no <inertial>, to which mass could be added")
         return inertial
 
 

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, long_runs
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, reshown, seen, shown
 from workbench.experiment.rivals import Pair
-from workbench.experiment.runs import TIME_STEP, Progress, Runs, spans
+from workbench.experiment.runs import Progress, Runs, spans
 from workbench.experiment.segment import Segment
 from workbench.experiment.stance import BodyMoves
 from workbench.identify.findings import NextExperiment
@@ -34,14 +35,6 @@ __all__ = ["Experiment", "ObservationModel", "Separation", "design_experiment"]
 
 Array = NDArray[np.float64]
 Base = Literal["free", "fixed"]
-LONGEST = 12.0
-"""Of the motion [s]."""
-SEPARATED = 5.0
-"""Log-likelihood ratio from which on names count as separated: odds of 150 to 1."""
-WORTH = 0.2
-"""How much another piece has to bring, in the logarithm of the log-likelihood ratio, summed over pairs."""
-KEPT = 4
-"""Pieces, of those tried, on which sensitivities are found."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,7 @@ class Separation:
 
     @property
     def separated(self) -> bool:
-        return self.log_likelihood_ratio >= SEPARATED
+        return self.log_likelihood_ratio >= EXPERIMENT.separated
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,20 +152,20 @@ class _Bench:
         focus = _focus(pair, self.nominal)
         pieces = JointMoves(self.nominal, self.reach, focus).segments()
         lasting = any(not e.where for e in pair.effects)
-        return pieces + (long_runs(self.nominal, self.reach, focus, LONGEST) if lasting else [])
+        return pieces + (long_runs(self.nominal, self.reach, focus, EXPERIMENT.longest) if lasting else [])
 
     def _tried(self, pair: Pair, library: Sequence[Segment], what: str) -> dict[str, Shown]:
         """What pieces show of a pair, by name: both on all of them, their neighbours on those where they differ most."""
         takes = self.runs.played(pair.models, [[s] for s in library], what)
         rough = {s.name: (s, of, shown(pair, of, self.sight)) for s, of in zip(library, takes) if self.runs.sound(of)}
-        best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:KEPT]
+        best = sorted(rough.values(), key=lambda r: -r[2].closest("a", moving=False).cost)[:EXPERIMENT.kept]
         if not best:
             return {}
         kept = [[s] for s, *_ in best]
         beside = self.runs.played(pair.neighbours, kept, what) if pair.neighbours else [[] for _ in kept]
         finer: list[Take | None] = [None for _ in kept]
         if self.base == "free":  # a robot on its feet multiplies small errors; a held one hardly does
-            finer = [fine for fine, in self.runs.played(pair.models[:1], kept, what, TIME_STEP / 2)]
+            finer = [fine for fine, in self.runs.played(pair.models[:1], kept, what, EXPERIMENT.time_step / 2)]
         return {s.name: shown(pair, [*of, *more], self.sight, fine)
                 for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}
 
@@ -205,7 +198,7 @@ def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]])
 
     def fits(names: Sequence[str]) -> bool:
         alone = any(pieces[name].long for name in names)
-        return sum(pieces[name].duration for name in names) <= LONGEST and not (alone and len(names) > 1)
+        return sum(pieces[name].duration for name in names) <= EXPERIMENT.longest and not (alone and len(names) > 1)
 
     useful = [name for name in pieces if any(name in of for of in tried)]
     chosen: list[str] = []
@@ -213,7 +206,7 @@ def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]])
     while True:
         options = [[*chosen, name] for name in useful if name not in chosen and fits([*chosen, name])]
         values = [value(o) for o in options]
-        if not values or max(values) <= had + WORTH:
+        if not values or max(values) <= had + EXPERIMENT.worth:
             return chosen
         had = max(values)
         chosen = options[values.index(had)]

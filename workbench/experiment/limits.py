@@ -10,22 +10,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.motion import Motion
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]
-WIDEST = math.radians(110)
-"""No joint is sent farther from neutral."""
-MARGIN = math.radians(5)
-"""Kept to a joint's ends, as links overshoot."""
-SPEED_SHARE = 0.9
-"""Of the speed that a servo reaches unloaded against its own friction."""
-CLEAR = 0.02
-"""Distance that links keep from each other [m], where they have it in neutral; else NEARER times what they have there."""
-NEARER = 0.6
-POINTS = 4
-"""On each bone of a link, from its joint to the next ones."""
 
 
 class Reach:
@@ -43,8 +33,10 @@ class Reach:
     def range(self, joint: str) -> tuple[float, float]:
         """Of goals [rad]; neutral is always inside."""
         frame = self.model.kinematics.frames[joint]
-        lower, upper = (b if math.isfinite(b) else math.copysign(WIDEST, b) for b in (frame.lower, frame.upper))
-        return min(max(lower + MARGIN, -WIDEST), 0.0), max(min(upper - MARGIN, WIDEST), 0.0)
+        lower, upper = (b if math.isfinite(b) else math.copysign(EXPERIMENT.widest, b) for b in (frame.lower, frame.upper))
+        return min(max(lower + EXPERIMENT.margin, -EXPERIMENT.widest), 0.0), max(
+            min(upper - EXPERIMENT.margin, EXPERIMENT.widest), 0.0
+        )
 
     def allows(self, segment: Segment) -> bool:
         """Whether registers, ranges and speeds hold what is asked: goals and speeds 0 to 1023, dwells of 1 ms or more."""
@@ -88,7 +80,7 @@ class Reach:
         ends: dict[str, list[Array]] = {link: [] for link in k.links}
         for f in k.frames.values():
             ends[f.parent].append(f.X_PF_p)
-        share = np.linspace(0, 1, POINTS)[:, None]
+        share = np.linspace(0, 1, EXPERIMENT.points)[:, None]
         return {link: np.vstack([share * e for e in (to or [2 * k.centers[link]])]) for link, to in ends.items()}
 
     @cached_property
@@ -102,7 +94,7 @@ class Reach:
             for b in links[i + 1:]:
                 have = float(_distance(at[a], at[b])[0])
                 if have > 1e-3:  # else one carries the other
-                    out[a, b] = min(CLEAR, NEARER * have)
+                    out[a, b] = min(EXPERIMENT.clear, EXPERIMENT.nearer * have)
         return out
 
 
@@ -116,4 +108,4 @@ def _reached(model: RobotModel, joint: str) -> float:
     surplus = max(servo.torque_at_full_duty - servo.coulomb_friction, 0.0)
     no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
     register = 1020 * 114 / 1023 * 2 * math.pi / 60
-    return SPEED_SHARE * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, register)
+    return EXPERIMENT.speed_share * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, register)

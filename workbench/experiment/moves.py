@@ -11,16 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.experiment.limits import Reach
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import GRAVITY, RobotModel
 
 Array = NDArray[np.float64]
-SLOW, QUICK = math.radians(50), math.radians(150)
-"""Speeds of sweeps, and of ways from one posture to another [rad/s]."""
-SETTLED = 0.3
-"""Rest at a segment's end, after which the next one finds the robot as if it had stood in neutral [s]."""
-GRID = (-60.0, -30.0, 0.0, 30.0, 60.0)
-"""Angles [deg] from which postures are put together."""
 
 
 @dataclass
@@ -49,9 +44,9 @@ class Path:
         """Stays."""
         return self.to({}, least=seconds)
 
-    def home(self, speed: float = QUICK) -> Path:
+    def home(self, speed: float = EXPERIMENT.quick) -> Path:
         """Back to neutral, and at rest."""
-        return self.to(dict.fromkeys(self.joints, 0.0), speed).hold(SETTLED)
+        return self.to(dict.fromkeys(self.joints, 0.0), speed).hold(EXPERIMENT.rest_at_end)
 
     def segment(self, name: str, base: str = "fixed", long: bool = False) -> Segment:
         return Segment(name, base, np.array(self.times), np.vstack(self.poses), long)
@@ -70,7 +65,7 @@ class JointMoves:
         return [s for s in map(self.reach.cleared, named) if s is not None]
 
     def _all(self) -> Iterator[Segment]:
-        yield self._sweep(30, 1.4 * SLOW)
+        yield self._sweep(30, 1.4 * EXPERIMENT.slow)
         yield self._steps("neutral", {}, (40, 0, -40, 0, 18, -18, 8, 0))
         yield self._tremble()
         for n, (name, posture) in enumerate(self._postures().items()):
@@ -99,7 +94,7 @@ class JointMoves:
     def _steps(self, name: str, posture: Mapping[str, float], sizes: Sequence[float]) -> Segment:
         path = self._path()
         if posture:
-            path.to(posture, QUICK).hold(0.2)
+            path.to(posture, EXPERIMENT.quick).hold(0.2)
         for size in sizes:
             path.to(self._offset(size, posture)).hold(0.2)
         return path.home().segment(f"quick steps, {name}")
@@ -113,20 +108,20 @@ class JointMoves:
 
     def _approach(self, name: str, posture: Mapping[str, float]) -> Segment:
         """The same angle reached from both sides, by long and by short ways."""
-        path = self._path().to(posture, QUICK).hold(0.25)
+        path = self._path().to(posture, EXPERIMENT.quick).hold(0.25)
         for size in (15, 0, -15, 0, 5, 0, -5, 0):
-            path.to(self._offset(size, posture), SLOW).hold(0.15)
+            path.to(self._offset(size, posture), EXPERIMENT.slow).hold(0.15)
         return path.home().segment(f"both ways, {name}")
 
     def _stairs(self, name: str, posture: Mapping[str, float]) -> Segment:
-        path = self._path().to(posture, QUICK).hold(0.2)
+        path = self._path().to(posture, EXPERIMENT.quick).hold(0.2)
         for size in (1.5, 3, 4.5, 6, 4.5, 3, 1.5, 0, -1.5, -3, -1.5, 0):
             path.to(self._offset(size, posture)).hold(0.12)
         return path.home().segment(f"stairs, {name}")
 
     def _shaken(self, name: str, posture: Mapping[str, float]) -> Segment:
         """The joint holds while its neighbours jerk."""
-        path = self._path().to(posture, QUICK).hold(0.2)
+        path = self._path().to(posture, EXPERIMENT.quick).hold(0.2)
         for share in (1, -1, 1, -1, 0.4, -0.4, 0.4, 0):
             shaken = {j: self.reach.within(j, posture.get(j, 0.0) + share * math.radians(18)) for j in self.others[:1]}
             path.to(shaken).hold(0.15)
@@ -140,8 +135,8 @@ class JointMoves:
         best = max(np.unique(q[:, column]), key=lambda a: np.ptp(torque[q[:, column] == a]))
         here = np.flatnonzero(q[:, column] == best)
         up, down = (self._pose(q[here[k]]) for k in (np.argmax(torque[here]), np.argmin(torque[here])))
-        path = self._path().to(up, QUICK).hold(0.2)
-        for pose, speed in ((down, SLOW), (up, QUICK), (down, QUICK)):
+        path = self._path().to(up, EXPERIMENT.quick).hold(0.2)
+        for pose, speed in ((down, EXPERIMENT.slow), (up, EXPERIMENT.quick), (down, EXPERIMENT.quick)):
             path.to(pose, speed).hold(0.2)
         return path.home().segment("load turned round")
 
@@ -156,7 +151,7 @@ class JointMoves:
         """Postures (M, n) [rad] of the joint and its neighbours, clear of each other, and gravity's torque on the joint (M,)."""
         (joint,) = self.focus
         moved = (joint, *self.others)
-        ranges = [sorted({self.reach.within(j, math.radians(a), room=math.radians(15)) for a in GRID}) for j in moved]
+        ranges = [sorted({self.reach.within(j, math.radians(a), room=math.radians(15)) for a in EXPERIMENT.grid}) for j in moved]
         rows = np.array(list(itertools.product(*ranges)))
         q = np.zeros((len(rows), len(self.model.joints)))
         q[:, [self.model.joints.index(j) for j in moved]] = rows
@@ -185,7 +180,7 @@ def long_runs(model: RobotModel, reach: Reach, focus: Sequence[str], seconds: fl
             path.to({j: reach.within(j, angle) for j in focus}, least=0.08)
         for size in (20, -20):
             path.to({j: reach.within(j, math.radians(size)) for j in focus}, least=0.9)
-    uneven = path.home(SLOW).segment("uneven dwells", long=True)
+    uneven = path.home(EXPERIMENT.slow).segment("uneven dwells", long=True)
     return [s for s in map(reach.cleared, (work, uneven)) if s is not None]
 
 

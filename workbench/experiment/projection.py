@@ -10,23 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, GAIN_SPAN, body_channels
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.rivals import Pair, Rival
-from workbench.identify.problem import LEAST_BODY_SIGMA
+from workbench.identify.options import PROBLEM
 from workbench.identify.ties import ObservationModel
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-ROUNDS = 2
-"""How often rivals are fitted to each other."""
-SETTLED = 0.99
-"""Of chi squared: a round that leaves more of it has settled."""
-TOGETHER = 0.05
-"""Frames within so many seconds err alike and count as one [s]."""
-ZERO = np.deg2rad(0.3)
-"""How far dry friction lets a joint stand from where it is thought to stand when angles are zeroed [rad]."""
-START = 0.01
-"""How far the first command's time may be off where cameras see the robot [s]."""
 Imitator = Literal["a", "b"]
 
 
@@ -95,7 +86,7 @@ def seen(take: Take, sight: ObservationModel) -> Array:
     take = take.zeroed_at_rest() if sight.captured else take.as_logged()
     q = take.q[:, [take.column(j) for j in sight.sigma]] / np.array(list(sight.sigma.values()))
     if take.base == "free" and sight.captured:
-        q = np.hstack([q, body_channels(take) / LEAST_BODY_SIGMA])
+        q = np.hstack([q, body_channels(take) / PROBLEM.least_body_sigma])
     return np.asarray(np.nan_to_num(q[~take.resting]))
 
 
@@ -118,10 +109,10 @@ def left_open(y: Array, sight: ObservationModel) -> list[Array]:
     first command came, and where each joint stood when its angle was called zero."""
     if not sight.captured:
         return []
-    out = [np.gradient(y, axis=0) * sight.rate * START]
+    out = [np.gradient(y, axis=0) * sight.rate * EXPERIMENT.start]
     for i, sigma in enumerate(sight.sigma.values()):
         column = np.zeros(y.shape)
-        column[:, i] = ZERO / sigma
+        column[:, i] = EXPERIMENT.zero / sigma
         out.append(column)
     return out
 
@@ -133,7 +124,7 @@ def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
 
 def _counts(sight: ObservationModel, count: int) -> Array:
     """Of each channel (c,): the root of one over the number of frames that err alike; the body's are gains over a span."""
-    counts = np.full(count, 1 / np.sqrt(max(1.0, TOGETHER * sight.rate)))
+    counts = np.full(count, 1 / np.sqrt(max(1.0, EXPERIMENT.together * sight.rate)))
     counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, GAIN_SPAN * sight.rate))
     return counts
 
@@ -152,7 +143,7 @@ def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[Robo
     rivals: dict[Imitator, Rival] = {"a": pair.a, "b": pair.b}
     best = {i: (known, known.closest(i, moving=False)) for i in rivals}
     settled = {i for i, r in rivals.items() if not len(r.steps())}
-    for _ in range(ROUNDS):
+    for _ in range(EXPERIMENT.rounds):
         trials = [(i, at.x + share * (here.closest(i, at.x).x - at.x))
                   for i, (here, at) in best.items() if i not in settled for share in (1.0, 0.4)]
         if not trials:
@@ -163,7 +154,7 @@ def fitted_to_each_other(pair: Pair, known: Shown, play: Callable[[Sequence[Robo
             ends.setdefault(i, []).append((now, now.closest(i, x, moving=False)))
         for i, options in ends.items():
             nearest = min(options, key=lambda o: o[1].cost)
-            if nearest[1].cost > SETTLED * best[i][1].cost:
+            if nearest[1].cost > EXPERIMENT.settled * best[i][1].cost:
                 settled.add(i)
             if nearest[1].cost < best[i][1].cost:
                 best[i] = nearest

@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.registry import effect_named
+from workbench.experiment.options import EXPERIMENT
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
-FREEDOM = 0.5
-"""How far a parameter may still go, as a share of what there is of it: a standard deviation. The session fitted it."""
-STEP = 0.2
-"""Of that, for sensitivities."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +25,7 @@ class Rival:
     @property
     def freedom(self) -> Array:
         """How far each number of its own effects may still go (p,), in the contract's units."""
-        return np.array([FREEDOM * n.felt for n in self._numbers()])
+        return np.array([EXPERIMENT.freedom * n.felt for n in self._numbers()])
 
     def moved(self, x: Array) -> Rival:
         """With its numbers moved by x (p,), in units of `freedom`, as far as is possible."""
@@ -45,7 +42,12 @@ class Rival:
 
     def steps(self) -> Array:
         """A step of each number for sensitivities (p,), in units of `freedom`, away from the nearer bound."""
-        return np.array([STEP if n.value + STEP * f <= n.high else -STEP for n, f in zip(self._numbers(), self.freedom)])
+        return np.array(
+            [
+                EXPERIMENT.step if n.value + EXPERIMENT.step * f <= n.high else -EXPERIMENT.step
+                for n, f in zip(self._numbers(), self.freedom)
+            ]
+        )
 
     def neighbours(self) -> list[Rival]:
         """With each number moved by its step, one at a time."""

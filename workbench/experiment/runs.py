@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.experiment.limits import Reach
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.projection import ObservationModel
 from workbench.experiment.segment import Segment, joined
 from workbench.motion import Motion
@@ -20,13 +21,6 @@ from workbench.simulation.batch import Job, simulate_batch
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float | None], None]
-TIME_STEP = 2e-3
-REST, AFTER = 0.1, 0.02
-"""Seconds before the first command and after the last frame."""
-UPRIGHT = 0.94
-"""Cosine of the tilt beyond which a robot counts as falling."""
-NEAR = 0.5
-"""Of the distance that commands keep between links, what moving links have to keep."""
 
 
 class Runs:
@@ -34,7 +28,7 @@ class Runs:
 
     def __init__(self, reach: Reach, base: str, sight: ObservationModel, n_jobs: int, progress: Progress) -> None:
         self.reach, self.base, self.sight, self.n_jobs, self.progress = reach, base, sight, n_jobs, progress
-        self.config = SimulationConfig(time_step=TIME_STEP, base=base, settle=0.6, contact_period=0)
+        self.config = SimulationConfig(time_step=EXPERIMENT.time_step, base=base, settle=0.6, contact_period=0)
 
     def motion(self, segments: Sequence[Segment]) -> Motion:
         """Segments as one motion."""
@@ -42,7 +36,7 @@ class Runs:
         return Motion(whole.name, whole.times, self.reach.model.joints, whole.angles, "next experiment")
 
     def played(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
-               time_step: float = TIME_STEP) -> list[list[Take]]:
+               time_step: float = EXPERIMENT.time_step) -> list[list[Take]]:
         """For each motion, given as its segments, the takes of all models. A model's jobs follow each other, so that its station
         is kept. Frames are at the same times within a segment whether it stands alone or among others."""
         config = replace(self.config, time_step=time_step, log_period=self.config.logged_every)
@@ -50,27 +44,36 @@ class Runs:
         for model in models:
             for segments in motions:
                 times = self._frames(segments)
-                jobs.append(Job(model, config, self.motion(segments).commands(), float(times[-1]) + AFTER, REST, times=times))
+                jobs.append(
+                    Job(
+                        model,
+                        config,
+                        self.motion(segments).commands(),
+                        float(times[-1]) + EXPERIMENT.after,
+                        EXPERIMENT.rest,
+                        times=times,
+                    )
+                )
         takes = simulate_batch(jobs, self.n_jobs, (lambda n, of: self.progress(what, n / of)) if what else None)
         return [takes[i::len(motions)] for i in range(len(motions))]
 
     def _frames(self, segments: Sequence[Segment]) -> Array:
         starts = np.cumsum([0.0, *(s.duration for s in segments)])
         frames = [start + np.arange(0, s.duration, 1 / self.sight.rate) for start, s in zip(starts, segments)]
-        return np.concatenate([[-REST, -REST / 2, -1e-3], *frames])
+        return np.concatenate([[-EXPERIMENT.rest, -EXPERIMENT.rest / 2, -1e-3], *frames])
 
     def sound(self, takes: Sequence[Take]) -> bool:
         """Whether the robot stayed on its feet and its links apart, in all of them."""
         return all(map(self._sound, takes))
 
     def _sound(self, take: Take) -> bool:
-        if not np.isfinite(take.q).all() or not self.reach.clear(take.q[::6], share=NEAR).all():
+        if not np.isfinite(take.q).all() or not self.reach.clear(take.q[::6], share=EXPERIMENT.near).all():
             return False
         if take.base != "free":
             return True
         assert take.quat_WB is not None
         up = Rotation.from_quat(take.quat_WB, scalar_first=True).as_matrix()[:, 2, 2]
-        return bool(up.min() > UPRIGHT)
+        return bool(up.min() > EXPERIMENT.upright)
 
 
 def spans(segments: Sequence[Segment], rate: float) -> Mapping[str, slice]:

@@ -13,15 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import Path
+from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import RobotModel, foot_points, legs
 
 Array = NDArray[np.float64]
 Body = tuple[float, float, float, float, float, float]
 """Displacement of the base: forward, left, up as shares of the legs' length; roll, pitch, yaw [deg]."""
-CALM, BRISK = math.radians(90), math.radians(200)
-MISSED = 0.05
-"""Share of the legs' length by which a foot may miss its place."""
 
 
 class BodyMoves:
@@ -37,17 +35,17 @@ class BodyMoves:
         return [s for s in map(self.reach.cleared, self._all()) if s is not None]
 
     def _all(self) -> Iterator[Segment]:
-        low = -0.15
+        low, calm, brisk = -0.15, EXPERIMENT.calm, EXPERIMENT.brisk
         down: Body = (0, 0, low, 0, 0, 0)
         moves: dict[str, tuple[float, Sequence[Body]]] = {
-            "down and up, calm": (CALM, [down, (0, 0, low / 2, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), down]),
-            "down and up, brisk": (BRISK, [down, (0, 0, low / 3, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), (0, 0, low / 3, 0, 0, 0)]),
-            "forward and back": (CALM, [down, (0.14, 0, low, 0, 0, 0), (-0.14, 0, low, 0, 0, 0), (0.07, 0, low, 0, 0, 0)]),
-            "to both sides": (CALM, [down, (0, 0.12, low, 0, 0, 0), (0, -0.12, low, 0, 0, 0), (0, 0.06, low, 0, 0, 0)]),
-            "jerks": (BRISK, [down, (0.1, 0, low, 0, 0, 0), (-0.1, 0, low, 0, 0, 0), (0, 0.09, low, 0, 0, 0),
+            "down and up, calm": (calm, [down, (0, 0, low / 2, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), down]),
+            "down and up, brisk": (brisk, [down, (0, 0, low / 3, 0, 0, 0), (0, 0, 1.4 * low, 0, 0, 0), (0, 0, low / 3, 0, 0, 0)]),
+            "forward and back": (calm, [down, (0.14, 0, low, 0, 0, 0), (-0.14, 0, low, 0, 0, 0), (0.07, 0, low, 0, 0, 0)]),
+            "to both sides": (calm, [down, (0, 0.12, low, 0, 0, 0), (0, -0.12, low, 0, 0, 0), (0, 0.06, low, 0, 0, 0)]),
+            "jerks": (brisk, [down, (0.1, 0, low, 0, 0, 0), (-0.1, 0, low, 0, 0, 0), (0, 0.09, low, 0, 0, 0),
                               (0, -0.09, low, 0, 0, 0), down]),
-            "turned about": (CALM, [down, (0, 0, low, 0, 0, 14), (0, 0, low, 0, 0, -14), down]),
-            "tipped": (CALM, [down, (0, 0, low, 0, 10, 0), (0, 0, low, 0, -10, 0), (0, 0, low, 8, 0, 0), (0, 0, low, -8, 0, 0)]),
+            "turned about": (calm, [down, (0, 0, low, 0, 0, 14), (0, 0, low, 0, 0, -14), down]),
+            "tipped": (calm, [down, (0, 0, low, 0, 10, 0), (0, 0, low, 0, -10, 0), (0, 0, low, 8, 0, 0), (0, 0, low, -8, 0, 0)]),
         }
         for name, (speed, bodies) in moves.items():
             path = Path(self.model.joints, self.reach.speeds)
@@ -57,16 +55,16 @@ class BodyMoves:
             for pose in poses:
                 assert pose is not None
                 path.to(pose, speed, least=0.12).hold(0.2)
-            yield path.home(CALM).segment(name, "free")
+            yield path.home(calm).segment(name, "free")
         k = self.model.kinematics
         carrying = {j for foot in self._legs for j in k.chain(self.model.foot_links[foot])}
         counterweights = [j for j in self.model.joints if j not in carrying]
         deep = self._pose(down)
         if counterweights and deep is not None:
-            path = Path(self.model.joints, self.reach.speeds).to(deep, CALM).hold(0.2)
+            path = Path(self.model.joints, self.reach.speeds).to(deep, calm).hold(0.2)
             for share in (1, -1, 0.5):
-                path.to({j: self.reach.within(j, share * math.radians(40)) for j in counterweights}, BRISK).hold(0.25)
-            yield path.home(CALM).segment("counterweights", "free")
+                path.to({j: self.reach.within(j, share * math.radians(40)) for j in counterweights}, brisk).hold(0.25)
+            yield path.home(calm).segment("counterweights", "free")
 
     @cached_property
     def _legs(self) -> Mapping[str, tuple[str, ...]]:
@@ -90,7 +88,7 @@ class BodyMoves:
                 first[-2:] = bend * np.array([0.4, 0.8 * self._opposed(foot, joints)])
                 tries.append(least_squares(partial(self._missed, foot, joints, goal),
                                            np.clip(first, ends[:, 0] + 1e-3, ends[:, 1] - 1e-3), bounds=(ends[:, 0], ends[:, 1])))
-            good = [t.x for t in tries if np.linalg.norm(t.fun) < MISSED * length]
+            good = [t.x for t in tries if np.linalg.norm(t.fun) < EXPERIMENT.missed * length]
             if not good:
                 return None
             out |= dict(zip(joints, map(float, min(good, key=partial(self._knee, foot)))))

@@ -8,28 +8,24 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.channels import ACROSS, BODY, joint_of
+from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
-from workbench.identify.fitting.covariance import WIDER, Z90
 from workbench.identify.fitting.fits import Fit
-from workbench.identify.ledger import GAP_RATIO, in_file_units
+from workbench.identify.ledger import in_file_units
+from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
-from workbench.identify.selection.model_comparison import Rival, Standing
-from workbench.identify.selection.record import Round
+from workbench.identify.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
+from workbench.identify.selection.model_comparison import NamePosterior, Rival
+from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.screening import CandidateFit
 from workbench.identify.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
-LEAST_RELATIVE = 0.005
-"""Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
-WORTH_AN_EXPERIMENT = 0.05
-"""Probability from which on the likeliest rival of a finding is worth an experiment."""
-SAME_ELSEWHERE = 0.1
-"""Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
 
 
 class ReadOff(Protocol):
@@ -52,7 +48,7 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplaine
     return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
 
 
-def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standing, before: Residuals, after: Residuals
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePosterior, before: Residuals, after: Residuals
             ) -> Finding:
     """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
     the nominal and the fitted model."""
@@ -62,35 +58,41 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: Standi
     alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
-    numbers = estimates(c, x, WIDER**2 * fit.covariance[own, own])
+    numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
     return Finding(
         effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
         alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
         validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
 
 
-def _elsewhere(c: Candidate, standing: Standing) -> list[Rival]:
+def _elsewhere(c: Candidate, standing: NamePosterior) -> list[Rival]:
     """The same effect where the data cannot tell it from this place."""
-    return [r for r in standing.rivals if r.candidate.name == c.name and r.probability >= SAME_ELSEWHERE * standing.probability]
+    return [
+        r
+        for r in standing.rivals
+        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * standing.probability
+    ]
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
-    half = Z90 * np.sqrt(np.diag(covariance))
+    half = CONCLUSIONS.z90 * np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
     values = np.array(c.values(x))
     unknown = np.ones(len(values), dtype=bool)
     if isinstance(c, PointMass):  # where it is says a moment over a mass: both err, together
         slopes, known = value_slopes(c, x), np.isfinite(half)
-        spread = Z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
+        spread = CONCLUSIONS.z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
         ends = np.array([values - spread, values + spread])
         unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     else:
         unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
-    least = Z90 * np.maximum(LEAST_RELATIVE * np.abs(values - neutral), [p.resolution for p in c.parameters])
+    least = CONCLUSIONS.z90 * np.maximum(
+        CONCLUSIONS.least_relative * np.abs(values - neutral), [p.resolution for p in c.parameters]
+    )
     low, high = np.minimum(low, values - least), np.maximum(high, values + least)
     low[unknown], high[unknown] = -np.inf, np.inf
     out: dict[str, Estimate] = {}
@@ -112,34 +114,40 @@ def change(evidence: Sequence[TakeEvidence], where: tuple[str, ...], before: Res
     return Change(joint_error(evidence, joints, before, use), joint_error(evidence, joints, after, use), "deg")
 
 
-def rejected(evidence: Sequence[TakeEvidence], fit: Fit, rounds: Sequence[Round], standings: Sequence[Standing], before: Residuals
-             ) -> tuple[Rejected, ...]:
+def rejected(
+    evidence: Sequence[TakeEvidence],
+    fit: Fit,
+    rounds: Sequence[SelectionStep],
+    posteriors: Sequence[NamePosterior],
+    before: Residuals,
+) -> tuple[Rejected, ...]:
     """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
     unseen = any(e.uses["validate"].any() for e in evidence)
-    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, standings) for r in _elsewhere(c, s)}
+    kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
-    for c, standing in zip(fit.effects, standings):
+    for c, standing in zip(fit.effects, posteriors):
         for rival in standing.rivals:
             if rival.candidate.key not in kept and rival.fit is not None:
-                more = f"{rival.behind:.0f} more" if rival.behind >= 0 else f"only {-rival.behind:.0f} less"
-                reason = f"in place of {c} it leaves {more} of chi squared on stretches that no fit saw"
                 left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
-                out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where, reason, left)
+                out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where,
+                                                    WorseInPlace(c.name, c.where, rival.behind), left)
     for r in rounds:
         for t in r.trials:
             key = t.candidate.key
             if key in kept or key in out:
                 continue
-            best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
-            if t.foretold:
-                reason = "its signature is not that of what is missing"
-            elif best is None:
-                reason = "what it takes away is no more than chance, or too little of what is missing there"
-            else:
-                reason = f"{best.candidate} takes {best.gain['choose']:.0f} off chi squared on the choosing stretches, this " \
-                         f"{t.gain['choose']:.0f}"
-            out[key] = Rejected(t.candidate.name, t.candidate.where, reason)
+            out[key] = Rejected(t.candidate.name, t.candidate.where, _why_not(r, t))
     return tuple(out.values())
+
+
+def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
+    """Of an effect that was tried in a round and not taken."""
+    best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
+    if t.screened_out:
+        return ScreenedOut()
+    if best is None:
+        return TooLittle()
+    return Outdone(best.candidate.name, best.candidate.where, best.gain["choose"], t.gain["choose"])
 
 
 def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
@@ -153,36 +161,36 @@ def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: 
         for c, r in ratios(e, residuals[i], "validate").items():
             column = e.channels.index(c)
             wider = float(np.hypot(1.0, floors[i][column])) if i in floors else 1.0
-            if not r > GAP_RATIO * wider:
+            if not r > PROBLEM.gap_ratio * wider:
                 continue
             sigma, unit = in_file_units(float(e.sigma[column]), c)
             out.append(Unexplained(() if c in BODY else (joint_of(c),), r * sigma, wider * sigma, unit,
-                                   f"{e.name}: {_depends(e, residuals[i][:, column], c)}"))
+                                   _dependence(e, residuals[i][:, column], c)))
     return tuple(out)
 
 
-def _depends(e: TakeEvidence, residual: Array, channel: str) -> str:
-    """What a residual goes with: its joint's angle, speed, acceleration (load), direction, or time."""
-    what = f"{channel}, " if channel in BODY else f"across its axis ({channel}), " if ACROSS in channel else ""
-    signals = {"time": e.take.recorded.time}
+def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
+    """What a residual goes with most: its joint's angle, speed, direction, or time."""
+    signals: dict[Signal, Array] = {"time": e.take.recorded.time}
     if channel not in BODY:
         q = e.take.recorded.q[:, e.take.recorded.column(joint_of(channel))]
         v = np.gradient(q, e.take.recorded.time)
         signals |= {"angle": q, "size of the angle": np.abs(q), "speed": v, "direction of motion": np.sign(v) * (np.abs(v) > 0.2)}
-    found = {}
+    found: dict[Signal, float] = {}
     for name, s in signals.items():
         good = np.isfinite(residual) & np.isfinite(s)
         if good.sum() > 20 and np.std(s[good]) > 0 and np.std(residual[good]) > 0:
             found[name] = abs(float(np.corrcoef(residual[good], s[good])[0, 1]))
-    best = max(found, key=lambda k: found[k]) if found else ""
-    told = best and found[best] > 0.3
-    return what + (f"goes with {best} (correlation {found[best]:.2f})" if told else "goes with nothing tried")
+    best = max(found, key=lambda k: found[k], default=None)
+    if best is None or not found[best] > CONCLUSIONS.correlated:
+        return Dependence(e.name, channel)
+    return Dependence(e.name, channel, best, found[best])
 
 
-def ties(nominal: RobotModel, fit: Fit, standings: Sequence[Standing]) -> tuple[Tie, ...]:
+def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
     """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
-    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in standings
-                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > WORTH_AN_EXPERIMENT)
+    return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
+                 if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
@@ -196,7 +204,7 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
         slopes[row:row + len(c.neutral), s] = value_slopes(c, fit.x[s])
     known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
-    inner = WIDER**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
+    inner = CONCLUSIONS.wider**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
     covariance = slopes @ inner @ slopes.T
     lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     covariance[lost] = covariance[:, lost] = np.inf

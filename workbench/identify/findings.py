@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
+from workbench.identify.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.files import write_together
 from workbench.robot.model_file import model_text
@@ -20,8 +21,6 @@ LIKELY = 0.5
 """Probability from which on a name counts as an explanation."""
 TIED = 0.5
 """An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
-SUREST = 0.98
-"""What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
 FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 
@@ -156,11 +155,11 @@ class Rejected:
 
     effect: str
     where: tuple[str, ...]
-    reason: str
+    reason: Reason
     validation: Change | None = None
 
     def to_json(self) -> dict[str, Any]:
-        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason}
+        out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.said()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
 
@@ -196,11 +195,11 @@ class Unexplained:
     error: float
     floor: float
     unit: str
-    description: str
+    description: Description
 
     def to_json(self) -> dict[str, Any]:
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
-                "description": self.description}
+                "description": self.description.said()}
 
 
 @dataclass(frozen=True)

@@ -11,23 +11,20 @@ from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
 from workbench.effects.base import Layer
 from workbench.identify.findings import GapEntry
-from workbench.identify.problem import SMOOTHED, TakeEvidence, ratios, smoothed
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence, ratios, smoothed
 
 Array = NDArray[np.float64]
-GAP_RATIO, GAP_SMOOTH = 1.3, 2.0
-"""RMS over sigma, of a channel and of its running means, from which on it has a gap. Quiet practice recordings stay below 1.15
-and 1.8."""
-FOLLOWS = 0.5
-"""On the ground, a joint that errs less than this share of the worst one, and not at all where the base was held, errs because
-the worst one does."""
 
 
 def channel_gaps(e: TakeEvidence, residual: Array) -> dict[str, float]:
     """Channels of a take that are beyond noise, with their RMS over sigma (or what their running means amount to)."""
     raw, smooth = ratios(e, residual), ratios(e, residual, smooth=True)
     # the body's frames overlap as it is
-    size = {c: raw[c] if c in BODY else max(raw[c], smooth[c] * GAP_RATIO / GAP_SMOOTH) for c in e.channels}
-    return {c: s for c, s in size.items() if s > GAP_RATIO}
+    size = {
+        c: raw[c] if c in BODY else max(raw[c], smooth[c] * PROBLEM.gap_ratio / PROBLEM.gap_ratio_smoothed) for c in e.channels
+    }
+    return {c: s for c, s in size.items() if s > PROBLEM.gap_ratio}
 
 
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:
@@ -48,7 +45,7 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
         for c, size in ill[i].items():
             if c in BODY and worst > size:
                 continue
-            if c not in BODY and held and i not in held and joint_of(c) not in ill_when_held and size < FOLLOWS * worst:
+            if c not in BODY and held and i not in held and joint_of(c) not in ill_when_held and size < PROBLEM.follows * worst:
                 continue
             column = e.channels.index(c)
             floor, unit = in_file_units(float(e.sigma[column]), c)
@@ -96,7 +93,7 @@ def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
     """Stretches [s] of the recording's clock in which the residual's running mean is beyond three sigma; the five longest, in
     order."""
     t = e.take.recorded.time
-    n = round(SMOOTHED / e.frame_time)
+    n = round(PROBLEM.smoothing / e.frame_time)
     mean = smoothed(residual[:, None], n)[:, 0]
     power = np.convolve(np.nan_to_num(np.square(mean)), np.ones(3 * n) / (3 * n), mode="same")
     inside = np.concatenate([[False], power > 9.0, [False]])

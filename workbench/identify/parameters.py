@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
+from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 """What an effect is, and where."""
-LEAST_SIZE, OF_VECTOR = 0.3, 0.5
-"""What a move for a slope is at least a share of: of the typical size, and of its length for one of a vector's numbers."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +90,9 @@ class Candidate:
     def magnitudes(self, x: Array) -> Array:
         """What each size is moved for a slope in shares of: a small number of a long vector, as how high a load sits, by as much
         as the others, else what it does drowns in what contact makes of small moves."""
-        out = np.maximum(np.abs(x), LEAST_SIZE)
+        out = np.maximum(np.abs(x), FIT.least_move)
         vector = self.of_vector
-        out[vector] = np.maximum(out[vector], OF_VECTOR * np.linalg.norm(x[vector]))
+        out[vector] = np.maximum(out[vector], FIT.vector_move * np.linalg.norm(x[vector]))
         return np.asarray(out)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:

@@ -9,16 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, both_ways
 from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
-LEAST_MASS, MOST_MOMENT = 0.05, 100.0
-"""Of a point mass, in typical masses and moments: what positions are divided by at least, and how far moments go."""
-AWAY = 2.5
-"""Typical distances at which a point mass is probed, along each axis."""
-DISTANCE, DOUBLINGS = 0.08, (-3.0, 2.6)
-"""From its axis [m], at which a mass that swings about it is looked for at first, and how many doublings off it may be."""
 
 
 def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:
@@ -40,15 +35,15 @@ class PointMass(Candidate):
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
         x = np.asarray(x, dtype=float)
-        return super().values([x[0], *(x[1:] / max(x[0], LEAST_MASS))])
+        return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = super().bounds()
-        low[1:], high[1:] = -MOST_MOMENT, MOST_MOMENT
+        low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
 
     def probes(self) -> list[Array]:
-        return [np.array([1.0, *(AWAY * np.eye(4)[k, 1:])]) for k in range(4)]
+        return [np.array([1.0, *(FIT.away * np.eye(4)[k, 1:])]) for k in range(4)]
 
     def around(self) -> list[Array]:
         middle, *probes = self.probes()
@@ -84,7 +79,7 @@ class SwungMass(PointMass):
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
         x = np.asarray(x, dtype=float)
-        away = DISTANCE * 2.0 ** float(np.clip(x[0], *DOUBLINGS))
+        away = FIT.swung_distance * 2.0 ** float(np.clip(x[0], *FIT.swung_doublings))
         unit = self.typical[0] * (self.typical[1] - self.neutral[1])  # of moments [kg m]
         moment = unit * (x[1:] @ self._across)
         size = float(np.linalg.norm(moment))
@@ -93,10 +88,12 @@ class SwungMass(PointMass):
         return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
 
     def bounds(self) -> tuple[Array, Array]:
-        return np.array([DOUBLINGS[0], -MOST_MOMENT, -MOST_MOMENT]), np.array([DOUBLINGS[1], MOST_MOMENT, MOST_MOMENT])
+        return np.array([FIT.swung_doublings[0], -FIT.most_moment, -FIT.most_moment]), np.array(
+            [FIT.swung_doublings[1], FIT.most_moment, FIT.most_moment]
+        )
 
     def probes(self) -> list[Array]:
-        return [AWAY * np.eye(3)[k] for k in (1, 2)]
+        return [FIT.away * np.eye(3)[k] for k in (1, 2)]
 
     def around(self) -> list[Array]:
         return both_ways(np.zeros(3), self.probes())

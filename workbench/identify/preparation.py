@@ -10,7 +10,8 @@ import numpy as np
 from workbench.compare.compare_session import Rollouts, roll_out, run_of
 from workbench.compare.session import Session
 from workbench.compare.session_takes import LeftOut, Progress, ReadTake, register_takes
-from workbench.identify.problem import BLOCK, USES, TakeEvidence, gather
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence, gather
 from workbench.identify.shooting import base_states
 from workbench.recording.take import Take
 from workbench.robot import InputError
@@ -46,7 +47,7 @@ def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConf
 
 def check_duration(session: Session, evidence: Sequence[TakeEvidence]) -> None:
     """InputError where takes are so short that no conclusion could be drawn, whatever they show."""
-    least = BLOCK * len(USES)
+    least = PROBLEM.block * len(PROBLEM.uses)
     longest = max(float(np.ptp(e.take.recorded.time[e.moving])) if e.moving.any() else 0.0 for e in evidence)
     if longest < least and not any(e.take.spec.use for e in evidence):
         raise InputError(session.path, f"nothing can be concluded: no take shows more than {longest:.1f} s after its first "

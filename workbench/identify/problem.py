@@ -16,6 +16,7 @@ from workbench.compare.session_takes import RegisteredTake
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
+from workbench.identify.options import PROBLEM
 from workbench.identify.shooting import unsettled
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
@@ -24,19 +25,6 @@ from workbench.simulation.steady import BaseStates
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-BLOCK = 0.4
-"""Length of a stretch [s]; of four in a row two are fitted, one decides, one validates."""
-USES = ("fit", "choose", "fit", "validate")
-PART, PARTS, JUDGES = 0.1, 3, 1
-"""With the base held, what is neither fitted nor validated is every third part [s] of what does not validate, the second of
-three: a joint forgets within one, and may meet its stop but once."""
-LEAST_BODY_SIGMA = np.array([1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004])
-"""Below this no contact model is believed: [m, m, rad, m, rad, rad]."""
-LATE, SHIFTS = 0.1, 4
-"""By how much every model may shift an estimated start [s], and in how many steps: a robot whose servos got each other's speeds
-sets out so unlike the nominal one that its start was estimated 62 ms early."""
-SMOOTHED = 0.065
-"""Span [s] over which residuals are averaged where a gap is looked for: noise averages out, what a model lacks does not."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +130,7 @@ class TakeEvidence:
         time, late, n = self.take.recorded.time, 0.0, len(self.joints)
         used = ~self.uses["validate"]
         shifted = simulated
-        for _ in range(SHIFTS):
+        for _ in range(PROBLEM.shifts):
             slope = np.gradient(shifted[:, :n], time, axis=0) / self.sigma[:n]
             r = (self.recorded[:, :n] - shifted[:, :n]) / self.sigma[:n]
             good = np.isfinite(r) & np.isfinite(slope) & used[:, None]
@@ -152,7 +140,7 @@ class TakeEvidence:
             if not told.any():
                 return shifted
             by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
-            most = LATE if self.start_is_free else LOOP
+            most = PROBLEM.late if self.start_is_free else LOOP
             late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[told])), -most, most))
             shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
         return np.where(np.isfinite(simulated), shifted, np.nan)
@@ -194,7 +182,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     weight = np.ones(len(names))
     if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
         body = [names.index(c) for c in BODY]
-        sigma[body] = np.maximum(sigma[body], LEAST_BODY_SIGMA)
+        sigma[body] = np.maximum(sigma[body], PROBLEM.least_body_sigma)
         weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
     sigma = np.maximum(sigma, 1e-6)
     apart = [*(f - finest for f in (*finer[:-1], nominal)), *(o - nominal for o in others)]
@@ -208,7 +196,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
 
 def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:
     """Times sigma (c,), by frame (N, c): at least 1, and more where steps and contact models part within a block."""
-    frames = max(1, round(BLOCK / float(np.median(np.diff(t.recorded.time)))))
+    frames = max(1, round(PROBLEM.block / float(np.median(np.diff(t.recorded.time)))))
     worst = np.max(np.square(np.nan_to_num(np.array(apart))), axis=0)
     local = _running_sum(worst, frames) / frames
     return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
@@ -216,14 +204,14 @@ def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake
 
 def part_of(since: Array) -> NDArray[np.int_]:
     """Which of PARTS a frame of a held take is in, by its time after the first command [s]."""
-    return np.mod(np.floor(since / PART).astype(int), PARTS)
+    return np.mod(np.floor(since / PROBLEM.part).astype(int), PROBLEM.parts)
 
 
 def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
     since = t.recorded.since_start
-    role = np.array(USES)[np.mod(np.floor(since / BLOCK).astype(int), len(USES))]
+    role = np.array(PROBLEM.uses)[np.mod(np.floor(since / PROBLEM.block).astype(int), len(PROBLEM.uses))]
     if t.spec.base == "fixed":
-        role = np.where(role == "validate", role, np.where(part_of(since) == JUDGES, "choose", "fit"))
+        role = np.where(role == "validate", role, np.where(part_of(since) == PROBLEM.deciding_part, "choose", "fit"))
     if t.spec.use == "validate":
         role[:] = "validate"
     elif not alone:
@@ -254,7 +242,7 @@ def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: boo
     """RMS of residual over sigma, by channel; on all frames after the first command, or those of one use. smooth: of running
     means, which show what is no noise."""
     if smooth:
-        residual = smoothed(residual, round(SMOOTHED / e.frame_time))
+        residual = smoothed(residual, round(PROBLEM.smoothing / e.frame_time))
     rows = residual[e.moving] if use is None else residual[e.uses[use]]
     count = np.isfinite(rows).sum(axis=0)
     value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))

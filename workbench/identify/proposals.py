@@ -9,14 +9,11 @@ from dataclasses import replace
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
+from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import point_mass
 from workbench.identify.problem import TakeEvidence
 from workbench.robot import RobotModel
-
-HEAVY, HEAVY_APART = 0.15, 0.09
-"""Share of the robot's mass from which on a link's centre of mass is asked about: of lighter ones it hardly shows. The latter of
-links that are no part of one leg, as a trunk's: what they carry tips the robot, while their own joint hardly feels it."""
 
 
 def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
@@ -52,7 +49,11 @@ def heavy_links(model: RobotModel) -> list[str]:
     k = model.kinematics
     feet = list(model.foot_links.values())
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))
-    return [link for link in k.links if k.masses[link] >= k.mass * (HEAVY_APART if feet and carried[link] != 1 else HEAVY)]
+    return [
+        link
+        for link in k.links
+        if k.masses[link] >= k.mass * (PROBLEM.heavy_trunk if feet and carried[link] != 1 else PROBLEM.heavy)
+    ]
 
 
 def _places(effect: Effect, model: RobotModel, seen: Sequence[str]) -> Iterable[tuple[str, ...]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,27 +13,21 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.identify.ledger import GAP_RATIO, channel_gaps
-from workbench.identify.problem import BLOCK, TakeEvidence
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
 
 Array = NDArray[np.float64]
-COARSE, FINE = 2.0, 0.25
-"""Steps for a first look, and for last numbers, in search steps."""
 STRETCHES = 10_000
 """More than a take has."""
-STATION, PUPPY = 17, 15
-"""What a station costs by itself, in joints, and how many a puppy has. Measured: 30 ms for a second of a joint, 33 of three
-joints, 53 of fifteen."""
-REST = 0.1
-"""Rest before the first command in rollouts [s]."""
 
 
 @dataclass(frozen=True)
-class Question:
+class RolloutRequest:
     """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone. until: how long after
     the first command [s]; frames after that are NaN."""
 
@@ -42,7 +37,7 @@ class Question:
     until: float = np.inf
 
 
-class Jury:
+class RolloutEvaluator:
     """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
     answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
 
@@ -56,10 +51,10 @@ class Jury:
         self.work = 0.0
         self._known: dict[str, NDArray[np.float32]] = {}
 
-    def residuals(self, questions: Sequence[Question]) -> list[dict[int, Array]]:
+    def residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
         keys: list[dict[int, str]] = []
-        new: dict[str, tuple[Question, int, RobotModel]] = {}
+        new: dict[str, tuple[RolloutRequest, int, RobotModel]] = {}
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
             keys.append({i: self._key(model, i, q) for i, model in felt.items()})
@@ -81,9 +76,9 @@ class Jury:
         return [{i: self.evidence[i].residual(self._known[key].astype(float), q.model, q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
-    def on(self, evidence: Sequence[TakeEvidence]) -> Jury:
-        """A jury on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
-        other = Jury(evidence, self.config, self.n_jobs, self.memory)
+    def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
+        """The same on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
+        other = RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
         other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
         return other
 
@@ -111,9 +106,9 @@ class Jury:
         e = self.evidence[take]
         spec = e.take.spec
         frames = e.since
-        times = np.concatenate([[-REST, -REST / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
+        times = np.concatenate([[-PROBLEM.rest, -PROBLEM.rest / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
         duration = float(times[-1]) + 2e-3
-        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, REST,
+        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, PROBLEM.rest,
                    name=spec.name, times=times, start=e.take.start_state(), steadied=e.steadied)
 
     def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
@@ -160,7 +155,7 @@ class Jury:
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / BLOCK).astype(int)
+            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
             parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 
@@ -183,7 +178,7 @@ class Jury:
     def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
         """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a held robot no more than
         expected, where running means alone show one."""
-        most = GAP_RATIO**2 * expected
+        most = PROBLEM.gap_ratio**2 * expected
         slight = [np.empty(0, dtype=bool)]
         for i, r in sorted(residuals.items()):
             e = self.evidence[i]
@@ -194,7 +189,7 @@ class Jury:
     def _length(self, take: int, until: float = np.inf) -> float:
         """Of a rollout [s of a puppy's], a walk counting more as it takes longer, few joints less."""
         e = self.evidence[take]
-        share = (len(e.joints) + STATION) / (PUPPY + STATION)
+        share = (len(e.joints) + PROBLEM.station_joints) / (PROBLEM.puppy_joints + PROBLEM.station_joints)
         return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
 
     def _felt(self, model: RobotModel, take: int) -> RobotModel:
@@ -204,13 +199,13 @@ class Jury:
         felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
         return model if len(felt) == len(model.effects) else replace(model, effects=felt)
 
-    def _key(self, felt: RobotModel, take: int, q: Question) -> str:
+    def _key(self, felt: RobotModel, take: int, q: RolloutRequest) -> str:
         played = self.evidence[take].take.commands
         goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
         until = self._until(take, q)
         return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}" + ("" if np.isinf(until) else f"-until{until:.6g}")
 
-    def _until(self, take: int, q: Question) -> float:
+    def _until(self, take: int, q: RolloutRequest) -> float:
         """How long a question looks at a take [s]."""
         return min(q.until, self.evidence[take].until)
 
@@ -224,13 +219,13 @@ class Jury:
         simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
         self._known[key] = simulated
         if self.memory is not None:
-            part = self.memory / f"{key}.part.npy"
+            part = self.memory / f"{key}.{os.getpid()}.part.npy"  # two runs may share the memory
             np.save(part, simulated)
             part.replace(self.memory / f"{key}.npy")
 
 
 def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Of `Jury.stretches`."""
+    """Of `RolloutEvaluator.stretches`."""
     return stretches // STRETCHES
 
 

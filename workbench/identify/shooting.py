@@ -10,22 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.identify.options import PROBLEM
 from workbench.recording.take import Take
 from workbench.simulation.steady import BaseStates
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-WINDOW = 0.6
-"""[s]. Over as much even a robot that is about to tip over goes where another engine sends it, too."""
-SETTLES = 0.1
-"""After which feet have found the floor again [s]: a millimetre's fall takes 15 ms."""
-SMOOTHED = 7
-"""Frames over which pose and velocity are read off, by a parabola: 60 ms at 120 Hz."""
 
 
 def edges(since: Array) -> Array:
     """Where windows begin (K,) [s], of a take whose frames are at `since` (N,) [s] after the first command."""
-    return np.arange(WINDOW, float(since[-1]) - WINDOW / 4, WINDOW)
+    return np.arange(PROBLEM.window, float(since[-1]) - PROBLEM.window / 4, PROBLEM.window)
 
 
 def base_states(recorded: Take) -> BaseStates | None:
@@ -35,7 +30,7 @@ def base_states(recorded: Take) -> BaseStates | None:
         return None
     seen: Mask = np.asarray(np.isfinite(np.hstack([recorded.p_WB, recorded.quat_WB])).all(axis=1))
     since = recorded.since_start
-    half = SMOOTHED // 2
+    half = PROBLEM.pose_frames // 2
     frames = [int(np.argmin(np.abs(since - t))) for t in edges(since)]
     frames = [i for i in frames if half <= i < len(since) - half and seen[i - half:i + half + 1].all()]
     if not frames:
@@ -60,4 +55,4 @@ def unsettled(states: BaseStates, since: Array) -> Mask:
     """Frames (N,) that tell nothing, as feet have yet to find the floor."""
     frame = float(np.median(np.diff(since)))
     after = since[:, None] - states.times
-    return np.asarray(((after > -frame) & (after < SETTLES)).any(axis=1))
+    return np.asarray(((after > -frame) & (after < PROBLEM.settles)).any(axis=1))

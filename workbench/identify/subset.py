@@ -9,20 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.ledger import channel_gaps
-from workbench.identify.problem import BLOCK, JUDGES, PARTS, USES, TakeEvidence, part_of
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence, part_of
 
 Array = NDArray[np.float64]
-LONG, SEARCHED = 60.0, 40.0
-"""Seconds of recording from which on a search looks at a share of it, and how much that is: what an effect must bring is
-measured by recordings of this length, too."""
-PIECE = 3 * len(USES) * BLOCK
-"""What a share grows by [s]."""
-
-STARVED = 0.1
-"""Share of what a channel lacks with the base held below which the frames that judge show too little of it."""
 
 
-def judged_fairly(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+
+def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
     """Takes of which, with the base held, another third of the frames judges where that which does shows next to nothing of what
     a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
     return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e
@@ -37,22 +31,22 @@ def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
     if not beyond.size:
         return e
     part = part_of(e.since)
-    least = [float(np.min(beyond[part[seen] == k].sum(axis=0) / beyond.sum(axis=0))) for k in range(PARTS)]
+    least = [float(np.min(beyond[part[seen] == k].sum(axis=0) / beyond.sum(axis=0))) for k in range(PROBLEM.parts)]
     judges = int(np.argmax(least))
-    if judges == JUDGES or least[JUDGES] >= STARVED:
+    if judges == PROBLEM.deciding_part or least[PROBLEM.deciding_part] >= PROBLEM.starved:
         return e
     uses = {"fit": seen & (part != judges), "choose": seen & (part == judges)}
     return replace(e, uses={**e.uses, **uses})
 
 
-def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
+def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
     """Takes as a search looks at them: not those that only validate; of long sessions, each from its first command until what is
     missing there was seen, or not at all, so that every channel's gap shows, in as many takes as it has.
 
     residuals (N, c): of the nominal robot, by take. Of what validates, nothing is used."""
     ends = [float(e.since[-1]) for e in evidence]
     fitted = [i for i, e in enumerate(evidence) if e.uses["fit"].any()]
-    if sum(ends[i] for i in fitted) <= LONG:
+    if sum(ends[i] for i in fitted) <= PROBLEM.long:
         return [e if i in fitted else _until(e, 0.0) for i, e in enumerate(evidence)]
     power = {i: _power(evidence[i], residuals[i]) for i in fitted}
     names = list(dict.fromkeys(c for e in evidence for c in e.channels))
@@ -62,8 +56,8 @@ def searched(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -
     until = dict.fromkeys(range(len(evidence)), 0.0)
     while True:
         spent = sum(until.values())
-        steps = [(i, t) for i in fitted for t in np.append(np.arange(until[i] + PIECE, ends[i], PIECE), ends[i])
-                 if 0 < t - until[i] <= SEARCHED - spent + 1e-9]
+        steps = [(i, t) for i in fitted for t in np.append(np.arange(until[i] + PROBLEM.piece, ends[i], PROBLEM.piece), ends[i])
+                 if 0 < t - until[i] <= PROBLEM.looked_at - spent + 1e-9]
         if not steps:
             break
         shown = {i: _shown(evidence[i], shares[i], until[i]) for i in fitted}
@@ -97,7 +91,7 @@ def _until(e: TakeEvidence, until: float) -> TakeEvidence:
     return replace(e, until=until, uses={use: mask & early for use, mask in e.uses.items()})
 
 
-def share_of(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
+def subset_used(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
     """What to say of a search that looked at a share of what it might: seconds by take that it looked at; else empty."""
     if all(np.isinf(e.until) for e in evidence if e.take.spec.use != "validate"):
         return {}

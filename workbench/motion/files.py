@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
 from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel
-from workbench.robot.files import read_text, write_whole
+from workbench.robot.files import write_whole
 from workbench.robot.numerals import number_of
+from workbench.robot.tables import plain_text
 
 MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
 """Beyond an hour, or ten turns, a table is in another unit."""
@@ -31,7 +32,7 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
         return load_mtn(file).motion(page or None, (model.bus_ids if model else None) or BUS_IDS)
-    return _parse(path, read_text(path), model)
+    return _parse(path, plain_text(path), model)
 
 
 def save_motion(motion: Motion, path: str | Path) -> Path:

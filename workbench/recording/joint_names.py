@@ -13,16 +13,17 @@ SO101_JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw"
 URDF_JOINTS = dict(zip(SO101_JOINTS, ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")))
 """The same joints by their names in the arm's published URDF."""
 
+
 def named_by_model(recording: Recording, model: RobotModel) -> Recording:
-    """A log with the model's joint names: a BAM log's one joint is the model's one, a SAGE programme's six are those of the arm's
-    URDF where the model has these; others must be the model's by name."""
-    joints = tuple(dict.fromkeys(c.partition(".")[2] for c in recording.channels if "." in c))
-    if recording.kind == "bam_log":
+    """A log with the model's joint names: the one joint of a log that does not name it is the model's one, others have the
+    model's names, or their format knows what else they are called."""
+    joints = recording.joints
+    if recording.nameless:
         if len(model.joints) != 1:
             raise InputError(recording.source, f"a log of one servo needs a model with one joint, not {len(model.joints)}")
         return _renamed(recording, {joints[0]: model.joints[0]})
-    if recording.kind == "sage" and set(joints) == set(URDF_JOINTS) and set(URDF_JOINTS.values()) <= set(model.joints):
-        return _renamed(recording, URDF_JOINTS)
+    if set(joints) == set(recording.aliases) and set(recording.aliases.values()) <= set(model.joints):
+        return _renamed(recording, recording.aliases)
     unknown = [j for j in joints if j not in model.joints]
     if unknown:
         raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +13,20 @@ from workbench.motion.commands import Commands
 from workbench.recording.body_track import BodyTrack
 
 Array = NDArray[np.float64]
+Sensing = Literal["mocap", "encoders"]
+"""What saw the robot: cameras its bodies, or its servos' own sensors their angles."""
 
 
 @dataclass(frozen=True)
 class Recording:
     """Raw content of a recording, in SI and radians but otherwise as it stands in the file.
 
-    kind: "motive", "joint_log", "bam_log" or "sage". version: of the format, as the file says. rate: [Hz], NaN if irregular.
+    kind: name of its format. sensing: what saw the robot. version: of the format, as the file says. rate: [Hz], NaN if irregular.
     frames: (N,) frame numbers. time: (N,) [s] from the first frame. rigid_bodies: asset -> path in the capture's axes
     (Motive: x forward up to a yaw, y up, z right). markers: name -> (N, 3) [m]. channels: joint channel
     ("goal.J", "speed.J" of moving, "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J",
-    "enabled.J") -> (N,).
-    metadata: what the header said. problems: one line each.
+    "enabled.J") -> (N,). metadata: what the header said. problems: one line each. nameless: the file does not name its one joint.
+    aliases: names that the model may have for the joints, by those of the file.
     """
 
     source: str
@@ -39,6 +42,14 @@ class Recording:
     commands: Commands | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
+    sensing: Sensing = "encoders"
+    nameless: bool = False
+    aliases: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that have channels, in the file's order."""
+        return tuple(dict.fromkeys(c.partition(".")[2] for c in self.channels if "." in c))
 
 
 @dataclass(frozen=True)

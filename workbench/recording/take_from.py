@@ -30,7 +30,7 @@ def take_from_recording(recording: Recording, measurement: Measurement, model: R
     are not the model's.
     """
     label = name or Path(recording.source).stem
-    if recording.kind == "motive":
+    if recording.sensing == "mocap":
         check_assets(recording, model)
         take = take_from_tracks(mend(tracks_of(recording), model), measurement, model, label, base)
         return replace(take, problems=(*recording.problems, *take.problems))

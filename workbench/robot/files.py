@@ -69,15 +69,20 @@ def read_text(path: str | Path, most: int = MOST_TEXT) -> str:
 
 def read_json(path: str | Path) -> Any:
     """The content of a JSON file; InputError names line and column, or says that it nests too deep or holds a giant number."""
-    text = read_text(path, MOST_JSON)
+    return parse_json(path, read_text(path, MOST_JSON))
+
+
+def parse_json(path: str | Path, text: str, place: str = "") -> Any:
+    """As `read_json`, of a text that stands at `place` in the file."""
     try:
         return json.loads(text, parse_int=_bounded_int)
     except json.JSONDecodeError as e:
-        raise InputError(path, f"line {e.lineno}, column {e.colno}: {e.msg}; expected whole JSON") from None
+        at = place or f"line {e.lineno}, "
+        raise InputError(path, f"{at}column {e.colno}: {e.msg}; expected whole JSON") from None
     except RecursionError:
-        raise InputError(path, "nested too deep; expected JSON of a few levels") from None
+        raise InputError(path, f"{place}nested too deep; expected JSON of a few levels") from None
     except OverflowError as e:
-        raise InputError(path, str(e)) from None
+        raise InputError(path, f"{place}{e}") from None
 
 
 def _bounded_int(digits: str) -> int:

@@ -139,19 +139,23 @@ def _parse(path: Path, text: str | None = None) -> Kinematics:
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import RevoluteJoint, WeldJoint
 
+    from workbench.robot.model_source.checks import drake_error, quiet_drake
+    from workbench.robot.model_source.prepare import named
     from workbench.robot.resources import ConfigureParser
 
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
     ConfigureParser(parser)
+    source = named(path)
     try:
-        instances = parser.AddModels(str(path)) if text is None else parser.AddModelsFromString(text, "sdf")
-    except Exception as e:
-        raise InputError(path, f"Drake cannot read this model: {e}") from None
+        with quiet_drake():
+            instances = parser.AddModels(str(path)) if text is None else parser.AddModelsFromString(text, "sdf")
+            plant.Finalize()
+    except (RuntimeError, ValueError) as e:
+        raise InputError(source, f"Drake cannot read this model: {drake_error(e)}") from None
     if len(instances) != 1:
-        raise InputError(path, f"expected one model, found {len(instances)}")
+        raise InputError(source, f"expected one model, found {len(instances)}")
     instance = instances[0]
-    plant.Finalize()
     names = [plant.get_body(b).name() for b in plant.GetBodyIndices(instance)]
     masses = {plant.get_body(b).name(): plant.get_body(b).default_mass() for b in plant.GetBodyIndices(instance)}
     centers = {plant.get_body(b).name(): plant.get_body(b).default_com() for b in plant.GetBodyIndices(instance)}
@@ -178,11 +182,11 @@ def _parse(path: Path, text: str | None = None) -> Kinematics:
         elif isinstance(joint, WeldJoint):
             frames[joint.name()] = JointFrame(axis=np.array([0.0, 0, 1]), lower=0.0, upper=0.0, effort=0.0, **common)
         else:
-            raise InputError(path, f"joint '{joint.name()}' is {joint.type_name()}; expected revolute or fixed")
+            raise InputError(source, f"joint '{joint.name()}' is {joint.type_name()}; expected revolute or fixed")
         parent_joint[child] = joint.name()
     roots = [n for n in names if n not in parent_joint]
     if len(roots) != 1:
-        raise InputError(path, f"expected one tree with one root link, found roots {', '.join(roots) or 'none'}")
+        raise InputError(source, f"expected one tree with one root link, found roots {', '.join(roots) or 'none'}")
     parent_joint[roots[0]] = None
     ordered = [roots[0]]
     while len(ordered) < len(names):  # parents before children

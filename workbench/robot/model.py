@@ -15,6 +15,7 @@ import yaml
 from workbench.robot.errors import InputError
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
+from workbench.robot.model_source import ModelSource, model_problems, prepared
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.resources import resolve_model
 from workbench.robot.servo_constants import ServoConstants
@@ -57,8 +58,8 @@ class RobotModel:
 
     description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
     constants by joint. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID by joint. feet: links that stand on the ground;
-    None: the last link with a collision shape on each branch (robot/feet.py). InputError where the description is wanted for the
-    base's default and cannot be read.
+    None: the last link with a collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the
+    description's meshes name. InputError where the description is wanted for the base's default and cannot be read.
     """
 
     description: str
@@ -69,15 +70,26 @@ class RobotModel:
     bus_ids: Mapping[str, int] = field(default_factory=dict)
     effects: tuple[EffectSpec, ...] = ()
     feet: tuple[str, ...] | None = None
+    packages: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.base:
             object.__setattr__(self, "base", self.kinematics.root)
 
     @cached_property
+    def source(self) -> ModelSource:
+        """The file of the description, and what Drake reads of it."""
+        return prepared(resolve_model(self.description), self.packages)
+
+    @property
     def path(self) -> Path:
-        """The SDF file."""
-        return resolve_model(self.description)
+        """The SDF file that Drake reads."""
+        return self.source.path
+
+    @cached_property
+    def problems(self) -> tuple[str, ...]:
+        """What is doubtful in the description, a line each; InputError where Drake cannot build it."""
+        return (*self.source.problems, *model_problems(self.path, self.source.source))
 
     @cached_property
     def kinematics(self) -> Kinematics:
@@ -109,8 +121,8 @@ class RobotModel:
     @cached_property
     def sha256(self) -> str:
         """Hash of the description's content and of everything said about it."""
-        digest = hashlib.sha256(self.path.read_bytes())
-        said = self.as_dict() | {"description": self.path.name}
+        digest = hashlib.sha256(self.source.source.read_bytes())
+        said = self.as_dict() | {"description": self.source.source.name}
         digest.update(yaml.dump(said, Dumper=FAST_YAML, sort_keys=True).encode())
         return digest.hexdigest()
 

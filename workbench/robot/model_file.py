@@ -74,7 +74,7 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
     content: dict[str, Any] = {
         "format": 1,
         "robot": {"model": _description(model, folder.resolve()), "base": model.base, "rigid_bodies": dict(model.rigid_bodies),
-                  "bus_ids": dict(model.bus_ids)},
+                  "bus_ids": dict(model.bus_ids), **({"packages": dict(model.packages)} if model.packages else {})},
         "ground": {k: v for k, v in asdict(model.ground).items() if v is not None},
         "servos": next(iter(servos.values())) if alike else servos,
     }
@@ -98,7 +98,8 @@ def _effect_content(e: EffectSpec) -> dict[str, Any]:
 def _description(model: RobotModel, folder: Path) -> str:
     if model.description.startswith("package://"):
         return model.description
-    return str(model.path.relative_to(folder) if model.path.is_relative_to(folder) else model.path)
+    path = model.source.source
+    return str(path.relative_to(folder) if path.is_relative_to(folder) else path)
 
 
 def load_model(path: str | Path) -> RobotModel:

@@ -16,9 +16,9 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def resource_dir(kind: str) -> Path:
-    """Folder of `kind` ("models" or "data"): inside the wheel if installed, else at the top of the source tree."""
+    """Folder of `kind` ("models", "data" or "firmware"): inside the wheel if installed, else at the top of the source tree."""
     inside = _PACKAGE / "resources" / kind
-    return inside if inside.is_dir() else _PACKAGE.parent / {"models": "models/sdf", "data": "data"}[kind]
+    return inside if inside.is_dir() else _PACKAGE.parent / {"models": "models/sdf"}.get(kind, kind)
 
 
 def data_file(name: str) -> Path:

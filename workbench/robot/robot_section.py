@@ -20,11 +20,12 @@ def read_model(top: Fields) -> RobotModel:
     """
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
+    packages = _packages(f)
     description = f.text("model", PUPPY) or PUPPY
     if not description.startswith("package://"):
         description = str(f.existing("model", description))
     try:
-        model = puppy_model() if description == PUPPY else RobotModel(description)
+        model = puppy_model() if description == PUPPY else RobotModel(description, packages=packages)
     except InputError as e:
         raise f.error("model", str(e)) from None
     kinematics = model.kinematics
@@ -50,6 +51,18 @@ def _ground(f: Fields | None) -> Ground | None:
     )
     f.done()
     return ground
+
+
+def _packages(f: Fields) -> dict[str, str]:
+    """Folders of ROS packages, relative to the file."""
+    given = f.mapping("packages")
+    folders = {}
+    for name, folder in given.items() if given is not None else ():
+        path = f.path.parent / folder if isinstance(folder, str) else None
+        if path is None or not path.is_dir():
+            raise f.error(f"packages.{name}", f"expected a folder, got {folder!r}")
+        folders[name] = str(path.resolve())
+    return folders
 
 
 def _rigid_bodies(f: Fields, links: tuple[str, ...]) -> dict[str, str]:

@@ -84,7 +84,7 @@ class Simulation:
         self._base = self.plant.GetBodyByName(model.base)
         self._foot_forces = FootForces(self.plant, self.diagram.scene_graph(), model)
         self._rest: tuple[bytes | None, Context] | None = None
-        self._runs, self._resumes = 0, False
+        self._runs = 0
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -246,7 +246,7 @@ class Simulation:
             self.simulator.AdvanceTo(self._whole_steps(self.config.settle))
             self._centre_base()
             self._rest = key, self.context.Clone()
-        self._runs, self._resumes = self._runs + 1, False
+        self._runs += 1
         self.context.SetTimeStateAndParametersFrom(self._rest[1])
         self.context.SetTime(0.0)
         self._hold_neutral()  # the inputs' values are no part of what was restored
@@ -304,7 +304,6 @@ class Simulation:
             bank.SetReference(context, np.asarray(reference, dtype=float))
             if start.reference is not None:  # held until the first command
                 self._command(start.reference - self._zero, np.zeros(len(self.joints)), np.ones(len(self.joints)))
-                self._resumes = True
 
     def _put_base(self, base: BaseState) -> None:
         R_WB = Rotation.from_quat(np.asarray(base.quat_WB, dtype=float), scalar_first=True).as_matrix()
@@ -372,7 +371,7 @@ class Simulation:
         sampled: list[float] = []
         due = set(samples.tolist())
         for t in sorted(due | {c for c in (*changes, *puts) if begin <= c < end} | {self._on_grid(end)}):
-            if not self._resumes or t > self.context.get_time():  # else a command at once would come a step late
+            if t > self.context.get_time():  # else a command at once would come a step late
                 self.simulator.AdvanceTo(t)
             if setter is not None and t in puts:
                 setter.put(puts[t], t)

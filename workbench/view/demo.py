@@ -91,7 +91,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
 def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:
     """The four runs by label; the servo law in point contact first."""
     labels = [f"{DRIVES[drive]}, {contact}" for drive, contact in RUNS]
-    configs = [SimulationConfig(drive=drive, contact=contact) for drive, contact in RUNS]
+    configs = [SimulationConfig(drive=drive, contact=contact, engine="drake") for drive, contact in RUNS]
     jobs = [motion_job(model, config, motion, CYCLES, SECONDS) for config in configs]
     progress(f"simulating {len(jobs)} walks", 0.0)
     takes = simulate_batch(jobs, progress=lambda n, of: progress(f"simulating {of} walks", n / of))

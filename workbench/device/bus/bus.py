@@ -117,8 +117,8 @@ class Bus:
     # All
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
-        """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when the
-        last byte was handed to the port [s]. ValueError where the registers do not lie side by side."""
+        """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when its
+        last byte is out and the servos have it [s]. ValueError where the registers do not lie side by side."""
         names = next(iter(values.values())).keys()
         registers = sorted((self._register(name) for name in names), key=lambda r: r.address)
         for one, two in itertools.pairwise(registers):
@@ -126,14 +126,14 @@ class Bus:
                 raise ValueError(f"{one.name} and {two.name} do not lie side by side")
         length = sum(r.size for r in registers)
         packed = [bytes([servo]) + b"".join(r.encode(v[r.name]) for r in registers) for servo, v in values.items()]
-        sent = self.now()
+        sent, frame = self.now(), 8 if self.profile.protocol == 1 else 14
         for some in _batched(packed, LONGEST // (length + 1)):
             parameters = list(b"".join(some))
             result = self._guarded(lambda: self._handler.syncWriteTxOnly(
                 self.port, registers[0].address, length, parameters, len(parameters)))  # noqa: B023
             if result != COMM_SUCCESS:
                 raise BusError(f"could not be sent: {self._handler.getTxRxResult(result)}")
-            sent = self.now()
+            sent = self.now() + (len(parameters) + frame) * self.port.tx_time_per_byte / 1000
         return sent
 
     def release(self, servos: Iterable[int]) -> None:

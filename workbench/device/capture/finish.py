@@ -69,9 +69,11 @@ class Capture:
     problems: tuple[str, ...]
 
 
-def finish(journal: str | Path, take: str | Path, ended: str = "", motive_recording: str | None = None) -> Capture:
+def finish(journal: str | Path, take: str | Path, ended: str = "", motive_recording: str | None = None,
+           until: float | None = None) -> Capture:
     """Writes the take (CSV) and beside it NAME.capture.json, whole or not at all; frames that did not come, and bodies that were
-    not seen, are blank cells. ended: why it ended early. InputError where the journal holds no frame."""
+    not seen, are blank cells. ended: why it ended early. until: host time [s] after which frames are left out. InputError
+    where the journal holds no frame."""
     journal, take = Path(journal), Path(take)
     content = _Content(journal)
     ledger, frames = content.ledger, content.frames
@@ -81,10 +83,14 @@ def finish(journal: str | Path, take: str | Path, ended: str = "", motive_record
     numbers = np.array(sorted(frames))
     times = np.array([frames[n].time for n in numbers.tolist()])
     rate, worst = _rate(numbers, times)
-    bodies = _tracks(frames, content.names, counts)
     first = float(times[0])
     clock = _clock(content.clocks, first)
     first_host = clock.host_time(first, first) if math.isfinite(clock.offset) else first + content.soonest
+    if until is not None:
+        frames = {n: f for n, f in frames.items() if first_host + (f.time - first) <= until}
+        if len(frames) < 2:
+            raise InputError(journal, "no two frames before the end of what was to be seen")
+    bodies = _tracks(frames, content.names, counts.first, max(frames))
     gaps = {name: float(np.mean(np.isnan(track.p[:, 0]))) for name, track in bodies.items()}
     problems = _problems(counts, gaps, worst, clock, content, ended)
     began = datetime.datetime.fromisoformat(content.head["utc"]) + datetime.timedelta(seconds=first_host - content.head_arrival)
@@ -151,13 +157,13 @@ def _rate(numbers: NDArray[np.int64], times: Array) -> tuple[float, float]:
     return rate, float(np.max(np.abs(t - n / rate)))
 
 
-def _tracks(frames: Mapping[int, Frame], names: Mapping[int, str], counts: Counts) -> dict[str, BodyTrack]:
-    span = counts.last - counts.first + 1
+def _tracks(frames: Mapping[int, Frame], names: Mapping[int, str], first: int, last: int) -> dict[str, BodyTrack]:
+    span = last - first + 1
     ids = sorted({body.id for frame in frames.values() for body in frame.bodies})
     p, quat, error = np.full((len(ids), span, 3), np.nan), np.full((len(ids), span, 4), np.nan), np.full((len(ids), span), np.nan)
     row = {number: i for i, number in enumerate(ids)}
     for number, frame in frames.items():
-        k = number - counts.first
+        k = number - first
         for body in frame.bodies:
             if body.tracked:
                 i = row[body.id]

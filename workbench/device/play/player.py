@@ -41,11 +41,13 @@ class PlayOptions:
 
 @dataclass(frozen=True)
 class Played:
-    """How it went. started: when the first pose was sent, on the bus's clock [s]. worst_late: by which a pose was late [s].
+    """How it went. started: when the first pose was sent, ended: when the last one's
+    dwell was over or the motion was stopped, on the bus's clock [s]. worst_late: by which a pose was late [s].
     stopped: why it ended early, "" where it did not. released: whether torque is off."""
 
     journal: Path
     started: float
+    ended: float
     poses: int
     worst_late: float
     stopped: str
@@ -82,7 +84,7 @@ class _Performance:
 
     def __init__(self, rig: Rig, stop: Callable[[], str], options: PlayOptions, progress: Progress) -> None:
         self.rig, self.stop, self.options, self.progress = rig, stop, options, progress
-        self.started, self.poses, self.worst_late = math.nan, 0, 0.0
+        self.started, self.ended, self.poses, self.worst_late = math.nan, math.nan, 0, 0.0
         self.goals: dict[str, float] = {}
 
     def run(self, commands: Commands) -> Played:
@@ -115,7 +117,7 @@ class _Performance:
             raise
         finally:
             bus.options = kept
-        return Played(rig.journal.path, self.started, self.poses, self.worst_late, stopped, released)
+        return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released)
 
     def _take_hold(self, careful: BusOptions) -> None:
         """Torque on, each joint where it is: reads before it writes anything, with as many tries as it takes."""
@@ -190,6 +192,7 @@ class _Performance:
                 self.started = sent
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
+        self.ended = bus.now()
 
     def _read_until(self, due: float) -> None:
         self.rig.read_until(due, lambda: bool(self.stop()))
@@ -201,6 +204,7 @@ class _Performance:
     def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
         """Does what the reaction says. On the way to neutral nothing but time and a lost port ends it any more."""
         rig = self.rig
+        self.ended = rig.bus.now() if math.isnan(self.ended) else self.ended
         rig.journal.write(t=rig.bus.now(), stopped=reaction.reason)
         if reaction.how == "neutral":
             rig.watch = Watch(rig.bus.profile, {}, {}, WatchOptions(confirm=10**9, silent=math.inf))

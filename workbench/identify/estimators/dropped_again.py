@@ -6,36 +6,36 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from workbench.identify.estimators.dropped_commands import Missed, with_missed
+from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
 from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 
 
 @dataclass(frozen=True)
-class Played:
+class TakesAsPlayed:
     """sent: takes with all poses that went out; missed: what was taken for missed, and left out of what is played."""
 
-    sent: Jury
-    missed: tuple[Missed, ...] = ()
+    sent: RolloutEvaluator
+    missed: tuple[DroppedCommands, ...] = ()
 
 
-def read_anew(search: Search, current: Fit, played: Played) -> tuple[Search, Played]:
+def reestimated(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Search, TakesAsPlayed]:
     """Missed poses as the robot with these effects tells them, and the search on takes that are played without these; the same
     search where they are those that were known."""
     model, sent = with_effects(search.nominal, current.sizes()), played.sent
-    residuals = sent.residuals([Question(model, tuple(range(len(sent.evidence))))])[0]
-    jury, missed = with_missed(sent, model, residuals)
+    residuals = sent.residuals([RolloutRequest(model, tuple(range(len(sent.evidence))))])[0]
+    evaluator, missed = with_dropped_commands(sent, model, residuals)
     if _poses(missed) != _poses(played.missed):
-        search = search.on(search.jury.on(played_as(search.jury.evidence, jury.evidence)))
+        search = search.on(search.evaluator.on(with_commands_of(search.evaluator.evidence, evaluator.evidence)))
     return search, replace(played, missed=missed)
 
 
-def played_as(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:
+def with_commands_of(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:
     """Takes played as others are, which are the same takes."""
     return [replace(e, take=o.take) for e, o in zip(evidence, others)]
 
 
-def _poses(missed: Sequence[Missed]) -> Mapping[str, Mapping[int, tuple[int, ...]]]:
+def _poses(missed: Sequence[DroppedCommands]) -> Mapping[str, Mapping[int, tuple[int, ...]]]:
     return {m.joint: m.poses for m in missed}

@@ -10,29 +10,19 @@ from numpy.typing import NDArray
 from scipy.stats import beta
 
 from workbench.effects.registry import effect_named, estimated_by
-from workbench.identify.estimators.dropped_in_motion import LEAST_STEP, TURNS, end_of, passed_over, played_without, steps
-from workbench.identify.estimators.stops_and_mounts import AT_STOP
+from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, end_of, played_without, steps
 from workbench.identify.findings import Change, Estimate, Finding
+from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence, joint_error
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
-MOST = 0.6
-"""Share of poses that may be missed: of more, something else is the matter."""
-STAYED, WENT = 0.3, 0.5
-"""Shares of the way: a missed pose leaves the joint within the first of where it was, where the model
-has gone at least the second."""
-LEAST_CLOSED, SURELY = 0.5, 0.8
-"""Share of a joint's gap that the poses taken for missed must explain; the second where none was missed with the base held: on
-the ground a joint may be kept from going."""
 
-SURE = 0.95
-"""Probability that poses were missed, where they explain that much."""
 
 
 @dataclass(frozen=True)
-class Missed:
+class DroppedCommands:
     """One joint's missed poses, by take. effect: the name of what misses them; of: how many would have moved the joint, in all
     takes."""
 
@@ -72,63 +62,77 @@ class Missed:
         """With the 90 % interval of a share (Clopper and Pearson 1934)."""
         low = float(beta.ppf(0.05, self.count, self.of - self.count + 1))
         high = 1.0 if self.count == self.of else float(beta.ppf(0.95, self.count + 1, self.of - self.count))
-        return Finding(self.effect, (self.joint,), SURE, {self._parameter: Estimate(self.probability, low, high, "1")},
-                       self.fit, self.validation,
-                       evidence=effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)")
+        return Finding(
+            self.effect,
+            (self.joint,),
+            READ_OFF.dropped_probability,
+            {self._parameter: Estimate(self.probability, low, high, "1")},
+            self.fit,
+            self.validation,
+            evidence=effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)",
+        )
 
 
-def with_missed(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> tuple[Jury, tuple[Missed, ...]]:
-    """A jury whose takes are played without the poses that were missed, and what was missed. residuals: of the nominal robot."""
+def with_dropped_commands(
+    evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]
+) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
+    """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: of
+    the nominal robot."""
     effect, *_ = (*estimated_by("missed poses"), None)
     if effect is None:
-        return jury, ()
-    found: list[Missed] = []
-    moving = passed_over(jury, nominal, residuals)
-    for joint in dict.fromkeys(j for e in jury.evidence for j in e.joints):
-        here = [i for i, e in enumerate(jury.evidence) if joint in e.joints and e.take.commands]
-        lost, after = _lost(jury, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
-        count, of = sum(map(len, lost.values())), sum(_telling(jury.evidence[i], joint, k) for i, k in lost.items())
-        least = _least_closed(jury, {i: len(k) for i, k in lost.items()})
-        if least is None or count > MOST * of:
+        return evaluator, ()
+    found: list[DroppedCommands] = []
+    moving = dropped_in_motion(evaluator, nominal, residuals)
+    for joint in dict.fromkeys(j for e in evaluator.evidence for j in e.joints):
+        here = [i for i, e in enumerate(evaluator.evidence) if joint in e.joints and e.take.commands]
+        lost, after = _lost(evaluator, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
+        count, of = sum(map(len, lost.values())), sum(_telling(evaluator.evidence[i], joint, k) for i, k in lost.items())
+        least = _least_closed(evaluator, {i: len(k) for i, k in lost.items()})
+        if least is None or count > READ_OFF.most_dropped * of:
             continue
-        if all(_stands_at_an_end(jury.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
+        if all(_stands_at_an_end(evaluator.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
             continue
         here = [i for i, k in lost.items() if k]
-        was, now = (float(sum(np.nansum(np.square(r[i][:, jury.evidence[i].columns(joint)])) for i in here))
+        was, now = (float(sum(np.nansum(np.square(r[i][:, evaluator.evidence[i].columns(joint)])) for i in here))
                     for r in (residuals, after))
-        frames = sum(np.isfinite(residuals[i][:, jury.evidence[i].columns(joint)]).sum() for i in here)
+        frames = sum(np.isfinite(residuals[i][:, evaluator.evidence[i].columns(joint)]).sum() for i in here)
         if was - now > least * (was - frames) and was - now > 100:
-            fit, unseen = (Change(joint_error(jury.evidence, [joint], residuals, use),
-                                  joint_error(jury.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
-            found.append(Missed(effect.name, joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
-            jury, residuals = played_without(jury, {(i, joint): k for i, k in lost.items() if k}), after
-    return jury, tuple(found)
+            fit, unseen = (Change(joint_error(evaluator.evidence, [joint], residuals, use),
+                                  joint_error(evaluator.evidence, [joint], after, use), "deg") for use in ("fit", "validate"))
+            found.append(DroppedCommands(effect.name, joint, {i: k for i, k in lost.items() if k}, of, fit, unseen))
+            evaluator, residuals = played_without(evaluator, {(i, joint): k for i, k in lost.items() if k}), after
+    return evaluator, tuple(found)
 
 
-def _lost(jury: Jury, nominal: RobotModel, joint: str, known: Mapping[int, tuple[int, ...]], residuals: Mapping[int, Array]
-          ) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
+def _lost(
+    evaluator: RolloutEvaluator,
+    nominal: RobotModel,
+    joint: str,
+    known: Mapping[int, tuple[int, ...]],
+    residuals: Mapping[int, Array],
+) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
     """Poses that a joint missed, by take, and what is left of all takes played without them. known: those missed in motion. What
     comes after a missed pose is read anew, beside a robot that did not get it either."""
     lost, now = dict(known), dict(residuals)
     new = {i: k for i, k in lost.items() if k}
-    for _ in range(TURNS):
+    for _ in range(READ_OFF.turns):
         if new:
-            tried = played_without(jury, {(i, joint): lost[i] for i in new})
-            now |= tried.residuals([Question(nominal, tuple(new))])[0]
-        new = {i: more for i in lost if (more := _read(jury.evidence[i], joint, now[i], lost[i]))}
+            tried = played_without(evaluator, {(i, joint): lost[i] for i in new})
+            now |= tried.residuals([RolloutRequest(nominal, tuple(new))])[0]
+        new = {i: more for i in lost if (more := _read(evaluator.evidence[i], joint, now[i], lost[i]))}
         if not new:
             break
         lost |= {i: tuple(sorted((*lost[i], *more))) for i, more in new.items()}
     return lost, now
 
 
-def _least_closed(jury: Jury, missed: Mapping[int, int]) -> float | None:
+def _least_closed(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> float | None:
     """Share of the joint's gap that so many missed poses, by take, must explain; None: not believed. On the ground a joint may be
     kept from going, once."""
-    held = [n for i, n in missed.items() if jury.evidence[i].take.spec.base == "fixed"]
+    held = [n for i, n in missed.items() if evaluator.evidence[i].take.spec.base == "fixed"]
     if sum(held):
-        return LEAST_CLOSED
-    return (SURELY if held else LEAST_CLOSED) if sum(missed.values()) > 1 else None
+        return READ_OFF.dropped_explains
+    return (READ_OFF.dropped_explains_free if held else READ_OFF.dropped_explains) if sum(missed.values()) > 1 else None
 
 
 def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
@@ -140,7 +144,7 @@ def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: i
     stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
     way = 1.0 if goal > stood else -1.0
     end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
-    return way * goal > end and way * stood > end - AT_STOP
+    return way * goal > end and way * stood > end - READ_OFF.at_stop
 
 
 def _seen(e: TakeEvidence, joint: str) -> Array:
@@ -169,16 +173,16 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
         frames = _at_the_end_of(e, k) & np.isfinite(seen)
         if k in gone:
             continue
-        if abs(way) < LEAST_STEP or not frames.any():
+        if abs(way) < READ_OFF.least_step or not frames.any():
             at = float(goal)
             continue
         went, should = (float(np.median(q[frames]) - at) / way for q in (seen, said))
-        if alike and abs(went) < STAYED and should > WENT:
+        if alike and abs(went) < READ_OFF.stayed and should > READ_OFF.went:
             missed.append(k)
             alike = False
         else:
             at = float(goal)
-            alike = alike or abs(went - 1) < STAYED
+            alike = alike or abs(went - 1) < READ_OFF.stayed
     return tuple(missed)
 
 

@@ -13,34 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
+from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-Lost = dict[tuple[int, str], tuple[int, ...]]
+DroppedPoses = dict[tuple[int, str], tuple[int, ...]]
 """Poses by take and joint."""
-LEAST_STEP = np.deg2rad(2.0)
-"""A pose that moves a joint by less does not tell whether it came [rad]."""
-CALM, BEHIND = 4.0, 7.0
-"""Standard deviations within which a joint goes as the model has it, and beyond which it stays behind."""
-BEFORE, LAG = 0.03, 0.05
-"""Times [s] before a command that show how the joint went until then, and by which what it does shows later."""
-EXPLAINED = 0.8
-"""Share of what a joint lacks until the next command that leaving out the pose must explain."""
-MOST, TURNS = 0.5, 12
-"""Share of poses that may be missed: of more, something else is the matter. Poses that may be missed one after another."""
 
 
-def played_without(jury: Jury, lost: Mapping[tuple[int, str], Sequence[int]]) -> Jury:
-    """The jury whose takes are played without some poses, by take and joint."""
-    evidence = list(jury.evidence)
+def played_without(evaluator: RolloutEvaluator, lost: Mapping[tuple[int, str], Sequence[int]]) -> RolloutEvaluator:
+    """The evaluator whose takes are played without some poses, by take and joint."""
+    evidence = list(evaluator.evidence)
     for (i, joint), poses in lost.items():
         take = evidence[i].take
         assert take.commands is not None
         commands = without_poses(take.commands, take.commands.column(joint), poses)
         evidence[i] = replace(evidence[i], take=replace(take, commands=commands))
-    return jury.on(evidence)
+    return evaluator.on(evidence)
 
 
 def end_of(e: TakeEvidence, k: int) -> float:
@@ -50,43 +41,47 @@ def end_of(e: TakeEvidence, k: int) -> float:
     return float(commands.times[k + 1] if k + 1 < len(commands.times) else commands.end)
 
 
-def passed_over(jury: Jury, nominal: RobotModel, residuals: Mapping[int, Array]) -> Lost:
+def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]) -> DroppedPoses:
     """Poses that were missed in motion. residuals: of the nominal robot, by take."""
-    lost: Lost = {}
+    lost: DroppedPoses = {}
     cleared: set[tuple[int, str, int]] = set()
     now = dict(residuals)
-    for _ in range(TURNS):
-        new = _suspects(jury, now, lost, cleared)
+    for _ in range(READ_OFF.turns):
+        new = _suspects(evaluator, now, lost, cleared)
         if not new:
             break
-        after = _played(jury, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
-        guilty = {(i, j): tuple(k for k in poses if _explained(jury.evidence[i], j, k, now[i], after[i]))
+        after = _played(evaluator, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
+        guilty = {(i, j): tuple(k for k in poses if _explained(evaluator.evidence[i], j, k, now[i], after[i]))
                   for (i, j), poses in new.items()}
         cleared |= {(*at, k) for at, poses in new.items() for k in poses if k not in guilty[at]}
         found = {at: tuple(sorted((*lost.get(at, ()), *poses))) for at, poses in guilty.items() if poses}
         if not found:
             break
         lost |= found
-        now = after if guilty == new else _played(jury, nominal, lost, residuals)
+        now = after if guilty == new else _played(evaluator, nominal, lost, residuals)
     return lost
 
 
-def _played(jury: Jury, nominal: RobotModel, lost: Lost, residuals: Mapping[int, Array]) -> dict[int, Array]:
+def _played(
+    evaluator: RolloutEvaluator, nominal: RobotModel, lost: DroppedPoses, residuals: Mapping[int, Array]
+) -> dict[int, Array]:
     """What is left without these poses."""
     takes = tuple(sorted({i for i, _ in lost}))
-    return dict(residuals) | played_without(jury, lost).residuals([Question(nominal, takes)])[0]
+    return dict(residuals) | played_without(evaluator, lost).residuals([RolloutRequest(nominal, takes)])[0]
 
 
-def _suspects(jury: Jury, now: Mapping[int, Array], lost: Lost, cleared: set[tuple[int, str, int]]) -> Lost:
+def _suspects(
+    evaluator: RolloutEvaluator, now: Mapping[int, Array], lost: DroppedPoses, cleared: set[tuple[int, str, int]]
+) -> DroppedPoses:
     """Poses with which joints that were well begin to stay behind; of several in a row the first, as what one does shows with the
     next, and left out together neither would be believed."""
-    out: Lost = {}
-    for i, e in enumerate(jury.evidence):
+    out: DroppedPoses = {}
+    for i, e in enumerate(evaluator.evidence):
         for joint in e.joints if e.take.commands is not None else ():
             gone = lost.get((i, joint), ())
             moves = steps(e, joint, gone)
             behind = tuple(k for k, way in moves.items() if (i, joint, k) not in cleared and _begins(e, joint, k, way, now[i]))
-            if behind and len(behind) + len(gone) <= MOST * (len(moves) + len(gone)):
+            if behind and len(behind) + len(gone) <= READ_OFF.most_dropped_in_motion * (len(moves) + len(gone)):
                 out[i, joint] = tuple(k for k in behind if k - 1 not in behind)
     return out
 
@@ -97,7 +92,7 @@ def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
     assert commands is not None
     column = commands.column(joint)
     ways = np.diff(without_poses(commands, column, gone).goals[:, column], prepend=0.0)
-    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= LEAST_STEP and k not in gone}
+    return {k: float(way) for k, way in enumerate(ways) if abs(way) >= READ_OFF.least_step and k not in gone}
 
 
 def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) -> bool:
@@ -105,9 +100,9 @@ def _begins(e: TakeEvidence, joint: str, k: int, way: float, residual: Array) ->
     own = -np.sign(way) * residual[:, e.channels.index(joint)]
     came, until = _between(e, k)
     time = e.take.recorded.since_start
-    was, then = own[(time > came - BEFORE) & (time <= came)], own[(time > came) & (time <= until)]
+    was, then = own[(time > came - READ_OFF.before) & (time <= came)], own[(time > came) & (time <= until)]
     was, then = was[np.isfinite(was)], then[np.isfinite(then)]
-    return bool(len(then)) and bool(np.all(np.abs(was) < CALM)) and bool(then.max() > max(BEHIND, -then.min()))
+    return bool(len(then)) and bool(np.all(np.abs(was) < READ_OFF.calm)) and bool(then.max() > max(READ_OFF.behind, -then.min()))
 
 
 def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array) -> bool:
@@ -116,11 +111,11 @@ def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array)
     time, channel = e.take.recorded.since_start, e.channels.index(joint)
     own = (time > came) & (time <= until) & np.isfinite(before[:, channel])
     was, now = (float(np.sum(r[own, channel] ** 2)) for r in (before, after))
-    return bool(was - now > EXPLAINED * (was - own.sum()))
+    return bool(was - now > READ_OFF.pose_explains * (was - own.sum()))
 
 
 def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
     """When a command came [s], and until when what it did shows alone."""
     commands = e.take.commands
     assert commands is not None
-    return float(commands.times[k]), end_of(e, k) + LAG
+    return float(commands.times[k]), end_of(e, k) + READ_OFF.lag

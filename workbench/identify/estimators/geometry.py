@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.findings import SUREST, Change, Estimate, Finding
-from workbench.identify.fitting.covariance import Z90
+from workbench.identify.findings import Change, Estimate, Finding
 from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import CONCLUSIONS, READ_OFF
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.problem import TakeEvidence
 from workbench.recording.mocap import quaternions as quat
@@ -28,19 +28,11 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
-LEAST_ALONG = 0.5
-"""Cosine between a link's length and what of it two axes tell."""
-ROUGH, ROUGH_TURN = 1e-4, np.deg2rad(0.25)
-"""What a take's distance between axes [m], and a direction [rad] for what the model says of droop, are off by at the least."""
-SURE = 5.0
-"""Standard deviations from which on a link is not as drawn."""
-LEAST_CHANGE, LEAST_TURNED = 5e-4, np.deg2rad(1.5)
-"""Changes of length [m] and turned horns [rad] below which no gait shows anything: what is told to be nearer is as drawn."""
 SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
 
 
 @dataclass(frozen=True)
-class Told:
+class UncertainValue:
     """A number and its standard deviation, in SI."""
 
     value: float
@@ -48,7 +40,7 @@ class Told:
 
     def differs(self, least: float) -> bool:
         """Whether it is neither nothing nor too little to show."""
-        return abs(self.value) > max(SURE * self.sigma, least)
+        return abs(self.value) > max(READ_OFF.geometry_sure * self.sigma, least)
 
     def is_nothing(self, least: float) -> bool:
         """Whether it is too little to show, surely."""
@@ -57,12 +49,14 @@ class Told:
 
 @dataclass(frozen=True)
 class Measured:
-    """A link that is not as long as drawn, or a horn that sits turned: value and standard deviation in the contract's unit."""
+    """A link that is not as long as drawn, a horn that sits turned, or what a servo's register says: value and standard deviation
+    in the contract's unit. seen: how that is known, for a person."""
 
     effect: str
     where: str
     mean: float
     sigma: float
+    seen: str = SEEN
 
     @property
     def variance(self) -> float:
@@ -76,14 +70,14 @@ class Measured:
     def finding(self, fit: Change, validation: Change) -> Finding:
         """With the 90 % interval of what was measured."""
         p = effect_named(self.effect).parameters[0]
-        half = Z90 * self.sigma
+        half = CONCLUSIONS.z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
-        return Finding(self.effect, (self.where,), SUREST, {p.name: number}, fit, validation,
-                       evidence=effect_named(self.effect).sentence(self.spec) + SEEN)
+        return Finding(self.effect, (self.where,), CONCLUSIONS.surest, {p.name: number}, fit, validation,
+                       evidence=effect_named(self.effect).sentence(self.spec) + self.seen)
 
 
 @dataclass(frozen=True)
-class Build:
+class Geometry:
     """What the bodies show. measured: what is not as drawn; near: a number from which to begin, by effect and place, where droop
     may not be what the model says; as_drawn: what need not be asked about."""
 
@@ -101,18 +95,18 @@ class Build:
         return [replace(c, typical=(self.near[c.key],)) if c.key in self.near else c for c in pool if c.key not in known]
 
 
-def build_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> Build:
+def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> Geometry:
     """What the bodies show of a robot whose model has no lengths or zeros of its own. residuals: of the model, by take."""
     lengths, turns = estimated_by("length between axes"), estimated_by("turn about an axis")
     if not lengths or not turns or {e.effect for e in model.effects} & {e.name for e in (*lengths, *turns)}:
-        return Build()
+        return Geometry()
     between = {i: _spans(e, model) for i, e in enumerate(evidence) if e.take.recording.rigid_bodies}
     held = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
     ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
     measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
     for (effect, *_), least, told in (
-            (lengths, LEAST_CHANGE, _changes(model, [s for there in between.values() for s in there])),
-            (turns, LEAST_TURNED, _turns(model, held))):
+            (lengths, READ_OFF.least_change, _changes(model, [s for there in between.values() for s in there])),
+            (turns, READ_OFF.least_turned, _turns(model, held))):
         name, unit = effect.name, effect.parameters[0].si
         for where, number in told.items():
             if number.is_nothing(least):
@@ -121,7 +115,7 @@ def build_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Map
                 near[name, (where,)] = number.value / unit
             elif number.differs(least):
                 measured.append(Measured(name, where, number.value / unit, number.sigma / unit))
-    return Build(tuple(measured), near, frozenset(as_drawn))
+    return Geometry(tuple(measured), near, frozenset(as_drawn))
 
 
 def _carried(model: RobotModel, joint: str) -> str:
@@ -133,24 +127,24 @@ def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
     return spans(tracks, seen_joints(tracks, model, e.take.spec.base)[0])
 
 
-def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, Told]:
+def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainValue]:
     """By how much links are longer than drawn, by link."""
     k, sdf = model.kinematics, SdfRobot(model.path)
-    told: dict[str, list[Told]] = {}
+    told: dict[str, list[UncertainValue]] = {}
     for s in between:
         link, drawn = k.frames[s.joint].child, _drawn(k, s)
         way, distance = sdf.way(k, link), float(np.linalg.norm(drawn))
         along = float(drawn @ way) / (distance * float(np.linalg.norm(way))) if distance > 0 and way.any() else 0.0
-        if along > LEAST_ALONG:
-            change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, ROUGH))
-            told.setdefault(link, []).append(Told(change / along, sigma / along))
+        if along > READ_OFF.least_along:
+            change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, READ_OFF.length_error))
+            told.setdefault(link, []).append(UncertainValue(change / along, sigma / along))
     return {link: _mean(each) for link, each in told.items()}
 
 
-def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, Told]:
+def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, UncertainValue]:
     """By how much links stand turned about the axes that carry them beyond what droop turns them, by joint."""
     k = model.kinematics
-    told: dict[str, list[Told]] = {}
+    told: dict[str, list[UncertainValue]] = {}
     for e, between in held:
         m = e.take.measurement
         rest = np.array([[m.rest_pose.get(j, 0.0) for j in k.joints]])
@@ -162,7 +156,9 @@ def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]
             seen, drawn = turned(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _drawn(k, s)
             if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
                 turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))
-                told.setdefault(s.joint, []).append(Told(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), ROUGH_TURN))))
+                told.setdefault(s.joint, []).append(
+                    UncertainValue(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), READ_OFF.direction_error)))
+                )
     return {joint: _mean(each) for joint, each in told.items()}
 
 
@@ -172,9 +168,9 @@ def _drawn(k: Kinematics, s: Span) -> Array:
     return across(following.X_PF_p - f.p_BM, f.axis_B, following.axis_of_parent)
 
 
-def _mean(told: Sequence[Told]) -> Told:
+def _mean(told: Sequence[UncertainValue]) -> UncertainValue:
     weights = np.array([t.sigma**-2 for t in told])
     values = np.array([t.value for t in told])
     mean = float(weights @ values / weights.sum())
     scatter = float(np.sqrt(weights @ (values - mean) ** 2 / weights.sum()))
-    return Told(mean, float(np.hypot(weights.sum() ** -0.5, scatter / np.sqrt(len(told)))))
+    return UncertainValue(mean, float(np.hypot(weights.sum() ** -0.5, scatter / np.sqrt(len(told)))))

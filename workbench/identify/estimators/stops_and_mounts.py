@@ -13,22 +13,15 @@ from workbench.compare.channels import ACROSS
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
 from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, smoothed
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-LEAST_CUT = np.deg2rad(1.5)
-"""A stop is asked about where the model goes this much further than the recording ever does, and does then [rad]."""
-AT_STOP = np.deg2rad(0.6)
-"""And where the recording stands this close to its end whenever the model is beyond it [rad]."""
-FURTHEST = 2.0
-"""Times what was cut off, that a stop may have cut off: it was read off."""
-LEAST_TURN = np.deg2rad(0.3)
-"""A marker frame is asked about that is turned by more than this at rest [rad]."""
 
 
-def special(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
+def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """Those that these takes suggest; residuals: of the nominal robot, by take."""
     ill = [channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)]
     out: list[Candidate] = []
@@ -58,13 +51,13 @@ def _stop(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals:
                 continue
             end = float(np.quantile(mean[good], 0.995))
             went[side] = max(went[side], end + rest * side)
-            beyond = good & (said * side > end + LEAST_CUT / 3)
-            if float(np.max(said[good] * side)) - end > LEAST_CUT and beyond.sum() > 5 \
-                    and float(np.median(end - mean[beyond])) < AT_STOP \
-                    and float(np.nanmax(((said - seen) * side)[beyond])) > LEAST_CUT:
+            beyond = good & (said * side > end + READ_OFF.least_cut / 3)
+            if float(np.max(said[good] * side)) - end > READ_OFF.least_cut and beyond.sum() > 5 \
+                    and float(np.median(end - mean[beyond])) < READ_OFF.at_stop \
+                    and float(np.nanmax(((said - seen) * side)[beyond])) > READ_OFF.least_cut:
                 ends[side].append((end + rest * side, float(np.max(said[good] * side)) + rest * side))
     found = {side: (min(e for e, _ in told), max(m for _, m in told)) for side, told in ends.items() if told}
-    found = {side: told for side, told in found.items() if went[side] - told[0] < LEAST_CUT}  # what it passed is no stop
+    found = {side: told for side, told in found.items() if went[side] - told[0] < READ_OFF.least_cut}  # what it passed is no stop
     if not found:
         return []
     far = [stop.parameters[0].low, stop.parameters[1].high]
@@ -74,7 +67,7 @@ def _stop(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals:
         neutral[k], typical[k], held[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
     # its ends do not change sides
     apart = sum(found[side][1] if side in found else went[side] for side in ends) / len(found)
-    furthest = min(apart - LEAST_CUT, FURTHEST * max(reach - end for end, reach in found.values()))
+    furthest = min(apart - READ_OFF.least_cut, READ_OFF.furthest_stop * max(reach - end for end, reach in found.values()))
     return [replace(Candidate.of(stop, (joint,), neutral, typical, held), reach=float(np.rad2deg(furthest)))]
 
 
@@ -113,7 +106,7 @@ def _frames(turned: Effect, model: RobotModel, evidence: Sequence[TakeEvidence])
     for asset in model.rigid_bodies:
         turns = [Rotation.from_quat(e.take.measurement.rest[asset][1], scalar_first=True).as_rotvec() for e in evidence
                  if asset in e.take.measurement.rest]
-        if not turns or min(np.linalg.norm(t) for t in turns) < LEAST_TURN:
+        if not turns or min(np.linalg.norm(t) for t in turns) < READ_OFF.least_asset_turn:
             continue
         turn = np.rad2deg(np.mean(turns, axis=0))
         typical = np.where(np.abs(turn) < 0.2, 1.0, turn)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.session_takes import Progress
-from workbench.identify.conclusions import WORTH_AN_EXPERIMENT, Residuals, change, estimates, value_slopes
+from workbench.identify.conclusions import Residuals, change, estimates, value_slopes
 from workbench.identify.evidence.fit import Asks, Fitted, fitting
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
@@ -21,9 +21,11 @@ from workbench.identify.evidence.region import Region, Rollouts, region_of
 from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.search import Found, lockstep, search, standing, without_names
 from workbench.identify.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury
+from workbench.identify.reasons import LessLikely, SpokenAgainst
+from workbench.identify.rollouts import RolloutEvaluator
 from workbench.identify.ties import Tie
 from workbench.robot import RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
@@ -110,7 +112,7 @@ class Explanation:
                         continue
                     said.add((c.name, c.where))
                     behind = p.best.log_posterior - f.log_posterior
-                    out.append(Rejected(c.name, c.where, f"the likeliest model with it is {behind:.1f} nats behind"))
+                    out.append(Rejected(c.name, c.where, LessLikely(behind)))
         return tuple(out)
 
     def ties(self) -> tuple[Tie, ...]:
@@ -121,7 +123,7 @@ class Explanation:
                 rival = p.rival((c.name, c.where))
                 other = next((f for f, _ in p.weights if rival and rival[0] in {(o.name, o.where) for o in f.hypothesis.effects}
                               and (c.name, c.where) not in {(o.name, o.where) for o in f.hypothesis.effects}), None)
-                if rival is not None and other is not None and rival[1] > WORTH_AN_EXPERIMENT:
+                if rival is not None and other is not None and rival[1] > CONCLUSIONS.worth_an_experiment:
                     hypotheses = [q.best.hypothesis for q in self.posteriors]
                     hypotheses[k] = other.hypothesis
                     out.append(Tie(self.model, self.rollouts.model(hypotheses), rival[1]))
@@ -133,18 +135,18 @@ def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:
     return all(e.take.spec.base == "fixed" and not e.take.recorded.zeroed for e in evidence)
 
 
-def explain(jury: Jury, nominal: RobotModel, pool: Sequence[Candidate], progress: Progress,
+def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Candidate], progress: Progress,
             options: EvidenceOptions | None = None) -> Explanation:
     """Searches each joint's effects by evidence."""
     options = options or EvidenceOptions()
-    whole = jury
-    jury = whole.on(_begun(whole.evidence, options.seconds))
-    evidence = jury.evidence
+    whole = evaluator
+    evaluator = whole.on(_begun(whole.evidence, options.seconds))
+    evidence = evaluator.evidence
     joints = [j for j in nominal.joints if any(j in e.channels for e in evidence)]
     felt = [c for c in pool if c.where != (nominal.base,)]
     asked, refuted = within_registers(felt, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
-    rollouts = Rollouts(jury, nominal, regions, tuple(start(r.numbers) for r in regions))
+    rollouts = Rollouts(evaluator, nominal, regions, tuple(start(r.numbers) for r in regions))
     rollouts, found = search(rollouts, options, progress)
     rejected = list(refuted)
     for _ in range(ROUNDS):
@@ -156,17 +158,16 @@ def explain(jury: Jury, nominal: RobotModel, pool: Sequence[Candidate], progress
             break
         for k, gains in said.items():
             for c, gain in gains.items():
-                rejected.append(Rejected(c.name, c.where, f"takes kept back are {-gain:.0f} nats less likely with it"))
+                rejected.append(Rejected(c.name, c.where, SpokenAgainst(-gain)))
             found = tuple(without_names(f, gains) if i == k else f for i, f in enumerate(found))
         rollouts = standing(rollouts, found)
     progress("numbers at a finer step", None)
-    fine = Jury(whole.evidence, replace(whole.config, time_step=FINE * whole.config.time_step), whole.n_jobs)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
     finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
-    last = lockstep(replace(rollouts, jury=fine, regions=entire), finishing)
+    last = lockstep(replace(rollouts, evaluator=whole, regions=entire, step=FINE), finishing)
     found = tuple(last[k] for k in range(len(found)))
-    whole.rollouts += jury.rollouts + fine.rollouts
+    whole.rollouts += evaluator.rollouts
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     return Explanation(nominal, standing(rollouts, found), found, believed, tuple(rejected), options)
 

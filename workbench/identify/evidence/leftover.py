@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from workbench.identify.conclusions import Residuals, unexplained
 from workbench.identify.findings import Unexplained
 from workbench.identify.ledger import in_file_units
 from workbench.identify.problem import TakeEvidence
+from workbench.identify.reasons import Dependence
 
 Array = NDArray[np.float64]
 EVENT = 0.5
@@ -38,12 +40,14 @@ def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Re
     """Channels beyond noise, numerics and spread, each with its worst event, the largest first. residuals, floors: over sigma."""
     out = []
     for u in unexplained(evidence, residuals, floors):
-        name, _, depends = u.description.partition(": ")
+        if not isinstance(u.description, Dependence):
+            out.append(u)
+            continue
+        name = u.description.take
         i = next(k for k, e in enumerate(evidence) if e.name == name)
         joint = u.where[0] if u.where else ""
         event = _worst(evidence[i], residuals[i], joint) if joint in evidence[i].joints else None
-        said = f"{name}: {depends}" if event is None else f"{name}: {_told(event)}; {depends}"
-        out.append(Unexplained(u.where, u.error, u.floor, u.unit, said))
+        out.append(u if event is None else replace(u, description=replace(u.description, worst=_told(event))))
     return tuple(sorted(out, key=lambda u: -u.error))
 
 

@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
@@ -20,46 +21,46 @@ SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
 
 
-def residuals_of(jury: Jury, questions: Sequence[Question]) -> list[dict[int, Array]]:
-    """As `Jury.residuals`; of logs without shifting their start, which is known."""
-    if not questions or not all(_is_log(jury, i) for q in questions for i in q.takes):
-        return jury.residuals(questions)
-    held = replace(jury.config, base="fixed", settle=SETTLE)
-    with ThreadPoolExecutor(jury.n_jobs) as pool:  # kernels hold no lock
-        return list(pool.map(lambda q: _answer(jury, q, held), questions))
+def residuals_of(evaluator: RolloutEvaluator, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
+    """As `RolloutEvaluator.residuals`; of logs without shifting their start, which is known."""
+    if not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
+        return evaluator.residuals(questions)
+    with ThreadPoolExecutor(evaluator.n_jobs) as pool:  # kernels hold no lock
+        return list(pool.map(lambda q: _answer(evaluator, q), questions))
 
 
-def _answer(jury: Jury, q: Question, held: object) -> dict[int, Array]:
+def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
+    held = replace(evaluator.config, base="fixed", settle=SETTLE, time_step=q.step * evaluator.config.time_step)
     models: dict[str, RobotModel] = {}
     jobs = []
     for i in q.takes:
-        spec = jury.evidence[i].take.spec
+        spec = evaluator.evidence[i].take.spec
         key = repr(sorted(spec.servos.items()))
         models.setdefault(key, q.model.with_servos(spec.servos))
-        jobs.append(_job(jury, i, models[key], held))
+        jobs.append(_job(evaluator, i, models[key], held))
     try:
         angles = servo_angles(jobs)
     except NotCoveredError:
-        return jury.residuals([q])[0]
-    jury.rollouts += len(jobs)
+        return evaluator.residuals([q])[0]
+    evaluator.rollouts += len(jobs)
     out = {}
     for i, q_servo in zip(q.takes, angles):
-        e = jury.evidence[i]
+        e = evaluator.evidence[i]
         columns = [q.model.joints.index(j) for j in e.joints]
         simulated = np.full(e.recorded.shape, np.nan)
         simulated[(e.since >= 0) & (e.since <= e.until)] = q_servo[:, columns]
-        out[i] = (e.recorded - simulated - e.offset) / (e.sigma * e.rough)
+        out[i] = (e.recorded - simulated - (e.offset if q.step >= 1 else 0.0)) / (e.sigma * e.rough)
     return out
 
 
-def _job(jury: Jury, i: int, model: RobotModel, held: object) -> Job:
-    take = jury.evidence[i].take
-    times = jury.evidence[i].since
-    times = times[(times >= 0) & (times <= jury.evidence[i].until)]
-    return Job(model, held, take.commands, float(times[-1]) + 2e-3, 0.1, name=take.spec.name,  # type: ignore[arg-type]
+def _job(evaluator: RolloutEvaluator, i: int, model: RobotModel, held: SimulationConfig) -> Job:
+    take = evaluator.evidence[i].take
+    times = evaluator.evidence[i].since
+    times = times[(times >= 0) & (times <= evaluator.evidence[i].until)]
+    return Job(model, held, take.commands, float(times[-1]) + 2e-3, 0.1, name=take.spec.name,
                times=times, start=take.start_state())
 
 
-def _is_log(jury: Jury, i: int) -> bool:
-    e = jury.evidence[i]
+def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
+    e = evaluator.evidence[i]
     return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints

@@ -15,7 +15,7 @@ from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibr
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -122,12 +122,14 @@ def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: 
 
 @dataclass(frozen=True)
 class Rollouts:
-    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at."""
+    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
+    step: in steps of the search."""
 
-    jury: Jury
+    evaluator: RolloutEvaluator
     nominal: RobotModel
     regions: tuple[Region, ...]
     standing: tuple[Hypothesis, ...]
+    step: float = 1.0
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""
@@ -147,10 +149,10 @@ class Rollouts:
             here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
             hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
             takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
-            questions.append(Question(self.model(hypotheses), takes))
+            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
             shared.append(here)
         out: list[Array] = [np.empty(0)] * len(wants)
-        for here, residuals in zip(shared, residuals_of(self.jury, questions)):
+        for here, residuals in zip(shared, residuals_of(self.evaluator, questions)):
             for region, k in here.items():
                 out[k] = self.regions[region].vector(residuals)
         return out

@@ -12,6 +12,7 @@ from workbench.effects.base import Registers
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.findings import Rejected
 from workbench.identify.parameters import LEAST_SIZE, Candidate
+from workbench.identify.reasons import RefutedByRegister
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
@@ -47,8 +48,7 @@ def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake],
         reach = abs(value - c.neutral[0]) + options.sure * error
         if reach < LEAST_SIZE * abs(c.typical[0] - c.neutral[0]):
             p = c.parameters[0]
-            said = f"the servos' own registers say {p.name} {value:.3g} ± {error:.2g} {p.unit}"
-            refuted.append(Rejected(c.name, c.where, said.rstrip()))
+            refuted.append(Rejected(c.name, c.where, RefutedByRegister(p.name, value, error, p.unit)))
         else:
             kept.append(replace(c, reach=reach))
     return kept, refuted

@@ -9,18 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Slopes
+from workbench.identify.fitting.fits import Fit, Search, Slopes
 from workbench.identify.ledger import in_file_units
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import Jury
+from workbench.identify.reasons import ParameterDrift
+from workbench.identify.rollouts import RolloutEvaluator
 
 Array = NDArray[np.float64]
-CHANGE = 0.25
-"""Share of a number that it changes by from a take's first to its last frame, from which on that is told: two engines, or a robot
-and a model, differ by less."""
-SURE = 5.0
-"""Standard errors of that change that it must be."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +39,7 @@ class Drift:
         channel = joint if joint in e.channels else e.joints[0]
         sigma, unit = in_file_units(float(e.sigma[e.channels.index(channel)]), channel)
         return Unexplained(() if joint is None else (joint,), self.rms * sigma, self.chance * sigma, unit,
-                           f"{p.name} of {self.effect} would have to go from {self.first:.3g} to {self.last:.3g} {p.unit} within "
-                           "a take: something that changes looks like it")
+                           ParameterDrift(self.effect.name, self.effect.where, p.name, self.first, self.last, p.unit))
 
 
 def drifts(search: Search, fit: Fit) -> list[Drift]:
@@ -54,11 +50,11 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     for s in fit.slopes:
         if not set(s.takes) <= set(search.held):
             continue
-        for n, change, error, rms in _trends(search.jury, fit, s):
+        for n, change, error, rms in _trends(search.evaluator, fit, s):
             c, x, k = of_number[n]
             if c.read_off and c.effect.free_play:
                 continue  # a loose mount rattles by chance, and nothing else is seen across an axis
-            if not c.shapes[k] and abs(change) > CHANGE * abs(x[k]):
+            if not c.shapes[k] and abs(change) > FIT.drift * abs(x[k]):
                 way = np.eye(len(x))[k] * change / 2
                 low, high = c.bounds()
                 first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
@@ -66,16 +62,16 @@ def drifts(search: Search, fit: Fit) -> list[Drift]:
     return out
 
 
-def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float, float]]:
+def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float, float]]:
     """Numbers (indices of x) that surely change over a take, by how much, its standard error, and the RMS over sigma that a
     change of one makes."""
-    r = jury.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
+    r = evaluator.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
     clocks = {}
     for i in s.takes:
-        e = jury.evidence[i]
+        e = evaluator.evidence[i]
         clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
-    clock = jury.vector(clocks, "fit", s.joint)
-    _, which = np.unique(jury.stretches(s.takes, "fit", s.joint), return_inverse=True)
+    clock = evaluator.vector(clocks, "fit", s.joint)
+    _, which = np.unique(evaluator.stretches(s.takes, "fit", s.joint), return_inverse=True)
     for n, slope in zip(s.numbers.tolist(), s.J.T):
         z = slope * clock
         z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
@@ -85,5 +81,5 @@ def _trends(jury: Jury, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float
         change = -float(z @ r) / power
         by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
         error = float(np.linalg.norm(by_stretch)) / power
-        if abs(change) >= SURE * error and change**2 * power >= LEAST_GAIN:
+        if abs(change) >= FIT.drift_sure * error and change**2 * power >= FIT.least_gain:
             yield n, change, error, float(np.sqrt(power / int(np.count_nonzero(r))))

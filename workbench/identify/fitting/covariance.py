@@ -8,41 +8,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.fitting.levenberg_marquardt import Solved
-from workbench.identify.rollouts import Jury, take_of
+from workbench.identify.options import FIT
+from workbench.identify.rollouts import RolloutEvaluator, take_of
 
 Array = NDArray[np.float64]
-Z90 = 1.645
-WIDER = 1.3
-"""Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
-engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials held the truth, with 1.3 it is 91 %."""
-TEMPER_WALKING = 60.0
-"""What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of the
-same effect that begin elsewhere end some hundreds apart there."""
-ENGINES = 0.06
-"""Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by that."""
 
 
-def covariance_of(jury: Jury, solved: Solved, takes: tuple[int, ...], joint: str | None = None, bent: bool = True) -> Array:
+def covariance_of(
+    evaluator: RolloutEvaluator, solved: Solved, takes: tuple[int, ...], joint: str | None = None, bent: bool = True
+) -> Array:
     """Of a block's numbers; joint: whose channels tell them, None for all; bent: whether contact bends what walks tell. Infinite
     where nothing depends on a number."""
-    stretches = jury.stretches(takes, "fit", joint)
-    engines = bent * ENGINES * np.abs(solved.x) * _walked(jury, solved, takes, stretches)
-    contact = _bent_by_contact(jury, solved, takes, joint)
-    temper = TEMPER_WALKING if bent and jury.walks(takes) else 1.0
+    stretches = evaluator.stretches(takes, "fit", joint)
+    engines = bent * FIT.contact_error * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
+    contact = _bent_by_contact(evaluator, solved, takes, joint)
+    temper = FIT.overdispersion_free if bent and evaluator.walks(takes) else 1.0
     return np.asarray(_scattered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 
-def _walked(jury: Jury, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
+def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
     """Share of what is known of each number that walks tell."""
-    free = [i for i in takes if jury.walks((i,))]
+    free = [i for i in takes if evaluator.walks((i,))]
     told = np.sum(solved.J**2, axis=0)
     walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
     return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
 
 
-def _bent_by_contact(jury: Jury, solved: Solved, takes: Sequence[int], joint: str | None) -> Array:
+def _bent_by_contact(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], joint: str | None) -> Array:
     """By how much the other contact model would move each number: it is as right as this one, in every stretch alike."""
-    other = jury.vector({i: jury.evidence[i].contact / jury.evidence[i].sigma for i in takes}, "fit", joint)
+    other = evaluator.vector({i: evaluator.evidence[i].contact / evaluator.evidence[i].sigma for i in takes}, "fit", joint)
     scale = np.sqrt(np.sum(solved.J**2, axis=0)) + 1e-9
     return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 

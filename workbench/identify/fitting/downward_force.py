@@ -10,33 +10,30 @@ from numpy.typing import NDArray
 from workbench.effects.base import si_values
 from workbench.identify.findings import Unexplained
 from workbench.identify.fitting.fits import Fit
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
+from workbench.identify.reasons import DownwardPull
 from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
-ASIDE = np.tan(np.deg2rad(15.0))
-"""Share of a pull's weight that it may pull aside by and still is one straight down."""
 STEP = 1e-3
 """Of a size, by which a slope is told."""
 
 
-def hangs(c: Candidate, x: Array) -> bool:
+def pulls_down(c: Candidate, x: Array) -> bool:
     """Whether an effect pulls the base straight down."""
     aside_x, aside_y, up = _pull(c, x)
-    return bool(np.hypot(aside_x, aside_y) < -ASIDE * up)
+    return bool(np.hypot(aside_x, aside_y) < -CONCLUSIONS.aside * up)
 
 
-def hanging(fit: Fit) -> Iterator[Unexplained]:
+def downward_pulls(fit: Fit) -> Iterator[Unexplained]:
     """Pulls straight down, as something that no effect of the vocabulary is: error is the pull, floor its standard deviation."""
     for (c, x), own in zip(fit.sizes(), fit.slices()):
-        if hangs(c, x):
+        if pulls_down(c, x):
             down = -float(_pull(c, x)[2])
             slopes = np.array([-_pull(c, x + step)[2] - down for step in STEP * np.eye(len(x))]) / STEP
             deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
-            yield Unexplained((), down, deviation, "N",
-                              f"the {c.name.replace('_', ' ')} is a pull straight down, with the weight of "
-                              f"{1e3 * down / GRAVITY:.0f} g that does not resist being moved as a load does: something that "
-                              "hangs and swings looks like it")
+            yield Unexplained((), down, deviation, "N", DownwardPull(c.name, down / GRAVITY))
 
 
 def _pull(c: Candidate, x: Array) -> Array:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
 from workbench.identify.fitting.covariance import covariance_of
-from workbench.identify.fitting.levenberg_marquardt import HELD, NEAR, WALKING, WIDE, fit_blocks, lowest, through, together
-from workbench.identify.fitting.responses import Part, Signatures
+from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest, through, together
+from workbench.identify.fitting.responses import Part, ResponseBank
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import FINE, Jury, Question
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -23,16 +24,6 @@ T = TypeVar("T")
 Sizes = list[tuple[Candidate, Array]]
 """Effects, each with its sizes."""
 Report = Callable[[str, float | None], None]
-RESETTLING = 3
-"""Steps of a fit of effects that were settled before."""
-AGAINST = 100.0
-"""Of chi squared on what is fitted of held takes: by how much more they speak against what walks make of a number."""
-LEAST_GAIN = 150.0
-"""Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds that
-is half its noise: engines, and a robot and its model, differ by as much."""
-FINER, FINER_STEPS = 0.5, 3
-"""In search steps, and steps of a fit, for the last slopes of effects of several numbers that walks tell: what a load's height
-does is less than what a coarse step makes of it."""
 
 
 @dataclass(frozen=True)
@@ -104,23 +95,25 @@ class Search:
     as contact bends what walks tell. signatures: what was seen of effects so far, a memory that all searches of a session share.
     """
 
-    def __init__(self, jury: Jury, nominal: RobotModel, settled: Fit | None = None, signatures: Signatures | None = None) -> None:
-        self.jury, self.nominal, self.settled = jury, nominal, settled
-        self.signatures: Signatures = {} if signatures is None else signatures
-        self.takes = tuple(range(len(jury.evidence)))
-        self.fitted = tuple(i for i, e in enumerate(jury.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
-        self.held = tuple(i for i in self.fitted if not jury.walks((i,)))
+    def __init__(
+        self, evaluator: RolloutEvaluator, nominal: RobotModel, settled: Fit | None = None, signatures: ResponseBank | None = None
+    ) -> None:
+        self.evaluator, self.nominal, self.settled = evaluator, nominal, settled
+        self.signatures: ResponseBank = {} if signatures is None else signatures
+        self.takes = tuple(range(len(evaluator.evidence)))
+        self.fitted = tuple(i for i, e in enumerate(evaluator.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
+        self.held = tuple(i for i in self.fitted if not evaluator.walks((i,)))
 
-    def on(self, jury: Jury) -> Search:
+    def on(self, evaluator: RolloutEvaluator) -> Search:
         """The same search on other takes of the session."""
-        return Search(jury, self.nominal, self.settled, self.signatures)
+        return Search(evaluator, self.nominal, self.settled, self.signatures)
 
     def with_settled(self, settled: Fit | None) -> Search:
         """The same search with other effects settled."""
-        return Search(self.jury, self.nominal, settled, self.signatures)
+        return Search(self.evaluator, self.nominal, settled, self.signatures)
 
     @property
-    def lone(self) -> bool:
+    def single_joint(self) -> bool:
         """Whether the robot has one joint, in which all that it lacks acts."""
         return len(self.nominal.joints) == 1
 
@@ -128,38 +121,38 @@ class Search:
         """Whether held takes told its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
 
-    def told_held(self, c: Candidate) -> bool:
+    def told_by_fixed_base(self, c: Candidate) -> bool:
         """The same, or there are no others."""
         return self.is_settled(c) or self.held == self.fitted
 
-    def grounded(self, takes: tuple[int, ...]) -> tuple[int, ...]:
+    def floating_base(self, takes: tuple[int, ...]) -> tuple[int, ...]:
         """Of these takes, those whose base is not held."""
         return tuple(i for i in takes if i not in self.held)
 
     def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
         """Of these takes, those that tell numbers of effects: where some walk these alone, unless an effect is of the whole robot
         or of the cameras; what held takes show of a joint or a link has been asked before."""
-        grounded = self.grounded(takes)
+        floating_base = self.floating_base(takes)
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
-        return grounded if grounded and alone else takes
+        return floating_base if floating_base and alone else takes
 
     def resettled(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
         """`current` with those that are settled, and `more`, fitted anew on held takes, and the search in which these are
         settled: for when one went or another came."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         free = self.with_settled(None)
-        settled = free.retimed(free.refitted(free.evaluated(there), self.held, RESETTLING, range(len(there))))
+        settled = free.with_timing_refitted(free.refitted(free.evaluated(there), self.held, FIT.refit_steps, range(len(there))))
         told = settled.sizes_by_key()
         return self.with_settled(settled), self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
 
-    def retimed(self, current: Fit) -> Fit:
+    def with_timing_refitted(self, current: Fit) -> Fit:
         """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come. As it
         was where held takes speak against that: then walks lack something else."""
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
-        if not timing or not self.grounded(self.fitted):
+        if not timing or not self.floating_base(self.fitted):
             return current
-        fit = self.refitted(current, self.fitted, RESETTLING, timing)
-        if held_gainsay(self, fit, current):
+        fit = self.refitted(current, self.fitted, FIT.refit_steps, timing)
+        if contradicted_by_fixed_base(self, fit, current):
             return current
         numbers = fit.numbers(timing)
         covariance = _with_block(current.covariance, numbers, fit.covariance[np.ix_(numbers, numbers)])
@@ -173,7 +166,7 @@ class Search:
 
     def evaluating(self, *lists: Sequence[tuple[Candidate, Array]]) -> Part[list[Fit]]:
         """Several lists of effects as they are, on all takes, as part of something that goes on beside others."""
-        answers = yield [Question(with_effects(self.nominal, effects), self.takes) for effects in lists]
+        answers = yield [RolloutRequest(with_effects(self.nominal, effects), self.takes) for effects in lists]
         out = []
         for effects, residuals in zip(lists, answers):
             x = np.concatenate([np.empty(0), *(x for _, x in effects)])
@@ -182,7 +175,7 @@ class Search:
 
     def side_by_side(self, parts: Sequence[Part[T]], report: Callable[[float], None] = lambda share: None) -> list[T]:
         """What several parts return; their rollouts share batches."""
-        done = together(dict(enumerate(parts)), lambda wanted: self.jury.residuals([q for _, q in wanted]), report)
+        done = together(dict(enumerate(parts)), lambda wanted: self.evaluator.residuals([q for _, q in wanted]), report)
         return [done[n] for n in range(len(parts))]
 
     def refitted(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None) -> Fit:
@@ -206,18 +199,20 @@ class Search:
                 x[numbers] = there
             return x
 
-        def ask(point: Sequence[Array]) -> Question:
-            return Question(with_effects(self.nominal, current.sizes(sizes(point))), takes, step)
+        def ask(point: Sequence[Array]) -> RolloutRequest:
+            return RolloutRequest(with_effects(self.nominal, current.sizes(sizes(point))), takes, step)
 
         def told(answer: dict[int, Array]) -> list[Array]:
-            return [self.jury.vector(answer, "fit", joint) for joint in blocks]
+            return [self.evaluator.vector(answer, "fit", joint) for joint in blocks]
 
         # several numbers share what a walk shows: a short move of one drowns
-        near = np.concatenate([np.full(c.size, NEAR if c.size == 1 else WALKING) for c in current.effects])[moving]
+        near = np.concatenate([np.full(c.size, FIT.stride_end if c.size == 1 else FIT.stride_free) for c in current.effects])[
+            moving
+        ]
         magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
         start = [current.x[n] for n in blocks.values()]
         answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
-        stride, least = (near, magnitudes) if self.jury.walks(takes) else (HELD, None)
+        stride, least = (near, magnitudes) if self.evaluator.walks(takes) else (FIT.stride_fixed, None)
         bounds = [(low[n], high[n]) for n in blocks.values()]
         fit = fit_blocks(start, told(answer), bounds, iterations, stride, magnitudes=least)
         solved = yield from through(fit, ask, told)
@@ -225,14 +220,14 @@ class Search:
         covariance = np.full((len(x), len(x)), np.inf)
         bent = any(current.effects[i].effect.layer != "timing" for i in moved)
         for s, (joint, numbers) in zip(solved, blocks.items()):
-            covariance[np.ix_(numbers, numbers)] = covariance_of(self.jury, s, takes, joint, bent)
+            covariance[np.ix_(numbers, numbers)] = covariance_of(self.evaluator, s, takes, joint, bent)
         slopes = tuple(Slopes(numbers, takes, s.J, joint) for s, (joint, numbers) in zip(solved, blocks.items()))
         (there,) = yield from self.evaluating(current.sizes(x))
         return self._told_held(replace(there, covariance=covariance, slopes=slopes))
 
     def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
         """Whether an effect shows in the channels of its own joint alone, on these takes."""
-        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.jury.walks(takes)
+        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.evaluator.walks(takes)
 
     def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
         """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves
@@ -267,8 +262,8 @@ class Search:
         before, fit = fit, self._finer(fit)
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
         alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
-        told_held = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
-        takes = self.held if told_held and self.held else self.takes
+        told_by_fixed_base = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
+        takes = self.held if told_by_fixed_base and self.held else self.takes
         points = [fit.x] if alone is None else _around(fit, alone)
         seen = self.finely(fit, takes, *points, *([] if before is fit else [before.x]))
         move, start = self._newton(seen[0]), fit.x.copy()
@@ -285,15 +280,15 @@ class Search:
 
     def _finer(self, fit: Fit) -> Fit:
         """The fit with what walks tell fitted once more in finer steps, where that is more than one number."""
-        if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.grounded(self.fitted):
+        if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.floating_base(self.fitted):
             return fit
-        return self.side_by_side([self.refitting(fit, self.fitted, FINER_STEPS, step=FINER)])[0]
+        return self.side_by_side([self.refitting(fit, self.fitted, FIT.finer_steps, step=FIT.finer)])[0]
 
     def _newton(self, seen: Fit) -> Array:
         """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
         move = np.zeros(len(seen.x))
         for s in seen.slopes:
-            r = self.jury.vector({i: seen.residuals[i] for i in s.takes}, "fit", s.joint)
+            r = self.evaluator.vector({i: seen.residuals[i] for i in s.takes}, "fit", s.joint)
             H = s.J.T @ s.J
             move[s.numbers] = -np.linalg.lstsq(H + 1e-6 * np.diag(np.diag(H) + 1e-12), s.J.T @ r, rcond=None)[0]
         return move
@@ -301,27 +296,27 @@ class Search:
     def floors(self, fit: Fit) -> dict[int, Array]:
         """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
         model = with_effects(self.nominal, fit.sizes())
-        longer = self.jury.residuals([Question(model, self.takes, 2 * FINE)])[0]
-        return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.jury.evidence[i].moving])) for i in self.takes}
+        longer = self.evaluator.residuals([RolloutRequest(model, self.takes, 2 * PROBLEM.fine)])[0]
+        return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.evaluator.evidence[i].moving])) for i in self.takes}
 
     def finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
         """The fit with other sizes, as FINE steps judge it."""
-        asked = [Question(with_effects(self.nominal, fit.sizes(x)), takes, FINE) for x in points]
-        return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.jury.residuals(asked))]
+        asked = [RolloutRequest(with_effects(self.nominal, fit.sizes(x)), takes, PROBLEM.fine) for x in points]
+        return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.evaluator.residuals(asked))]
 
     def _cost(self, residuals: dict[int, Array]) -> dict[str, float]:
-        return {use: self.jury.cost(residuals, use) for use in ("fit", "choose", "validate")}
+        return {use: self.evaluator.cost(residuals, use) for use in ("fit", "choose", "validate")}
 
 
-def gained(jury: Jury, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
+def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
     """By how much less chi squared one fit leaves than another, of one use of some takes."""
-    was, now = (jury.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
+    was, now = (evaluator.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
     return was - now
 
 
-def held_gainsay(search: Search, fit: Fit, other: Fit) -> bool:
+def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
     """Whether held takes speak against a fit, beside another."""
-    return gained(search.jury, fit, other, search.held, "fit") > AGAINST
+    return gained(search.evaluator, fit, other, search.held, "fit") > FIT.against
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
@@ -336,7 +331,7 @@ def _around(fit: Fit, n: int) -> list[Array]:
     """The fit's sizes, and those with number n far on both sides."""
     low, high = fit.bounds()
     x = np.array([fit.x] * 3)
-    x[1:, n] *= 1 + WIDE, 1 / (1 + WIDE)
+    x[1:, n] *= 1 + FIT.wide, 1 / (1 + FIT.wide)
     return list(np.clip(x, low, high))
 
 

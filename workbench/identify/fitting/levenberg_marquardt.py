@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.parameters import LEAST_SIZE
+from workbench.identify.options import FIT
 
 Array = NDArray[np.float64]
 Point = list[Array]
@@ -22,14 +22,6 @@ Left = list[Array]
 """Residual vectors, by block."""
 Asks = Generator[list[Point], list[Left], "list[Solved]"]
 T = TypeVar("T")
-HELD, WALKING, NEAR = 0.15, 0.4, 0.08
-"""Share of a number by which it is moved for a difference: where the base is held, on a walk, and there near the end."""
-WIDE = 0.35
-"""Share of a number by which it is moved where slopes led nowhere or hardly anywhere, and all that was seen lies closer."""
-TINY = 1e-6
-"""Of a number, below which a move tells nothing of slopes."""
-SETTLED = 3e-3
-"""A fit ends where a step takes less than this share off the sum of squares."""
 
 
 @dataclass(frozen=True)
@@ -48,13 +40,20 @@ class Solved:
         return float(self.r @ self.r)
 
 
-def fit_blocks(start: Point, left: Left, bounds: Sequence[tuple[Array, Array]], iterations: int, stride: float | Array = HELD,
-               since: Sequence[Solved] = (), magnitudes: Array | None = None) -> Asks:
+def fit_blocks(
+    start: Point,
+    left: Left,
+    bounds: Sequence[tuple[Array, Array]],
+    iterations: int,
+    stride: float | Array = FIT.stride_fixed,
+    since: Sequence[Solved] = (),
+    magnitudes: Array | None = None,
+) -> Asks:
     """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
     block, one for each number), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
     Walking answers small changes with noise: there strides are long (WALKING). magnitudes: of a lone block, what they are at
     least shares of. since: fits that ended at `start`, and go on."""
-    rough = bool(np.any(np.asarray(stride) != HELD))
+    rough = bool(np.any(np.asarray(stride) != FIT.stride_fixed))
     blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
     for b, s in zip(blocks, since):
         b.J, b.updated, b.damping, b.missed = s.J, True, s.damping, s.missed
@@ -122,7 +121,7 @@ class _Block:
         if not self.open:
             return self.x, self.x
         if self.missed and self._near_sighted:
-            return np.clip(self.x * (1 + WIDE), self.low, self.high), np.clip(self.x / (1 + WIDE), self.low, self.high)
+            return np.clip(self.x * (1 + FIT.wide), self.low, self.high), np.clip(self.x / (1 + FIT.wide), self.low, self.high)
         first, second = (_step(self.x, self.r, self.J, self.damping * k + extra, self.low, self.high)
                          for k, extra in ((1, 0.0), (30, 0.3)))
         bottom = lowest(self.known, self.low, self.high) if self.missed else None
@@ -131,7 +130,7 @@ class _Block:
     @property
     def _near_sighted(self) -> bool:
         """Whether a walk's slopes may be noise and all that was seen of the one number lies close."""
-        return self.rough and len(self.x) == 1 and bool(np.ptp([at[0] for at, _ in self.known]) < WIDE * abs(self.x[0]))
+        return self.rough and len(self.x) == 1 and bool(np.ptp([at[0] for at, _ in self.known]) < FIT.wide * abs(self.x[0]))
 
     def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
         """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
@@ -148,9 +147,9 @@ class _Block:
             return
         there, left_there = tried[best]
         way = there - self.x
-        if way @ way > TINY**2:
+        if way @ way > FIT.tiny**2:
             self.J = self.J + np.outer(left_there - self.r - self.J @ way, way) / (way @ way)
-        settled = before - costs[best] <= SETTLED * before
+        settled = before - costs[best] <= FIT.converged * before
         self.updated, self.missed = True, settled and self._near_sighted
         self.open = self.missed or not settled
         self.damping = self.damping / 3 if best == 0 else min(self.damping * 10, 1.0)
@@ -159,7 +158,7 @@ class _Block:
 
 def steps_of(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None = None) -> Array:
     """By how much each number is moved for a difference: a share `stride` of it, or of `magnitudes`, as far as it may go."""
-    step = stride * np.maximum(np.abs(x), LEAST_SIZE if magnitudes is None else magnitudes)
+    step = stride * np.maximum(np.abs(x), FIT.least_move if magnitudes is None else magnitudes)
     return np.asarray(np.where(x + step <= high, step, -step))
 
 

@@ -11,30 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import Question
+from workbench.identify.rollouts import RolloutRequest
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-Part = Generator[list[Question], list[dict[int, Array]], T]
+Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
 """What a part of a search asks, is answered, and returns."""
 Seen = tuple[list[Array], list[list[Array]], float]
 """Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
-Signatures = dict[tuple[object, ...], Seen]
+ResponseBank = dict[tuple[object, ...], Seen]
 """By group and takes."""
-SCANNED, BETWEEN, SCANNED_GROUND, AROUND = (1.0, 4.0), 2.0, (0.7, 2.0), 2.0
-"""Sizes, in typical ones, at which an effect is looked at before it is fitted, with the base held also between where it may begin
-at any load, as what ends a motor's torque; of a walk, the floor's alone at two sizes, unless walks are all there is, and those of
-several numbers at the last, beyond what a walk makes of anything small."""
-SHAPED = (0.0, 2.0, -2.0)
-"""Doublings, with the base held, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 
 
-def sizes_of(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
+def scan_sizes(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
     """Of the above, for an effect. unheld: whether no take had the base held, where joints show what they lack, however much."""
     if walking and c.effect.layer == "ground":
-        return SCANNED_GROUND
-    return SCANNED[:1] if walking and not unheld else SCANNED
+        return FIT.scanned_ground
+    return FIT.scanned[:1] if walking and not unheld else FIT.scanned
 
 
 def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
@@ -45,17 +40,19 @@ def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
     probes = c.around() if walking else c.probes()
     low, high = c.bounds()
     if len(probes) > 1 or not c.size:
-        return [np.clip(AROUND * p, low, high) for p in probes] if walking else probes
+        return [np.clip(FIT.scanned_around * p, low, high) for p in probes] if walking else probes
     lifts = walking and c.effect.layer == "structure" and low[0] < 0 < high[0]  # of four feet, this one or the others
     ways = (1.0, -1.0) if lifts else (1.0,)
-    shapes = SHAPED if c.shapes.any() and not walking else (0.0,)
+    shapes = FIT.shaped if c.shapes.any() and not walking else (0.0,)
     if not walking and math.isinf(c.neutral[0]):
-        sizes = sorted({*sizes, BETWEEN})
+        sizes = sorted({*sizes, FIT.scanned_between})
     points = [np.clip(w * s * probes[0] + d * c.shapes, low, high) for d in shapes for s in sizes for w in ways]
     return [p for k, p in enumerate(points) if not any(np.allclose(p, other) for other in points[:k])]
 
 
-def guess(c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float) -> tuple[Array, float]:
+def linearised_estimate(
+    c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float
+) -> tuple[Array, float]:
     """Sizes to start from, and how much of the sum of squares signatures say they take away."""
     whole = float(r0 @ r0)
     if not c.size:

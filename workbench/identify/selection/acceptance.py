@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
-from workbench.identify.ledger import GAP_RATIO, channel_gaps
+from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.selection.best_subsets import NEARLY_ALL
-from workbench.identify.selection.record import Round, before_rough, taken
+from workbench.identify.selection.record import SelectionStep, before_rough, taken
 from workbench.identify.selection.scheduling import STANDS_OUT, standing_out
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import CandidateFit
 
 Array = NDArray[np.float64]
 LEAST_WALKING = 300.0
@@ -39,7 +40,7 @@ several, the first may leave much to the next, but a name that leaves half at th
 def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
                ) -> dict[str, float]:
     """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
-    evidence = search.jury.evidence
+    evidence = search.evaluator.evidence
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
@@ -50,11 +51,11 @@ def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...],
 
 def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> Array:
     """By channel of a take, the share that effects may err by, of what they brought from `before` to `now`."""
-    e = search.jury.evidence[take]
+    e = search.evaluator.evidence[take]
     shares = np.full(len(e.channels), share)
-    if not search.jury.walks((take,)):
+    if not search.evaluator.walks((take,)):
         was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
-        parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > GAP_RATIO**2 - 1)
+        parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > PROBLEM.gap_ratio**2 - 1)
         if len(parts) > 1 and parts[-1][0] > STANDS_OUT * parts[-2][0] and parts[-1][1] not in {c.joint for c in now.effects}:
             shares[e.columns(parts[-1][1])] *= ALONE
     return shares
@@ -74,39 +75,39 @@ def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
     return LAST_CLOSED if part else LEAST_CLOSED
 
 
-def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[Round], everywhere: bool = True
+def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep], everywhere: bool = True
                     ) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
     that walks told, and beyond what others, as all with the base held, may err by in each channel. everywhere: of walks, not in
     channels with a gap alone."""
-    jury, left = search.jury, 0.0
-    walks = jury.walks(takes)
+    evaluator, left = search.evaluator, 0.0
+    walks = evaluator.walks(takes)
     before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
     settled = _settling(search, rounds)
     if walks and search.settled is not None and settled:
         before, share = settled[0].before, ROUGH_SHARE
     for i in takes:
-        if channel_gaps(jury.evidence[i], current.residuals[i]):
+        if channel_gaps(evaluator.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
             may_err = _may_err(search, before, current, i, share)
-            left += sum(jury.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
+            left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
-        return left < ALL_CLOSED * LEAST_GAIN
+        return left < ALL_CLOSED * FIT.least_gain
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
     return left < max(LEAST_WALKING, LEFT_SHARE * brought)
 
 
-def _settling(search: Search, rounds: Sequence[Round]) -> list[Round]:
+def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
     """Those in which something was taken that held takes told."""
     return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
 
 
-def worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[Round], current: Fit) -> bool:
+def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds: Sequence[SelectionStep], current: Fit) -> bool:
     """Whether an effect that was fitted beside `current` brings enough."""
-    if t.foretold:
+    if t.screened_out:
         return False
-    walks = search.jury.walks(takes)
-    least = LEAST_WALKING if t.joint is None and walks else LEAST_GAIN * max(1, t.candidate.size)
+    walks = search.evaluator.walks(takes)
+    least = LEAST_WALKING if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
     if t.joint is not None and t.closed > NEARLY_ALL:
         least *= ALL_CLOSED
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
@@ -123,18 +124,18 @@ def worthwhile(search: Search, t: Trial, takes: Sequence[int], rounds: Sequence[
     return gain > least
 
 
-def _beyond_error(search: Search, t: Trial, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
+def _beyond_error(search: Search, t: CandidateFit, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
     """An effect's gain less what those that led from `before` to `now` may err by, this share of what they brought channel by
     channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
     here = search.telling([t.candidate], tuple(takes))
-    was, left = (search.jury.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
-    evidence = search.jury.evidence
+    was, left = (search.evaluator.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
+    evidence = search.evaluator.evidence
     shares = np.concatenate([_may_err(search, before, now, i, share)[evidence[i].columns(t.joint)] for i in sorted(here)])
     may_err = shares * np.maximum(was - left, 0.0)
     return float(np.sum(np.where(t.by_channel > 0, np.maximum(t.by_channel - may_err, 0.0), t.by_channel)))
 
 
-def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
+def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
     that was judged or stood out; on held takes alone, where they told it. Of a joint that walks tell, its own gap, if it has
     one, counts as much as all that follows from it, and not what is left to the effects of others."""
@@ -143,17 +144,17 @@ def completed(search: Search, r: Round, t: Trial, now: Fit) -> float:
     takes = search.held if search.is_settled(t.candidate) else search.fitted
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
     if t.joint is not None or joint is None or outstanding:
-        return search.jury.closed(before, after, "choose", joint if outstanding else t.joint)
+        return search.evaluator.closed(before, after, "choose", joint if outstanding else t.joint)
     others = {c.joint for c in now.effects if c.joint is not None} - {joint}
-    everywhere = search.jury.closed(before, after, "choose", without=others)
-    return max(everywhere, (everywhere + search.jury.closed(before, after, "choose", joint)) / 2)
+    everywhere = search.evaluator.closed(before, after, "choose", without=others)
+    return max(everywhere, (everywhere + search.evaluator.closed(before, after, "choose", joint)) / 2)
 
 
 def idle(search: Search, fit: Fit) -> list[Candidate]:
     """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for.
     fit: as fine steps judge it."""
     walked = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
-    if not walked or not search.grounded(search.fitted):
+    if not walked or not search.floating_base(search.fitted):
         return []
     points = np.tile(fit.x, (len(walked), 1))
     for x, (_, own) in zip(points, walked):

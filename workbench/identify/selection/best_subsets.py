@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search, Sizes
+from workbench.identify.fitting.fits import Fit, Search, Sizes
 from workbench.identify.fitting.responses import Part
-from workbench.identify.selection.record import Round
-from workbench.identify.selection.screening import Trial
+from workbench.identify.options import FIT
+from workbench.identify.selection.record import SelectionStep
+from workbench.identify.selection.screening import CandidateFit
 
 Array = NDArray[np.float64]
 NEARLY_ALL = 0.9
@@ -39,7 +40,7 @@ where others must take one's place. It ends where little changes."""
 class Seen:
     """What an effect does to what is fitted in a joint: signatures (m, k), each at the sizes in a row of points (k, n)."""
 
-    trial: Trial
+    trial: CandidateFit
     signatures: Array
     points: Array
 
@@ -55,21 +56,23 @@ class Seen:
         return np.asarray(np.linalg.lstsq(self.points[:, makes].T, x[makes], rcond=None)[0], dtype=float)
 
 
-def companies(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str) -> list[list[Trial]]:
+def subsets_for(
+    search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], joint: str
+) -> list[list[CandidateFit]]:
     """Sets of effects that, as signatures foretell it, explain a joint far better than fewer do, with sizes to begin from.
 
     trials: of a race beside `current` on these takes, whose base is held.
     """
     known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
     until = min((looked[2] for _, looked in known), default=np.inf)
-    base = search.jury.early({i: current.residuals[i] for i in takes}, until)
+    base = search.evaluator.early({i: current.residuals[i] for i in takes}, until)
     rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
-    r0 = search.jury.vector(base, "fit", joint)[rows[joint]]
+    r0 = search.evaluator.vector(base, "fit", joint)[rows[joint]]
     seen = [s for t, (points, did, _) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
     return _best_sets(seen, r0) if seen else []
 
 
-def _signatures(search: Search, t: Trial, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
+def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
     """Sizes at which a candidate was looked at, what each did, and for how long it was looked at [s]."""
     for name, (points, seen, until) in search.signatures.items():
         if name[-1] == takes and t.candidate.key in name[:-1]:
@@ -83,13 +86,13 @@ def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, ju
     """Of the vector of the channels of `judged` (None: of all), what is of a joint, and was looked at."""
     inside = {}
     for i in takes:
-        e = search.jury.evidence[i]
+        e = search.evaluator.evidence[i]
         inside[i] = np.zeros_like(current.residuals[i])
         inside[i][np.ix_(e.since <= until, e.columns(joint))] = 1.0
-    return search.jury.vector(inside, "fit", judged) != 0
+    return search.evaluator.vector(inside, "fit", judged) != 0
 
 
-def variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[Seen]:
+def variants(t: CandidateFit, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[Seen]:
     """An effect of several numbers, each seen alone; of one, as it was seen at each size."""
     c = t.candidate
     if not c.size or not len(points):
@@ -101,19 +104,19 @@ def variants(t: Trial, points: Sequence[Array], signatures: Sequence[Array]) -> 
         yield Seen(t, v[:, None], p[None])
 
 
-def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[Trial]]:
-    lines = _Lines(seen, r0)
+def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
+    lines = _NormalEquations(seen, r0)
     best = lines.whole
-    out: list[list[Trial]] = []
+    out: list[list[CandidateFit]] = []
     for size in (1, *SIZES):
-        sets: dict[frozenset[object], tuple[float, list[Trial]]] = {}
+        sets: dict[frozenset[object], tuple[float, list[CandidateFit]]] = {}
         for which in combinations(range(len(seen)), size):
             name = frozenset(seen[k].trial.candidate.key for k in which)
             if len(name) < size:
                 continue
             left, x = lines.lowest(which)
             if (name not in sets or left < sets[name][0]) and all(possible(seen[k], there) for k, there in zip(which, x)):
-                sets[name] = left, [replace(seen[k].trial, x=there, foretold=False) for k, there in zip(which, x)]
+                sets[name] = left, [replace(seen[k].trial, x=there, screened_out=False) for k, there in zip(which, x)]
         ranked = sorted(sets.values(), key=lambda s: s[0])
         if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
             break
@@ -123,8 +126,8 @@ def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[Trial]]:
     return out
 
 
-class _Lines:
-    """Signatures added up: what is missing, r0, less what they do in shares of what was seen."""
+class _NormalEquations:
+    """ResponseBank added up: what is missing, r0, less what they do in shares of what was seen."""
 
     def __init__(self, seen: Sequence[Seen], r0: Array) -> None:
         A = np.concatenate([s.signatures for s in seen], axis=1)
@@ -155,18 +158,18 @@ def worst_joint(beyond: dict[str, float]) -> str | None:
     return None if worst is None else joint_of(worst)
 
 
-def several(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
-            ) -> list[list[Trial]]:
+def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
+            ) -> list[list[CandidateFit]]:
     """Sets of effects for the joint that errs most, where the base is held and no single one is most of it."""
     joint = worst_joint(beyond)
-    if joint is None or search.jury.walks(takes):
+    if joint is None or search.evaluator.walks(takes):
         return []
     if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
         return []
-    return companies(search, current, trials, takes, joint)
+    return subsets_for(search, current, trials, takes, joint)
 
 
-def fitted_beside(search: Search, current: Fit, added: Sequence[Trial], takes: tuple[int, ...], steps: int) -> Part[Fit]:
+def fitted_beside(search: Search, current: Fit, added: Sequence[CandidateFit], takes: tuple[int, ...], steps: int) -> Part[Fit]:
     """All effects fitted together, when some were added."""
     return (yield from _fitted_from(search, [*current.sizes(), *((t.candidate, t.x) for t in added)], takes, steps))
 
@@ -183,16 +186,16 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
               for c, x in fit.sizes() if c.shapes.any() for share, doublings in AGAIN]
     if not starts:
         return fit
-    best = min(search.side_by_side([_fitted_from(search, sizes, takes, MOST_STEPS) for sizes in starts]), key=priced)
-    return search.refitted(best, takes, steps) if priced(best) < HALF * priced(fit) else fit
+    best = min(search.side_by_side([_fitted_from(search, sizes, takes, MOST_STEPS) for sizes in starts]), key=penalised_cost)
+    return search.refitted(best, takes, steps) if penalised_cost(best) < HALF * penalised_cost(fit) else fit
 
 
-def priced(fit: Fit) -> float:
+def penalised_cost(fit: Fit) -> float:
     """What a fit leaves on the choosing stretches, and what its numbers have to bring."""
-    return fit.cost["choose"] + LEAST_GAIN * len(fit.x)
+    return fit.cost["choose"] + FIT.least_gain * len(fit.x)
 
 
-def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]) -> list[Round]:
+def selection_steps(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[CandidateFit]]]) -> list[SelectionStep]:
     """A round for each of the effects that are taken together, the first of `sets`, which were fitted; its rivals those with
     which another set has it replaced."""
     best, chosen = sets[0]
@@ -208,5 +211,5 @@ def seated(search: Search, current: Fit, sets: Sequence[tuple[Fit, list[Trial]]]
             if len(others) == len(chosen) and len(new) == 1 and t.candidate.key not in {o.candidate.key for o in others}:
                 theirs = {use: gain[use] - fit.cost[use] + best.cost[use] for use in gain}
                 trials.append(replace(new[0], x=fit.sizes_by_key()[new[0].candidate.key], gain=theirs, joint=t.joint))
-        out.append(Round(current, tuple(trials), (trials[0],)))
+        out.append(SelectionStep(current, tuple(trials), (trials[0],)))
     return out

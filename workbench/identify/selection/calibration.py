@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.downward_force import hangs
+from workbench.identify.fitting.downward_force import pulls_down
 from workbench.identify.fitting.fits import Fit, Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
-from workbench.identify.selection.model_comparison import LEAST, Standing
+from workbench.identify.selection.model_comparison import LEAST, NamePosterior
 from workbench.identify.selection.scheduling import FEW
 
 Array = NDArray[np.float64]
@@ -38,17 +38,17 @@ NOTHING = 3.0
 2.7, true ones come to 3.3 and more."""
 
 
-def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Mapping[int, Array],
-            changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[Standing]:
+def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
+            changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[NamePosterior]:
     """Standings less sure where held takes, which told the effect, leave much at its place, or want its numbers to change; of the
     whole robot at joints that no other effect is to answer for, or at its only one; where a floor is nearly the model's, a number
     as far as it may go, or nearly nothing; where it, or about as likely a rival, pulls straight down; where in fine steps it is
     `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.held if i in floors
-            for channel, r in ratios(search.jury.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
-    out, theirs = [], set() if search.lone else {c.joint for c in fit.effects}
-    for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), standings):
-        worst = _left_at(c, left, theirs) if search.told_held(c) else 0.0
+            for channel, r in ratios(search.evaluator.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
+    out, theirs = [], set() if search.single_joint else {c.joint for c in fit.effects}
+    for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), posteriors):
+        worst = _left_at(c, left, theirs) if search.told_by_fixed_base(c) else 0.0
         factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
         if c.read_off and c.effect.free_play:
             factor = max(factor, RATTLES)
@@ -57,7 +57,7 @@ def doubted(search: Search, fit: Fit, standings: Sequence[Standing], floors: Map
         slight = (_hardly_another_floor(c, x) or _at_its_limit(c, x)
                   or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes) or _may_hang(c, x, s))
         factor *= LEAST if c in idle else HARDLY if slight else 1.0
-        out.append(Standing(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
+        out.append(NamePosterior(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
 
 
@@ -87,12 +87,14 @@ def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
 
 
-def _may_hang(c: Candidate, x: Array, s: Standing) -> bool:
+def _may_hang(c: Candidate, x: Array, s: NamePosterior) -> bool:
     """Whether an effect, or a rival about as likely, pulls straight down."""
-    return hangs(c, x) or any(hangs(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability)
+    return pulls_down(c, x) or any(
+        pulls_down(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability
+    )
 
 
-def _becomes(c: Candidate, s: Standing) -> bool:
+def _becomes(c: Candidate, s: NamePosterior) -> bool:
     """Whether what an effect is at its end stands beside it: of a load that weighs nothing, a centre of mass elsewhere."""
     return any(r.candidate.key == (c.effect.reduces_to, c.where) for r in s.rivals)
 

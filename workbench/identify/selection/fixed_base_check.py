@@ -5,29 +5,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.fitting.fits import Fit, Search, gained, held_gainsay
+from workbench.identify.fitting.fits import Fit, Search, contradicted_by_fixed_base, gained
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.best_subsets import NEARLY_ALL
 
 
-def heard(search: Search, current: Fit, told: Sequence[Candidate]) -> tuple[Search, Fit]:
+def checked_on_fixed_base(search: Search, current: Fit, told: Sequence[Candidate]) -> tuple[Search, Fit]:
     """The fit with such numbers of effects that walks have just told as held takes tell them, and the search in which these are
     settled; as it was where walks then show less of them, or held takes want none at all."""
     if not search.held:
         return search, current
     for c in told:
         if c.where and c.size and not c.read_off and c.effect.layer != "ground" and not search.is_settled(c):
-            search, current = _heard(search, current, c)
+            search, current = _checked(search, current, c)
     return search, current
 
 
-def _heard(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
-    held, walks = search.held, search.grounded(search.fitted)
+def _checked(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
+    held, walks = search.held, search.floating_base(search.fitted)
     without = search.evaluated(current.sizes_without(c.key))
-    if not held_gainsay(search, current, without):
+    if not contradicted_by_fixed_base(search, current, without):
         return search, current
     settled, fit = search.resettled(current, c)
-    walking = [gained(search.jury, without, there, walks, "fit") for there in (fit, current)]
-    if gained(search.jury, without, fit, held, "fit") > 0 and walking[0] > NEARLY_ALL * walking[1]:
+    walking = [gained(search.evaluator, without, there, walks, "fit") for there in (fit, current)]
+    if gained(search.evaluator, without, fit, held, "fit") > 0 and walking[0] > NEARLY_ALL * walking[1]:
         return settled, fit
     return search, current

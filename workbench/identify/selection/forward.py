@@ -12,19 +12,20 @@ from functools import partial
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.estimators.dropped_again import Played, read_anew
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Report, Search
+from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
+from workbench.identify.fitting.fits import Fit, Report, Search
 from workbench.identify.ledger import channel_gaps
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.acceptance import (
     ALL_CLOSED,
     LAST_CLOSED,
     LEAST_CLOSED,
     LEAST_WALKING,
+    is_acceptable,
     least_closed,
     remaining,
     too_little_left,
-    worthwhile,
 )
 from workbench.identify.selection.backward import without_idle, without_part_answers
 from workbench.identify.selection.best_subsets import (
@@ -32,16 +33,16 @@ from workbench.identify.selection.best_subsets import (
     MOST_STEPS,
     NEARLY_ALL,
     fitted_beside,
-    priced,
-    seated,
+    penalised_cost,
+    selection_steps,
 )
-from workbench.identify.selection.fixed_base_check import heard
-from workbench.identify.selection.pair_move import in_two
-from workbench.identify.selection.record import Chosen, Round, before_rough
-from workbench.identify.selection.reevaluation import weighed_anew
+from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
+from workbench.identify.selection.pair_move import with_pair
+from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
+from workbench.identify.selection.reevaluation import reevaluated
 from workbench.identify.selection.scheduling import FEW, TIERS, TIERS_OF_ALL, asked, standing_out
-from workbench.identify.selection.screening import Trial, tried
-from workbench.identify.selection.single_joint import lone_round, set_right, together
+from workbench.identify.selection.screening import CandidateFit, tried
+from workbench.identify.selection.single_joint import set_right, single_joint_step, together
 
 MOST_ROUNDS = 6
 """With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
@@ -67,30 +68,30 @@ ALIKE = 0.25
 """Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
 
 
-def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: Played | None = None
-           ) -> Chosen:
+def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
+           ) -> SelectionResult:
     """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
     left out of what is played; read anew by what held takes told."""
     current = nominal = search.evaluated([])
-    rounds: list[Round] = []
-    work = MOST_WORK_LONE if search.lone else MOST_WORK
-    most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.jury.seconds)
+    rounds: list[SelectionStep] = []
+    work = MOST_WORK_LONE if search.single_joint else MOST_WORK
+    most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.evaluator.seconds)
     if search.held:
         search, current, rounds = _phase(search, pool, current, search.held, rounds, report, most)
     if current.effects and played is not None:
         report("looking anew", None)
         begun = search
-        search, played = read_anew(search, current, played)
+        search, played = reestimated(search, current, played)
         if search is not begun:
             rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
             current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, REPLAYED_STEPS)
         nominal = search.evaluated([])
     if search.held != search.fitted:
-        current = search.retimed(current)
+        current = search.with_timing_refitted(current)
         search = search.with_settled(current)
         closed = least_closed(search, nominal, current)
         search, current, rounds = _phase(search, pool, current, search.fitted, rounds, report, most, closed)
-        current, rounds = in_two(search, pool, current, rounds, report)
+        current, rounds = with_pair(search, pool, current, rounds, report)
     kept = without_part_answers(search, current, rounds)
     if len(kept.effects):
         report("fitting together", None)
@@ -99,36 +100,38 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
             search, kept = search.resettled(kept)
         if kept is not current or _may_go_on(search, kept):
             kept = search.refitted(kept, search.fitted, LAST_STEPS)
-    return Chosen(search, kept, tuple(rounds), played.missed if played else ())
+    return SelectionResult(search, kept, tuple(rounds), played.missed if played else ())
 
 
 def _may_go_on(search: Search, fit: Fit) -> bool:
     """Whether a fit may not have come to its end: where walks still show a gap, as fits of several numbers begin in coarse steps,
     and of a lone joint, where all acts alike and valleys are long."""
-    return search.lone or any(channel_gaps(search.jury.evidence[i], fit.residuals[i]) for i in search.grounded(search.fitted))
+    return search.single_joint or any(
+        channel_gaps(search.evaluator.evidence[i], fit.residuals[i]) for i in search.floating_base(search.fitted)
+    )
 
 
-def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[Round],
-           report: Report, most_work: float, closed: float = LEAST_CLOSED) -> tuple[Search, Fit, list[Round]]:
+def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep],
+           report: Report, most_work: float, closed: float = LEAST_CLOSED) -> tuple[Search, Fit, list[SelectionStep]]:
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, rounds = False, list(rounds)
-    least = LEAST_WALKING if search.jury.walks(takes) else ALL_CLOSED * LEAST_GAIN
+    least = LEAST_WALKING if search.evaluator.walks(takes) else ALL_CLOSED * FIT.least_gain
     for _ in range(MOST_ROUNDS):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
         if stopped or not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
-        if not search.jury.walks(takes) and search.lone and search.jury.work <= most_work:
-            current, seats = lone_round(search, pool, current, beyond, takes, say)
+        if not search.evaluator.walks(takes) and search.single_joint and search.evaluator.work <= most_work:
+            current, seats = single_joint_step(search, pool, current, beyond, takes, say)
             rounds += seats
             if seats:
                 continue
-        trials: list[Trial] = []
+        trials: list[CandidateFit] = []
         likely = pool
         for tier in range(TIERS_OF_ALL if closed > LEAST_CLOSED else TIERS):
-            stopped = search.jury.work > most_work
+            stopped = search.evaluator.work > most_work
             if stopped:
                 break
             groups, on = asked(search, likely, current, beyond, takes, tier)
@@ -138,74 +141,76 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
             said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
                                      or _is_of_all(search, current, trials[0], takes, beyond))
-            if said and (tier + 1 >= TIERS_OF_ALL or worthwhile(search, trials[0], takes, rounds, current)):
+            if said and (tier + 1 >= TIERS_OF_ALL or is_acceptable(search, trials[0], takes, rounds, current)):
                 if not _tips(search, trials[0], takes, tier):
                     break
                 likely = [c for c in pool if c.effect.moves_center]
-        worth = [t for t in trials if t.closed > closed and worthwhile(search, t, takes, rounds, current)]
+        worth = [t for t in trials if t.closed > closed and is_acceptable(search, t, takes, rounds, current)]
         choices = _accepted(worth)
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
-        after, accepted = min(zip(fits, choices), key=lambda f: priced(f[0]), default=(current, []))
+        after, accepted = min(zip(fits, choices), key=lambda f: penalised_cost(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
-        seats = [Round(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)]
+        seats = [
+            SelectionStep(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)
+        ]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
         of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
         sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
-        if sets and priced(sets[0][0]) < HALF * priced(after):
+        if sets and penalised_cost(sets[0][0]) < HALF * penalised_cost(after):
             after = sets[0][0]
-            seats = [replace(seats[0], accepted=()), *seated(search, current, sets)]
+            seats = [replace(seats[0], accepted=()), *selection_steps(search, current, sets)]
         rounds += seats
         if after is current:
             break
         current = after
-        if search.jury.walks(takes):
-            search, current = heard(search, current, [t.candidate for t in accepted])
+        if search.evaluator.walks(takes):
+            search, current = checked_on_fixed_base(search, current, [t.candidate for t in accepted])
         else:
-            current, rounds = weighed_anew(search, current, rounds, takes)
-    if search.jury.walks(takes):
-        current, rounds = weighed_anew(search, current, rounds, takes)
-    elif search.lone and search.jury.work <= most_work:
+            current, rounds = reevaluated(search, current, rounds, takes)
+    if search.evaluator.walks(takes):
+        current, rounds = reevaluated(search, current, rounds, takes)
+    elif search.single_joint and search.evaluator.work <= most_work:
         current, seats = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
         rounds = seats or rounds
     return search, current, rounds
 
 
-def _says_it(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+def _says_it(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
-    surely = tier < TIERS_OF_ALL or not search.jury.walks(takes)
+    surely = tier < TIERS_OF_ALL or not search.evaluator.walks(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
         return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
     if not surely:
         return t.closed > ENOUGH
-    return t.closed > (NEARLY_ALL_WALKING if search.jury.walks(takes) else NEARLY_ALL)
+    return t.closed > (NEARLY_ALL_WALKING if search.evaluator.walks(takes) else NEARLY_ALL)
 
 
-def _tips(search: Search, t: Trial, takes: tuple[int, ...], tier: int) -> bool:
+def _tips(search: Search, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether centres of mass of links that are asked last are not to be passed over: they tip a robot on the ground as the best
     so far does. A load there, with a number more, does so wherever it hangs, which tells nothing."""
-    return search.jury.walks(takes) and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia"
+    return search.evaluator.walks(takes) and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia"
 
 
-def _is_of_all(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
+def _is_of_all(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
     """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
     common, whatever more one of them lacks."""
     joints = {joint_of(c) for c in beyond if c not in BODY}
-    if t.candidate.where or len(joints) <= FEW or search.jury.walks(takes):
+    if t.candidate.where or len(joints) <= FEW or search.evaluator.walks(takes):
         return False
     return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > NEARLY_ALL
 
 
-def _closed_at(search: Search, current: Fit, t: Trial, takes: tuple[int, ...], joint: str | None) -> float:
+def _closed_at(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], joint: str | None) -> float:
     """Share of what is beyond noise in a joint that an effect judged by all channels takes away."""
     if not len(t.by_channel):
         return 0.0
     here = search.telling([t.candidate], takes)
-    cost, expected = search.jury.by_channel({i: current.residuals[i] for i in here}, "choose")
-    own = np.concatenate([np.isin(e.columns(), e.columns(joint)) for e in (search.jury.evidence[i] for i in here)])
+    cost, expected = search.evaluator.by_channel({i: current.residuals[i] for i in here}, "choose")
+    own = np.concatenate([np.isin(e.columns(), e.columns(joint)) for e in (search.evaluator.evidence[i] for i in here)])
     return float(np.sum(t.by_channel[own]) / max(1.0, np.sum(np.maximum(cost - expected, 0.0)[own])))
 
 
-def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
+def _accepted(worth: Sequence[CandidateFit]) -> list[list[CandidateFit]]:
     """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
     robot's the best, but not what leaves half where another closes nearly all. Where a race does not tell who is ahead, each of
     them to be fitted."""
@@ -220,7 +225,7 @@ def _accepted(worth: Sequence[Trial]) -> list[list[Trial]]:
     shown = next((t for t in worth if t.candidate.read_off and t.joint == best.joint
                   and t.gain["choose"] > HALFWAY * best.gain["choose"]), None)
     best = shown or best
-    elsewhere: list[Trial] = []
+    elsewhere: list[CandidateFit] = []
     for t in worth:
         alike = t.gain["choose"] > ALIKE * best.gain["choose"] or t.closed > NEARLY_ALL
         if alike and t.joint not in {None, best.joint, *(o.joint for o in elsewhere)}:

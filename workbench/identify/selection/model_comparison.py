@@ -9,18 +9,17 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.findings import SUREST
-from workbench.identify.fitting.covariance import TEMPER_WALKING
 from workbench.identify.fitting.fits import Fit, Report, Search, gained
 from workbench.identify.fitting.responses import Part
+from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.parameters import Candidate, Key
-from workbench.identify.selection.acceptance import completed
+from workbench.identify.selection.acceptance import explained_at_the_end
 from workbench.identify.selection.forward import CLOSE, MOST_RIVALS
-from workbench.identify.selection.record import Chosen, Round
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.record import SelectionResult, SelectionStep
+from workbench.identify.selection.screening import CandidateFit
 
 Array = NDArray[np.float64]
-Seats = dict[Key, tuple[Round, Trial]]
+Seats = dict[Key, tuple[SelectionStep, CandidateFit]]
 """By effect, when it was taken and on what."""
 TEMPER = 4.0
 """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where walks do not
@@ -68,15 +67,16 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Standing:
+class NamePosterior:
     """A finding's probability and its rivals, the likeliest first."""
 
     probability: float
     rivals: tuple[Rival, ...]
 
 
-def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[Standing]]:
-    """The effects that stay, and the standing of each: a rival that does better in an effect's place takes it."""
+def compare_models(search: Search, chosen: SelectionResult, report: Report) -> tuple[Search, Fit, list[NamePosterior]]:
+    """The effects that stay, and how probable each is: a rival that does better in an effect's place takes it. The search as it
+    is then."""
     fit = chosen.fit
     seats: Seats = {t.candidate.key: (r, t) for r in chosen.rounds for t in r.accepted}
     for turn in range(len(fit.effects) + 1):
@@ -94,12 +94,12 @@ def contest(search: Search, chosen: Chosen, report: Report) -> tuple[Fit, list[S
         r, _ = seats[replaced.key]
         seats[best.effects[-1].key] = r, next(t for t in r.trials if t.candidate.key == best.effects[-1].key)
         if search.is_settled(replaced):
-            best = search.resettled(best, best.effects[-1])
+            search, best = search.resettled(best, best.effects[-1])
         fit = search.refitted(best, search.fitted, STEPS)
-    return fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
+    return search, fit, [_standing(search, fit, i, there, seats) for i, there in enumerate(rivals)]
 
 
-def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> Standing:
+def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Seats) -> NamePosterior:
     taken = seats[fit.effects[i].key][1]
     walked = _walked(search, fit.effects[i], taken)
     temper = _temper(search, fit, fit.effects[i], taken)
@@ -107,11 +107,11 @@ def _standing(search: Search, fit: Fit, i: int, rivals: Sequence[Fit], seats: Se
     twins = np.array([False, *(_twin(search, fit, i, r) if walked else _outbid(search, fit, i, r) for r in rivals)])
     weight = np.maximum(np.exp(0.5 * (leads - leads.max()) / temper), np.where(twins, TWIN, 0.0))
     p = weight / weight.sum()
-    closed = completed(search, *seats[fit.effects[i].key], fit)
-    sure = SUREST * next((factor for share, factor in CLOSED if closed >= share), LEAST)
+    closed = explained_at_the_end(search, *seats[fit.effects[i].key], fit)
+    sure = CONCLUSIONS.surest * next((factor for share, factor in CLOSED if closed >= share), LEAST)
     told = [Rival(r.effects[-1], r.x[r.slices()[-1]], float(r.cost["choose"] - fit.cost["choose"]), float(q) * sure, r)
             for r, q in zip(rivals, p[1:])]
-    return Standing(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
+    return NamePosterior(float(p[0]) * sure, tuple(sorted(told, key=lambda r: -r.probability)))
 
 
 def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
@@ -121,15 +121,15 @@ def _twin(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
     return -_better(search, fit, rival, search.held) < BETTER * _misfit(search, fit)
 
 
-def _walked(search: Search, c: Candidate, taken: Trial) -> bool:
+def _walked(search: Search, c: Candidate, taken: CandidateFit) -> bool:
     """Whether walks tell an effect."""
-    return taken.joint is None and search.jury.walks(search.fitted) and not search.is_settled(c)
+    return taken.joint is None and search.evaluator.walks(search.fitted) and not search.is_settled(c)
 
 
-def _temper(search: Search, fit: Fit, c: Candidate, taken: Trial) -> float:
+def _temper(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> float:
     """What leads of an effect's rivals are divided by when they become probabilities."""
     if _walked(search, c, taken):
-        return max(TEMPER_WALKING, ROUGH * taken.gain["choose"]) * _misfit(search, fit)
+        return max(FIT.overdispersion_free, ROUGH * taken.gain["choose"]) * _misfit(search, fit)
     return TEMPER * _misfit(search, fit, taken.joint)
 
 
@@ -138,12 +138,12 @@ def _misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
     alone would have them chi squared differences are left to chance. joint: that was judged alone with the base held, and does
     not feel what goes wrong elsewhere."""
     if joint is None:
-        return max(1.0, fit.cost["choose"] / max(1.0, search.jury.expected(search.fitted, "choose")))
-    left, expected = search.jury.by_channel({i: fit.residuals[i] for i in search.held}, "choose", joint)
+        return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected(search.fitted, "choose")))
+    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.held}, "choose", joint)
     return max(1.0, float(left.sum()) / max(1.0, float(expected.sum())))
 
 
-def _lead(search: Search, fit: Fit, rival: Fit, taken: Trial) -> float:
+def _lead(search: Search, fit: Fit, rival: Fit, taken: CandidateFit) -> float:
     """By how much a fit with a rival in an effect's place is better, of chi squared, numbers priced."""
     price = max(NUMBER, NUMBER_SHARE * taken.gain["choose"])
     own = [c.key for c in rival.effects]
@@ -176,13 +176,13 @@ def _by_both(of: Mapping[str, float]) -> float:
 
 def _better_held(search: Search, fit: Fit, rival: Fit) -> float:
     """By how much a rival of an effect that held takes told is better: these take the word first."""
-    walks = _better(search, fit, rival, search.grounded(search.fitted)) * TEMPER / TEMPER_WALKING
+    walks = _better(search, fit, rival, search.floating_base(search.fitted)) * TEMPER / FIT.overdispersion_free
     return _better(search, fit, rival, search.held) + float(np.clip(walks, -WALKS_SAY, WALKS_SAY))
 
 
 def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
     """How much less chi squared a rival leaves on these takes."""
-    return gained(search.jury, fit, rival, takes, "choose")
+    return gained(search.evaluator, fit, rival, takes, "choose")
 
 
 def _told(fit: Fit, i: int) -> int:
@@ -192,7 +192,7 @@ def _told(fit: Fit, i: int) -> int:
     return told or fit.effects[i].size
 
 
-def _near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[Trial]:
+def _near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[CandidateFit]:
     """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end; where
     walks tell it, what moves another link's centre of mass, which tips the robot as much once it is fitted to its end."""
     r, trial = seats[c.key]
@@ -204,11 +204,11 @@ def _near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candida
         alike.add((c.effect.reduces_to, c.where))
     tips = _walked(search, c, trial) and c.effect.layer == "inertia"
     always = [t for t in there if t.candidate.key in alike
-              or (tips and not t.foretold and t.candidate.effect.moves_center and t.candidate.where != c.where)]
-    return always + [t for t in there if not t.foretold and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
+              or (tips and not t.screened_out and t.candidate.effect.moves_center and t.candidate.where != c.where)]
+    return always + [t for t in there if not t.screened_out and t not in always and _behind(trial, t) < reach][:MOST_RIVALS]
 
 
-def _behind(trial: Trial, t: Trial) -> float:
+def _behind(trial: CandidateFit, t: CandidateFit) -> float:
     """By how much a rival was behind; where all channels of a walk judge, what was fitted says as much as what was not."""
     behind = {use: trial.gain[use] - t.gain[use] for use in trial.gain}
     return min(behind["choose"], _by_both(behind)) if trial.joint is None else behind["choose"]
@@ -220,7 +220,7 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
     return not c.shapes.any() or bool(np.any(c.shapes & ((x < low + SHAPE_END) | (x > high - SHAPE_END))))
 
 
-def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
+def _put(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
     """The fit with a rival in effect i's place and its numbers fitted there, with those of others in its joint where held takes
     tell them; the same effect elsewhere begins at the size that the other has, and what the other becomes where that does the
     same, if that is better."""
@@ -234,7 +234,7 @@ def _put(search: Search, fit: Fit, i: int, rival: Trial) -> Part[Fit]:
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * NEAR, 2 * CLOSE * rival.gain["choose"]):
         return there
-    held = search.told_held(own)
+    held = search.told_by_fixed_base(own)
     takes = search.held if held else search.fitted
-    beside = [j for j, (c, _) in enumerate(others) if held and (search.lone or c.joint == own.joint)]
+    beside = [j for j, (c, _) in enumerate(others) if held and (search.single_joint or c.joint == own.joint)]
     return (yield from search.refitting(there, takes, STEPS, free=[*beside, len(others)]))

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.fitting.fits import Fit, Report, Search, Sizes
-from workbench.identify.fitting.levenberg_marquardt import WALKING, steps_of
-from workbench.identify.fitting.responses import AROUND, SCANNED_GROUND
+from workbench.identify.fitting.levenberg_marquardt import steps_of
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import COARSE, Question
-from workbench.identify.selection.acceptance import too_little_left, worthwhile
-from workbench.identify.selection.best_subsets import fitted_beside, priced, seated
-from workbench.identify.selection.record import COMPLETE, Round, judged_by_all
-from workbench.identify.selection.screening import Trial
+from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.selection.acceptance import is_acceptable, too_little_left
+from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
+from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
+from workbench.identify.selection.screening import CandidateFit
 from workbench.identify.selection.swap import NOTHING, in_place
 
 Array = NDArray[np.float64]
@@ -30,8 +30,8 @@ NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
 that."""
 
 
-def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], report: Report
-           ) -> tuple[Fit, list[Round]]:
+def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Report
+           ) -> tuple[Fit, list[SelectionStep]]:
     """The fit, with two effects in the place of the last that walks told, one of them at least of the ground or of masses, where
     that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
@@ -49,14 +49,14 @@ def in_two(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequ
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
     pairs = _foretold(search, rest, list(known.values())[:ONES], free)
     fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
-    ranked = sorted(zip(fits, pairs), key=lambda f: priced(f[0]))
+    ranked = sorted(zip(fits, pairs), key=lambda f: penalised_cost(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
-    seats = [_beside_tried(r, seat) for r in seated(search, rest, ranked)]
+    seats = [_beside_tried(r, seat) for r in selection_steps(search, rest, ranked)]
     return ranked[0][0], [*(r for r in rounds if r is not seat), *seats]
 
 
-def _beside_tried(taken: Round, seat: Round) -> Round:
+def _beside_tried(taken: SelectionStep, seat: SelectionStep) -> SelectionStep:
     """A round with what else was tried at first: a pull's twin is to be put in its place."""
     fitted = {t.candidate.key for t in taken.trials}
     return replace(taken, trials=(*taken.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
@@ -71,16 +71,16 @@ def _keeps_company(c: Candidate) -> bool:
 class _Around:
     """What is asked around a fit with one effect: each number that walks tell moved, and each other effect beside it."""
 
-    one: Trial
+    one: CandidateFit
     fit: Fit
     moves: list[tuple[Candidate, Array, Array]]
     probes: list[tuple[Candidate, list[Array]]]
 
     @classmethod
-    def of(cls, one: Trial, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
+    def of(cls, one: CandidateFit, fit: Fit, others: Sequence[Candidate], search: Search) -> _Around:
         c = one.candidate
         company = [o for o in others if o.key != c.key and not (o.effect.steady_pull and c.effect.steady_pull)]
-        moves = [(e, x, steps_of(x, *e.bounds(), WALKING, e.magnitudes(x))) for e, x in fit.sizes()
+        moves = [(e, x, steps_of(x, *e.bounds(), FIT.stride_free, e.magnitudes(x))) for e, x in fit.sizes()
                  if e.size and not search.is_settled(e)]
         return cls(one, fit, moves, [(o, _probes(o)) for o in company])
 
@@ -91,40 +91,42 @@ class _Around:
         for c, points in self.probes:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
-    def foretold(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[Trial]]]:
+    def screened_out(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
         """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
         plain = next(answers)
         slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
         moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]
         for c, points in self.probes:
             did = [next(answers) - plain for _ in points]
-            for cost, chosen in in_place(Trial(c, points[0], NOTHING, None), points, did, left, moving, x, slopes):
+            for cost, chosen in in_place(CandidateFit(c, points[0], NOTHING, None), points, did, left, moving, x, slopes):
                 yield cost, [t for t in chosen if t.candidate.key in (self.one.candidate.key, c.key)]
 
 
 def _probes(c: Candidate) -> list[Array]:
     """Sizes at which an effect is looked at: the floor's alone at two."""
-    sizes = (AROUND,) if c.size > 1 else SCANNED_GROUND[:1] if c.where else SCANNED_GROUND
+    sizes = (FIT.scanned_around,) if c.size > 1 else FIT.scanned_ground[:1] if c.where else FIT.scanned_ground
     return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
 
 
-def _foretold(search: Search, rest: Fit, ones: Sequence[Trial], others: Sequence[Candidate]) -> list[list[Trial]]:
+def _foretold(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: Sequence[Candidate]) -> list[list[CandidateFit]]:
     """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
     takes = search.telling([t.candidate for t in ones], search.fitted)
     around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]
-    questions = [Question(with_effects(search.nominal, sizes), takes, COARSE) for a in around for sizes in a.asked()]
-    answers = iter([search.jury.vector(answer, "fit") for answer in search.jury.residuals(questions)])
-    best: dict[frozenset[Key], tuple[float, list[Trial]]] = {}
+    questions = [
+        RolloutRequest(with_effects(search.nominal, sizes), takes, PROBLEM.coarse) for a in around for sizes in a.asked()
+    ]
+    answers = iter([search.evaluator.vector(answer, "fit") for answer in search.evaluator.residuals(questions)])
+    best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}
     for a in around:
-        for cost, pair in a.foretold(search.jury.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
+        for cost, pair in a.screened_out(search.evaluator.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
             name = frozenset(t.candidate.key for t in pair)
             best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
     return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIRS]]
 
 
-def _enough(search: Search, fit: Fit, pair: Sequence[Trial], current: Fit, rounds: Sequence[Round]) -> bool:
+def _enough(search: Search, fit: Fit, pair: Sequence[CandidateFit], current: Fit, rounds: Sequence[SelectionStep]) -> bool:
     """Whether a pair brings as much more than the one as any effect has to."""
     takes = search.telling([t.candidate for t in pair], search.fitted)
-    was, now = (search.jury.by_channel({i: f.residuals[i] for i in takes}, "choose")[0] for f in (current, fit))
+    was, now = (search.evaluator.by_channel({i: f.residuals[i] for i in takes}, "choose")[0] for f in (current, fit))
     more = replace(pair[-1], gain={use: current.cost[use] - fit.cost[use] for use in NOTHING}, by_channel=was - now)
-    return worthwhile(search, more, search.fitted, rounds, current)
+    return is_acceptable(search, more, search.fitted, rounds, current)

@@ -5,39 +5,39 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workbench.identify.estimators.dropped_commands import Missed
+from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.fits import Fit, Search
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import CandidateFit
 
 COMPLETE = 0.97
 """Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
 
 
 @dataclass(frozen=True)
-class Round:
+class SelectionStep:
     """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
     limit of work, before all that could be asked was."""
 
     before: Fit
-    trials: tuple[Trial, ...]
-    accepted: tuple[Trial, ...]
+    trials: tuple[CandidateFit, ...]
+    accepted: tuple[CandidateFit, ...]
     stopped: bool = False
 
-    def rivals(self, trial: Trial) -> list[Trial]:
+    def rivals(self, trial: CandidateFit) -> list[CandidateFit]:
         """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
         place = trial.joint
         return [t for t in self.trials if place is None or t.joint in (place, None)]
 
 
 @dataclass(frozen=True)
-class Chosen:
+class SelectionResult:
     """The effects that stay, fitted together, and how they were found; search: as it was at the end, with what is settled and
     the takes as they were played; missed: poses that servos never got."""
 
     search: Search
     fit: Fit
-    rounds: tuple[Round, ...]
-    missed: tuple[Missed, ...] = ()
+    rounds: tuple[SelectionStep, ...]
+    missed: tuple[DroppedCommands, ...] = ()
 
     @property
     def stopped(self) -> bool:
@@ -45,23 +45,23 @@ class Chosen:
         return any(r.stopped for r in self.rounds)
 
 
-def taken(rounds: Sequence[Round]) -> list[Trial]:
+def taken(rounds: Sequence[SelectionStep]) -> list[CandidateFit]:
     """What was taken of physics."""
     return [t for r in rounds for t in r.accepted if not _exact(t)]
 
 
-def before_rough(rounds: Sequence[Round], current: Fit) -> Fit:
+def before_rough(rounds: Sequence[SelectionStep], current: Fit) -> Fit:
     """What there was before the first effect whose hundredths engines play differently."""
     return next((r.before for r in rounds if not all(map(_exact, r.accepted))), current)
 
 
-def _exact(t: Trial) -> bool:
+def _exact(t: CandidateFit) -> bool:
     """Whether engines do not differ in it: in how cameras saw the robot, or when commands come; other speeds, which no number
     says, make another motion."""
     layer = t.candidate.effect.layer
     return layer == "measurement" or (layer == "timing" and t.candidate.size > 0)
 
 
-def judged_by_all(search: Search, t: Trial) -> bool:
+def judged_by_all(search: Search, t: CandidateFit) -> bool:
     """Whether it was fitted by some number, and all channels judged it; not what held takes told."""
-    return not t.foretold and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)
+    return not t.screened_out and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)

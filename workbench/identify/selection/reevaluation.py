@@ -9,27 +9,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.fitting.fits import LEAST_GAIN, Fit, Search
+from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import MOST_STEPS, fitted_beside
-from workbench.identify.selection.record import COMPLETE, Round, judged_by_all
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
+from workbench.identify.selection.screening import CandidateFit
 
 NEAR, MOST = 0.5, 2
 """Share of its gain that a rival had when it was taken, and how many are fitted."""
 
 
-def weighed_anew(search: Search, current: Fit, rounds: Sequence[Round], takes: tuple[int, ...]) -> tuple[Fit, list[Round]]:
+def reevaluated(
+    search: Search, current: Fit, rounds: Sequence[SelectionStep], takes: tuple[int, ...]
+) -> tuple[Fit, list[SelectionStep]]:
     """The fit and its rounds, such effects replaced where a rival leaves less on these takes, beside all that came since; rivals'
     gains as they are there."""
     out = list(rounds)
     for n, r in enumerate(rounds):
         for t in r.accepted if any(later.accepted for later in rounds[n + 1:]) else ():
             if _weighable(search, t) and t.closed < COMPLETE and t.candidate.key in current.sizes_by_key():
-                current, out[n] = _weighed(search, current, out[n], t, takes)
+                current, out[n] = _reevaluated(search, current, out[n], t, takes)
     return current, out
 
 
-def _weighed(search: Search, current: Fit, r: Round, t: Trial, takes: tuple[int, ...]) -> tuple[Fit, Round]:
+def _reevaluated(
+    search: Search, current: Fit, r: SelectionStep, t: CandidateFit, takes: tuple[int, ...]
+) -> tuple[Fit, SelectionStep]:
     rivals = [o for o in r.trials if _weighable(search, o) and o.candidate.key not in current.sizes_by_key()
               and o.gain["choose"] > NEAR * t.gain["choose"]][:MOST]
     if not rivals:
@@ -38,20 +43,20 @@ def _weighed(search: Search, current: Fit, r: Round, t: Trial, takes: tuple[int,
     fits = search.side_by_side([fitted_beside(search, rest, [o], takes, MOST_STEPS) for o in rivals])
 
     def left(fit: Fit) -> dict[str, float]:
-        return {use: search.jury.cost({i: fit.residuals[i] for i in takes}, use) for use in t.gain}
+        return {use: search.evaluator.cost({i: fit.residuals[i] for i in takes}, use) for use in t.gain}
 
     was = left(current)
     anew = {o.candidate.key: replace(o, x=fit.sizes_by_key()[o.candidate.key],
                                      gain={use: t.gain[use] + was[use] - now for use, now in left(fit).items()})
             for o, fit in zip(rivals, fits)}
     known = [anew.get(o.candidate.key, o) for o in r.trials]
-    best, taken = max(zip(fits, anew.values()), key=lambda f: f[1].gain["choose"] - LEAST_GAIN * len(f[0].x))
-    if taken.gain["choose"] - t.gain["choose"] < LEAST_GAIN * (1 + len(best.x) - len(current.x)):
+    best, taken = max(zip(fits, anew.values()), key=lambda f: f[1].gain["choose"] - FIT.least_gain * len(f[0].x))
+    if taken.gain["choose"] - t.gain["choose"] < FIT.least_gain * (1 + len(best.x) - len(current.x)):
         best, taken = current, t
     return best, replace(r, trials=tuple(sorted(known, key=lambda o: -o.gain["choose"])),
                          accepted=tuple(taken if a is t else a for a in r.accepted))
 
 
-def _weighable(search: Search, t: Trial) -> bool:
+def _weighable(search: Search, t: CandidateFit) -> bool:
     """Whether another may stand for it: not for how cameras saw the robot."""
     return judged_by_all(search, t) and t.candidate.effect.layer != "measurement"

@@ -34,9 +34,9 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
-    grounded = search.grounded(takes)
+    floating_base = search.floating_base(takes)
     many = len(joints) > FEW
-    moves_all = bool(grounded) and (many or any(c in BODY for c in beyond))
+    moves_all = bool(floating_base) and (many or any(c in BODY for c in beyond))
     well, ill = _when_held(search, current)
     outstanding = standing_out(search, current, takes)
 
@@ -57,27 +57,27 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     def carried(c: Candidate) -> str | None:
         return search.nominal.kinematics.joint_of(c.where[0]) if c.effect.layer == "inertia" else None
 
-    zeroed = all(search.jury.evidence[i].take.recorded.zeroed for i in takes)
+    zeroed = all(search.evaluator.evidence[i].take.recorded.zeroed for i in takes)
     used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
-    lone = search.lone and not grounded
+    single_joint = search.single_joint and not floating_base
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
         if any(c.where == e.where and c.name in e.effect.includes for e in current.effects):
             continue
         if c.effect.steady_pull and any(e.effect.steady_pull for e in current.effects):
             continue
-        likely = _tier(c, bool(grounded), many, heavy, outstanding, carried(c) in well)
-        if c.key in used or (min(likely, LONE) if lone else likely) != tier:
+        likely = _tier(c, bool(floating_base), many, heavy, outstanding, carried(c) in well)
+        if c.key in used or (min(likely, LONE) if single_joint else likely) != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
         elif c.joint is not None:
             if c.effect.hidden_by_zeroing:
-                if moves_all or (c.joint in joints and (grounded or not zeroed)):
+                if moves_all or (c.joint in joints and (floating_base or not zeroed)):
                     groups[c.key] = [c]
-            elif c.joint in joints and not (grounded and settled(c)):
-                groups.setdefault(c.key if c.read_off or grounded else (c.name, "joint"), []).append(c)
-        elif (not settled(c)) if grounded else _could_show(search, c, joints):
+            elif c.joint in joints and not (floating_base and settled(c)):
+                groups.setdefault(c.key if c.read_off or floating_base else (c.name, "joint"), []).append(c)
+        elif (not settled(c)) if floating_base else _could_show(search, c, joints):
             groups[c.key] = [c]
 
     return list(groups.values()), {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
@@ -86,9 +86,9 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
 def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[str]:
     """Joints that err far more than all else on some take on the ground."""
     out: set[str] = set()
-    for i in search.grounded(takes):
+    for i in search.floating_base(takes):
         beyond: dict[str, float] = {}
-        for channel, size in channel_gaps(search.jury.evidence[i], current.residuals[i]).items():
+        for channel, size in channel_gaps(search.evaluator.evidence[i], current.residuals[i]).items():
             beyond[joint_of(channel)] = max(beyond.get(joint_of(channel), 0.0), size**2 - 1)
         *others, worst = sorted(beyond.items(), key=lambda b: b[1]) or [("", 0.0)]
         if worst[0] in search.nominal.joints and worst[1] > STANDS_OUT * max((b for _, b in others), default=0.0):
@@ -98,21 +98,21 @@ def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[st
 
 def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     """Joints that moved while the base was held and went as the model has it; those that did not go so."""
-    evidence = search.jury.evidence
+    evidence = search.evaluator.evidence
     ill = {joint_of(c) for i in search.held for c in channel_gaps(evidence[i], current.residuals[i])}
     moved = {j for i in search.held for j in evidence[i].joints
              if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > MOVED}
     return moved - ill, ill
 
 
-def _tier(c: Candidate, grounded: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str], well: bool) -> int:
+def _tier(c: Candidate, floating_base: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str], well: bool) -> int:
     """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
     number, by where feet stand, by several (for which a walk has to be looked at all around), of links that their joint carried
     well in all axes but its own last, then joints, what links carry."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
-    if not grounded:
+    if not floating_base:
         if not c.where:
             return 1 if many else 2
         return 2 if c.joint is not None else 3

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.fitting.fits import Fit, Search
-from workbench.identify.fitting.levenberg_marquardt import HELD, WALKING, Asks, Solved, fit_blocks, through
-from workbench.identify.fitting.responses import Part, Signatures, guess, scan, sizes_of
+from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks, through
+from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import COARSE, Jury, Question, take_of
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -43,22 +44,22 @@ STEPS, STEPS_WALKING = 3, 2
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateFit:
     """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
-    `Jury.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the choosing
-    stretches; joint: whose channels alone were looked at, None for all. foretold: whether signatures alone said so
+    `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
+    choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
     much less of it than of a rival that no fit was made."""
 
     candidate: Candidate
     x: Array
     gain: Mapping[str, float]
     joint: str | None
-    foretold: bool = False
+    screened_out: bool = False
     closed: float = 0.0
     by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
 
-Asking = Part[list[Trial]]
+Asking = Part[list[CandidateFit]]
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class Race:
     and how long these are looked at."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
-    foretold: dict[str | None, float] = field(default_factory=dict)
+    screened_out: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0
@@ -79,7 +80,7 @@ class Race:
 
 
 def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
-          report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[Trial]:
+          report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
     """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
     at several joints, each judged by its own joint's channels. takes: on which, by group.
     ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
@@ -87,12 +88,22 @@ def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], t
     race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not search.held), []
     for n, group in enumerate(groups):
         base = {i: current.residuals[i] for i in takes[n]}
-        asking.append(Trying(search.jury, search.nominal, current.sizes(), base, group, race, search.apart(group[0], takes[n]),
-                             search.signatures).run())
+        asking.append(
+            CandidateEvaluation(
+                search.evaluator,
+                search.nominal,
+                current.sizes(),
+                base,
+                group,
+                race,
+                search.apart(group[0], takes[n]),
+                search.signatures,
+            ).run()
+        )
     return [trial for trials in search.side_by_side(asking, report) for trial in trials]
 
 
-class Trying:
+class CandidateEvaluation:
     """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
@@ -100,20 +111,29 @@ class Trying:
     races; this one's are added.
     """
 
-    def __init__(self, jury: Jury, nominal: RobotModel, beside: Sequence[tuple[Candidate, Array]], base: dict[int, Array],
-                 group: Sequence[Candidate], race: Race, apart: bool, signatures: Signatures) -> None:
-        self.jury, self.group, self.race, self.signatures = jury, group, race, signatures
+    def __init__(
+        self,
+        evaluator: RolloutEvaluator,
+        nominal: RobotModel,
+        beside: Sequence[tuple[Candidate, Array]],
+        base: dict[int, Array],
+        group: Sequence[Candidate],
+        race: Race,
+        apart: bool,
+        signatures: ResponseBank,
+    ) -> None:
+        self.evaluator, self.group, self.race, self.signatures = evaluator, group, race, signatures
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
-        self.walking = jury.walks(tuple(base))
+        self.walking = evaluator.walks(tuple(base))
         self.base, self.takes = base, tuple(base)
         self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
-        self.power = {i: jury.cost({i: r}, "fit") for i, r in base.items()}
+        self.power = {i: evaluator.cost({i: r}, "fit") for i, r in base.items()}
         alone = self.coarse and self.walking  # walks are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
-        lone = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
-        self.until = self._shown() if self.coarse and not lone else np.inf
+        single_joint = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
+        self.until = self._shown() if self.coarse and not single_joint else np.inf
         self.without: dict[int, Array] = {}
         self._name = (*(c.key for c in group), self.looked_at)
 
@@ -122,7 +142,7 @@ class Trying:
         past = yield from self._past()
         starts, gains = past or (yield from self._looked_at())
         alive = [] if past else (yield from self._worth_fitting(gains))
-        out = [Trial(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, foretold=True)
+        out = [CandidateFit(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, screened_out=True)
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
             return out
@@ -147,9 +167,9 @@ class Trying:
         """Sizes to start from and what signatures say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
-        probes = scan(c, sizes_of(c, self.walking, self.race.unheld), self.walking)
+        probes = scan(c, scan_sizes(c, self.walking, self.race.unheld), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
-        plain, *answers = yield [replace(q, takes=self.looked_at, step=COARSE, until=self.until) for q in looks]
+        plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse, until=self.until) for q in looks]
         before = self._left(plain)
         signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
         self.signatures[self._name] = probes, signatures, self.until
@@ -159,15 +179,15 @@ class Trying:
             return told
         x = yield from self._fitted_on(*calm)
         (answer,) = yield [self._question([0], [x])]
-        return max(told, ([x], [sum(self.power.values()) - self.jury.cost(answer, "fit")]), key=lambda t: t[1])
+        return max(told, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
 
     def _fitted_on(self, take: int, x: Array) -> Part[Array]:
         """Sizes as one take alone wants them."""
-        def ask(point: Sequence[Array]) -> Question:
+        def ask(point: Sequence[Array]) -> RolloutRequest:
             return replace(self._question([0], point), takes=(take,))
 
         def tell(answer: dict[int, Array]) -> list[Array]:
-            return [self.jury.vector(answer, "fit")]
+            return [self.evaluator.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
         (solved,) = yield from through(self._stepping([x], tell(answer), [0], STEPS_WALKING), ask, tell)
@@ -175,16 +195,16 @@ class Trying:
 
     def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
         """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
-        beyond = {i: self.power[i] - self.jury.expected((i,), "fit") for i in self.takes}
+        beyond = {i: self.power[i] - self.evaluator.expected((i,), "fit") for i in self.takes}
         if gain > CALM * sum(beyond.values()):
             return None
-        take = take_of(self.jury.stretches(self.takes, "fit"))
+        take = take_of(self.evaluator.stretches(self.takes, "fit"))
         best: tuple[int, Array] | None = None
         most = CALM
         for i in self.takes:
             here = take == i
             r0 = self.r0[0][here]
-            x, gain = guess(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
+            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
             share = gain / max(beyond[i], self.race.least, 1.0)
             if share > most:
                 best, most = (i, x), share
@@ -196,16 +216,18 @@ class Trying:
         looked_at = self._early(until)
         r0 = self._left(looked_at)
         far = FAR_WALKING if self.walking else FAR
-        guesses = [guess(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)]
-        share = max(self.jury.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
+        guesses = [
+            linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)
+        ]
+        share = max(self.evaluator.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _shown(self) -> float:
         """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
         seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
         share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
-        least = {j: share * self.jury.cost(seen, "fit", j) for j in self.joints}
-        while any(self.jury.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
+        least = {j: share * self.evaluator.cost(seen, "fit", j) for j in self.joints}
+        while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
             until += LOOKED / 2
         return until
 
@@ -213,7 +235,7 @@ class Trying:
         """What there is already leaves of the takes that are looked at for so long [s]."""
         key = self.looked_at, until
         if key not in self.race.early:
-            self.race.early[key] = self.jury.early({i: self.base[i] for i in self.looked_at}, until)
+            self.race.early[key] = self.evaluator.early({i: self.base[i] for i in self.looked_at}, until)
         return self.race.early[key]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
@@ -221,13 +243,13 @@ class Trying:
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
-        _tell(race.foretold, self.joints, gains)
+        _tell(race.screened_out, self.joints, gains)
         yield []  # until all have said what they foretell
         last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
         worth = WORTH_WALKING if self.walking else WORTH
-        least = race.least * (1.0 if _best(race.foretold, None) > race.least else DOUBTED)
+        least = race.least * (1.0 if _best(race.screened_out, None) > race.least else DOUBTED)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > least and g >= worth * _best(race.foretold, j) and (j is not None or g >= last)]
+                if g > least and g >= worth * _best(race.screened_out, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
@@ -251,27 +273,29 @@ class Trying:
         """n steps of a fit of some of the group, at the strides that these takes need."""
         bounds = [self.group[b].bounds() for b in which]
         if not self.walking:
-            return fit_blocks(start, leaves, bounds, n, HELD, since)
-        return fit_blocks(start, leaves, bounds, n, WALKING, since, self.group[which[0]].magnitudes(start[0]))
+            return fit_blocks(start, leaves, bounds, n, FIT.stride_fixed, since)
+        return fit_blocks(start, leaves, bounds, n, FIT.stride_free, since, self.group[which[0]].magnitudes(start[0]))
 
-    def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> Trial:
+    def _judged(self, b: int, x: Array, answer: dict[int, Array]) -> CandidateFit:
         joint = self.joints[b]
-        off = {use: self.jury.cost(self.base, use, joint) - self.jury.cost(answer, use, joint) for use in ("fit", "choose")}
-        before, after = (self.jury.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
-        return Trial(self.group[b], x, off, joint, closed=self.jury.closed(self.base, answer, "choose", joint),
+        off = {
+            use: self.evaluator.cost(self.base, use, joint) - self.evaluator.cost(answer, use, joint) for use in ("fit", "choose")
+        }
+        before, after = (self.evaluator.by_channel(r, "choose", joint)[0] for r in (self.base, answer))
+        return CandidateFit(self.group[b], x, off, joint, closed=self.evaluator.closed(self.base, answer, "choose", joint),
                      by_channel=before - after)
 
-    def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> Question:
+    def _question(self, which: Sequence[int], sizes: Sequence[Array]) -> RolloutRequest:
         """The robot with those of the group at these sizes, beside what there is already."""
         model = with_effects(self.with_these, [(self.group[b], x) for b, x in zip(which, sizes)])
-        return Question(model, self.takes, COARSE if self.coarse else 1.0)
+        return RolloutRequest(model, self.takes, PROBLEM.coarse if self.coarse else 1.0)
 
     def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
         """What an answer leaves: the difference that coarse steps tell, beside what the search's step leaves."""
         return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
-        return [self.jury.vector(answer, "fit", j) for j in self.joints]
+        return [self.evaluator.vector(answer, "fit", j) for j in self.joints]
 
 
 def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:

@@ -15,15 +15,15 @@ from workbench.identify.selection.best_subsets import (
     TOGETHER_STEPS,
     begun_again,
     fitted_beside,
-    priced,
-    seated,
+    penalised_cost,
+    selection_steps,
     several,
     worst_joint,
 )
-from workbench.identify.selection.record import Round
+from workbench.identify.selection.record import SelectionStep
 from workbench.identify.selection.reevaluation import MOST, NEAR
 from workbench.identify.selection.scheduling import LONE, asked
-from workbench.identify.selection.screening import Trial, tried
+from workbench.identify.selection.screening import CandidateFit, tried
 from workbench.identify.selection.swap import NOTHING, exchanges
 
 Array = NDArray[np.float64]
@@ -35,8 +35,8 @@ ALL_THE_REST = 0.95
 """Share of what is beyond noise that a set closes, too, where it is right but for what engines do otherwise, as at a stop."""
 
 
-def lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
-               say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
+def single_joint_step(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
+               say: Callable[[float], None]) -> tuple[Fit, list[SelectionStep]]:
     """Of a robot of one joint, in which all acts: sets of effects before any is fitted alone, if one is nearly all."""
     looked = _looked_at(search, pool, current, beyond, takes, say)
     sets = together(search, current, looked, takes, beyond)
@@ -44,13 +44,13 @@ def lone_round(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
         return current, []
     best = sets[0][0]
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (current, best))
-    if search.jury.closed(before, after, "choose") <= NEARLY_ALL:
+    if search.evaluator.closed(before, after, "choose") <= NEARLY_ALL:
         return current, []
-    return best, seated(search, current, sets)
+    return best, selection_steps(search, current, sets)
 
 
-def set_right(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[Round], takes: tuple[int, ...],
-              say: Callable[[float], None]) -> tuple[Fit, list[Round]]:
+def set_right(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], takes: tuple[int, ...],
+              say: Callable[[float], None]) -> tuple[Fit, list[SelectionStep]]:
     """Of a robot of one joint: a set that leaves about what a right model does, where what was found so far leaves more: with one
     effect replaced, one more, or one sharing its work with a rival. A weaker supply does nearly all that friction does, and no
     fit that begins with the one comes to both."""
@@ -62,13 +62,13 @@ def set_right(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     other = exchanges(search, current, looked, takes, joint, current.effects, beside=True)
     shared = _shared(current, rounds, joint)
     sets = sorted([*_fitted(search, nominal, other, takes), *_fitted(search, nominal, shared, takes, len(shared))],
-                  key=lambda f: priced(f[0]))
+                  key=lambda f: penalised_cost(f[0]))
     if not sets or not (_is_right(search, sets[0][0], takes, joint) or _ends(search, current, sets[0][0], takes, joint)):
         return current, []
-    return sets[0][0], seated(search, nominal, sets)
+    return sets[0][0], selection_steps(search, nominal, sets)
 
 
-def _shared(current: Fit, rounds: Sequence[Round], joint: str) -> list[list[Trial]]:
+def _shared(current: Fit, rounds: Sequence[SelectionStep], joint: str) -> list[list[CandidateFit]]:
     """Sets in which an effect and a rival that was nearly as good each have half the size that they had alone."""
     there = current.sizes_by_key()
     out = []
@@ -78,7 +78,7 @@ def _shared(current: Fit, rounds: Sequence[Round], joint: str) -> list[list[Tria
             halves = (t.candidate.key, o.candidate.key)
             sizes = [(c, np.where(c.shapes, x, x / 2) if c.key in halves else x)
                      for c, x in [*((c, _free(c, x)) for c, x in current.sizes()), (o.candidate, o.x)]]
-            out.append([Trial(c, x, NOTHING, joint) for c, x in sizes])
+            out.append([CandidateFit(c, x, NOTHING, joint) for c, x in sizes])
     return out
 
 
@@ -89,7 +89,7 @@ def _free(c: Candidate, x: Array) -> Array:
 
 
 def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
-               say: Callable[[float], None]) -> list[Trial]:
+               say: Callable[[float], None]) -> list[CandidateFit]:
     """What signatures say of all that acts in the one joint, nothing fitted."""
     groups: list[list[Candidate]] = []
     on: dict[int, tuple[int, ...]] = {}
@@ -100,8 +100,8 @@ def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
     return tried(search, current, groups, on, say, least=np.inf)
 
 
-def together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple[int, ...], beyond: dict[str, float]
-             ) -> list[tuple[Fit, list[Trial]]]:
+def together(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
+             ) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
     replaced, until none of these is better."""
     joint = worst_joint(beyond)
@@ -118,7 +118,7 @@ def together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
         new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
                if frozenset(t.candidate.key for t in s) not in known]
-        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: priced(f[0]))
+        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: penalised_cost(f[0]))
         if sets[0][0] is fit:
             break
     return sets
@@ -126,21 +126,21 @@ def together(search: Search, current: Fit, trials: Sequence[Trial], takes: tuple
 
 def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
     """Whether a fit leaves in a joint about what a right model does."""
-    left, expected = search.jury.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
+    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
     return bool(left.sum() < RIGHT * expected.sum())
 
 
 def _ends(search: Search, before: Fit, after: Fit, takes: tuple[int, ...], joint: str) -> bool:
     """Whether nearly all that a fit leaves in a joint beyond noise is gone in another."""
     both = ({i: fit.residuals[i] for i in takes} for fit in (before, after))
-    (was, expected), (left, _) = (search.jury.by_channel(residuals, "choose", joint) for residuals in both)
+    (was, expected), (left, _) = (search.evaluator.by_channel(residuals, "choose", joint) for residuals in both)
     return bool(left.sum() - expected.sum() < (1 - ALL_THE_REST) * (was.sum() - expected.sum()))
 
 
-def _fitted(search: Search, current: Fit, sets: Sequence[list[Trial]], takes: tuple[int, ...], ahead: int = AHEAD
-            ) -> list[tuple[Fit, list[Trial]]]:
+def _fitted(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...], ahead: int = AHEAD
+            ) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
     begun = search.side_by_side([fitted_beside(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
-    ranked = sorted(zip(begun, sets), key=lambda f: priced(f[0]))
+    ranked = sorted(zip(begun, sets), key=lambda f: penalised_cost(f[0]))
     ended = search.side_by_side([search.refitting(fit, takes, TOGETHER_STEPS) for fit, _ in ranked[:ahead]])
-    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[ahead:]], key=lambda f: priced(f[0]))
+    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[ahead:]], key=lambda f: penalised_cost(f[0]))

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from workbench.identify.fitting.fits import Fit, Search, Sizes
-from workbench.identify.fitting.levenberg_marquardt import HELD, steps_of
-from workbench.identify.fitting.responses import SCANNED, scan
+from workbench.identify.fitting.levenberg_marquardt import steps_of
+from workbench.identify.fitting.responses import scan
+from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import Question
+from workbench.identify.rollouts import RolloutRequest
 from workbench.identify.selection.best_subsets import AS_GOOD, Seen, possible, variants
-from workbench.identify.selection.screening import Trial
+from workbench.identify.selection.screening import CandidateFit
 
 Array = NDArray[np.float64]
 FITTED = 2
@@ -29,8 +30,15 @@ NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only foretell."""
 
 
-def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[int, ...], joint: str, alone: Sequence[Candidate],
-              beside: bool = False) -> list[list[Trial]]:
+def exchanges(
+    search: Search,
+    fit: Fit,
+    trials: Sequence[CandidateFit],
+    takes: tuple[int, ...],
+    joint: str,
+    alone: Sequence[Candidate],
+    beside: bool = False,
+) -> list[list[CandidateFit]]:
     """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
     whoever was asked about the joint, on these takes, whose base is held. beside: those, too, in which it stands for none."""
     there = fit.sizes_by_key()
@@ -39,18 +47,18 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
     if not mine or not others:
         return []
     moves = [_moved(c, there[c.key]) for c in mine]
-    probes = [scan(t.candidate, SCANNED, walking=False) for t in others]
+    probes = [scan(t.candidate, FIT.scanned, walking=False) for t in others]
     asked: list[Sizes] = [fit.sizes_with(c.key, x) for c, points in zip(mine, moves) for x in points]
     asked += [fit.sizes_without(c.key) for c in mine]
     asked += [[*fit.sizes(), (t.candidate, p)] for t, points in zip(others, probes) for p in points]
-    answers = search.jury.residuals([Question(with_effects(search.nominal, sizes), takes) for sizes in asked])
-    seen = iter([search.jury.vector(a, "fit", joint) for a in answers])
-    left = search.jury.vector({i: fit.residuals[i] for i in takes}, "fit", joint)
+    answers = search.evaluator.residuals([RolloutRequest(with_effects(search.nominal, sizes), takes) for sizes in asked])
+    seen = iter([search.evaluator.vector(a, "fit", joint) for a in answers])
+    left = search.evaluator.vector({i: fit.residuals[i] for i in takes}, "fit", joint)
     slopes = [np.column_stack([(next(seen) - left) / float((x - there[c.key]).sum()) for x in points])
               for c, points in zip(mine, moves)]
     rests = [next(seen) for _ in mine]
     signatures = [[next(seen) - left for _ in points] for points in probes]
-    out: list[list[Trial]] = []
+    out: list[list[CandidateFit]] = []
     for k, rest in enumerate([*rests, left] if beside else rests):
         staying = [n for n in range(len(mine)) if n != k]
         x = [there[mine[n].key] for n in staying]
@@ -63,21 +71,23 @@ def exchanges(search: Search, fit: Fit, trials: Sequence[Trial], takes: tuple[in
 
 def _moved(c: Candidate, x: Array) -> list[Array]:
     """Sizes with one number moved at a time."""
-    return list(x + np.diag(steps_of(x, *c.bounds(), HELD)))
+    return list(x + np.diag(steps_of(x, *c.bounds(), FIT.stride_fixed)))
 
 
-def in_place(t: Trial, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
-             x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[Trial]]]:
+def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
+             x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[CandidateFit]]]:
     """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
     was seen; of several, all at once. rest: what is left without the other."""
     ends = np.cumsum([0, *(len(size) for size in x)])
-    ways: list[tuple[float, list[Trial]]] = []
+    ways: list[tuple[float, list[CandidateFit]]] = []
     for seen in variants(t, points, did):
         solved = lsq_linear(np.column_stack([*slopes, seen.signatures]), -rest, _bounds(seen, staying, x))
         size = seen.sizes(solved.x[ends[-1]:])
         if possible(seen, size):
-            beside = [Trial(e, start + solved.x[a:b], NOTHING, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))]
-            ways.append((2.0 * float(solved.cost), [*beside, replace(t, x=size, foretold=False)]))
+            beside = [
+                CandidateFit(e, start + solved.x[a:b], NOTHING, t.joint) for e, start, (a, b) in zip(staying, x, pairwise(ends))
+            ]
+            ways.append((2.0 * float(solved.cost), [*beside, replace(t, x=size, screened_out=False)]))
     return sorted(ways, key=lambda way: way[0])[:1]
 
 

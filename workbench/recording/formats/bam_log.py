@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.numbers import rate_of
+from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
-from workbench.robot.files import read_text
+from workbench.robot.files import read_json
 
 Array = NDArray[np.float64]
 _FULL_DUTY = 885.0
@@ -29,25 +30,26 @@ def read_bam_log(path: str | Path) -> Recording:
     InputError where it is no JSON, cut, lacks an entry's key or holds what is no number.
     """
     source = str(path)
-    try:
-        content = json.loads(read_text(path))
-    except json.JSONDecodeError as e:
-        raise InputError(source, f"line {e.lineno}, column {e.colno}: {e.msg}; expected whole JSON") from None
+    content = read_json(path)
     if not isinstance(content, dict) or not isinstance(content.get("entries"), list) or not content["entries"]:
-        raise InputError(source, "expected a JSON object with a list 'entries'")
+        keys = ", ".join(map(str, list(content)[:6])) if isinstance(content, dict) else ""
+        found = f"one with {keys or 'nothing'}" if isinstance(content, dict) else "another value"
+        raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)
     bad = np.flatnonzero(~(np.diff(time) > 0))
     if len(bad):
         raise InputError(source, f"entries[{bad[0] + 1}].timestamp: expected increasing times")
-    joint = str(content.get("motor", "servo"))
+    joint = str(content.get("motor", "servo"))[:40]
     channels = {f"{channel}.{joint}": _column(source, entries, key, key in _REQUIRED) for key, channel in _CHANNELS.items()
                 if key in _REQUIRED or key in entries[0]}
     problems = []
     if "load" in entries[0]:
         load = _column(source, entries, "load", False)
         load = np.where(load > 32767, load - 65536, load)
-        if np.nanmax(np.abs(load)) <= _FULL_DUTY:
+        if not np.any(load):
+            problems.append("load is 0 in every row: it was not read, and no duty is told")
+        elif np.nanmax(np.abs(load)) <= _FULL_DUTY:
             channels[f"duty.{joint}"] = load / _FULL_DUTY
         else:
             problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, and no duty is told")
@@ -59,7 +61,7 @@ def read_bam_log(path: str | Path) -> Recording:
     metadata = {k: str(v) for k, v in content.items() if isinstance(v, (str, int, float)) and not isinstance(v, bool)}
     goals = channels[f"goal.{joint}"]
     return Recording(source=source, kind="bam_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
-                     units="radians", channels=channels, metadata=metadata, problems=tuple(problems),
+                     units="radians", channels=channels, metadata=metadata, problems=tuple(problems), nameless=True,
                      commands=commands_of_rows(time, (joint,), goals[:, None], enabled[:, None] != 0))
 
 
@@ -69,10 +71,18 @@ def _column(source: str, entries: list[Any], key: str, required: bool) -> Array:
         value = entry.get(key) if isinstance(entry, dict) else None
         if value is None and required:
             raise InputError(source, f"entries[{i}]: key '{key}' is missing")
-        if value is not None and not isinstance(value, (int, float)):
-            raise InputError(source, f"entries[{i}].{key}: expected a number, got {value!r}")
+        if value is not None and (not isinstance(value, (int, float)) or math.isinf(value)):
+            raise InputError(source, f"entries[{i}].{key}: expected a number, got {str(value)[:40]}")
         if value is not None:
             out[i] = value
     if required and not np.isfinite(out).all():
         raise InputError(source, f"entries[{int(np.argmin(np.isfinite(out)))}].{key}: expected a finite number")
     return out
+
+
+def matches(head: bytes) -> bool:
+    """Whether a file begins as JSON does."""
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"{", b"["))
+
+
+FORMAT = RecordingFormat("bam_log", "a BAM log", matches, read_bam_log)

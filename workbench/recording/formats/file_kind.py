@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Literal
 
 from workbench.recording.formats.rollout_table import is_rollout
-from workbench.robot import InputError
+from workbench.robot.numerals import number_of
+from workbench.robot.tables import is_binary, plain_head, split_row
 
 Kind = Literal["recording", "motion", "rollout"]
 
@@ -20,21 +20,14 @@ def file_kind(path: str | Path) -> Kind:
         return "motion"
     if path.is_dir():
         return "recording"  # a SAGE programme is a folder
-    try:
-        with path.open("rb") as f:
-            lines = [line.decode("utf-8-sig", errors="replace").strip() for line in f.read(100_000).splitlines()]
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    head = plain_head(path)
+    if is_binary(head):
+        return "recording"
+    lines = [line.decode("utf-8-sig", errors="replace").strip() for line in head.splitlines()]
     if lines and is_rollout(lines[0]):
         return "rollout"
     first = next((line for line in lines if line and not line.startswith("#")), "")
-    cells = [c.strip() for c in next(csv.reader([first]), [])]
+    cells = split_row(first)
     plain = "time" in cells and not any("." in c for c in cells)
-    return "motion" if plain or _numbers(cells) else "recording"
-
-
-def _numbers(cells: list[str]) -> bool:
-    try:
-        return bool([float(c) for c in cells])
-    except ValueError:
-        return False
+    numbers = bool(cells) and all(number_of(c) is not None for c in cells)
+    return "motion" if plain or numbers else "recording"

@@ -12,10 +12,12 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from workbench.recording.formats.log_commands import commands_of_rows
-from workbench.recording.formats.numbers import column, map_file, rate_of, read_columns, strings
+from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
+from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
 from workbench.robot.files import write_whole
+from workbench.robot.tables import is_binary, split_row
 
 Array = NDArray[np.float64]
 _DEGREES = np.pi / 180
@@ -26,12 +28,12 @@ _TRUE, _FALSE = {"1", "1.0", "true"}, {"0", "0.0", "false"}
 
 def looks_like_joint_log(head: bytes) -> bool:
     """Whether a file that begins with `head` has a header with `time` and goals or positions of joints."""
-    cells = _cells(head.partition(b"\n")[0])
+    cells = [] if is_binary(head) else _cells(head.partition(b"\n")[0])
     return "time" in cells and any(c.startswith(("goal.", "position.")) for c in cells)
 
 
 def _cells(line: bytes) -> list[str]:
-    return [c.strip() for c in next(csv.reader([line.decode("utf-8-sig", "replace").rstrip("\r")]), [])]
+    return split_row(line.decode("utf-8-sig", "replace").rstrip("\r"))
 
 
 def read_joint_log(path: str | Path) -> Recording:
@@ -41,7 +43,7 @@ def read_joint_log(path: str | Path) -> Recording:
     the first row alone are a start, and the file then is the commands of a prediction.
     """
     source = str(path)
-    content = map_file(path)
+    content, written = table_bytes(path)
     end = content.find(b"\n")
     names = _cells(content[:end] if end >= 0 else content[:])
     _check_names(source, names)
@@ -62,7 +64,8 @@ def read_joint_log(path: str | Path) -> Recording:
     at_once = np.zeros(len(time))
     speeds = np.column_stack([np.nan_to_num(channels.get(f"speed.{j}", at_once)) for j in joints])
     return Recording(source=source, kind="joint_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
-                     units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial, speeds))
+                     units="degrees", channels=channels, commands=commands_of_rows(time, joints, goals, enabled, initial, speeds),
+                     metadata={"written with": written} if written else {})
 
 
 def _check_names(source: str, names: list[str]) -> None:
@@ -71,7 +74,7 @@ def _check_names(source: str, names: list[str]) -> None:
         if name in names[:i]:
             raise InputError(source, f"line 1: column '{name}' stands there twice")
         if name not in ("time", "voltage") and not (dot and joint and kind in _SCALE):
-            raise InputError(source, f"line 1: unknown column '{name}'; expected time, voltage, or one of "
+            raise InputError(source, f"line 1: unknown column '{name[:40]}'; expected time, voltage, or one of "
                                      f"{', '.join(k + '.JOINT' for k in _SCALE)}")
         if dot and f"goal.{joint}" not in names:
             raise InputError(source, f"line 1: column '{name}' without 'goal.{joint}'")
@@ -103,3 +106,6 @@ def write_joint_log(path: str | Path, time: Array, channels: Mapping[str, Array]
     for row in np.column_stack(rows):
         write(["" if np.isnan(v) else f"{v:.9g}" for v in row])
     return write_whole(path, out.getvalue())
+
+
+FORMAT = RecordingFormat("joint_log", "a joint log", looks_like_joint_log, read_joint_log)

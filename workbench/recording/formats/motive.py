@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Collection
 from pathlib import Path
 
@@ -11,14 +10,27 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from workbench.recording.body_track import BodyTrack
-from workbench.recording.formats.motive_header import Asset, MotiveHeader, euler_order, metres_per_unit, number, parse_header
-from workbench.recording.formats.numbers import column, map_file, read_columns, stacked
+from workbench.recording.formats.motive_header import (
+    Asset,
+    MotiveHeader,
+    euler_order,
+    looks_like_motive,
+    metres_per_unit,
+    number,
+    parse_header,
+)
+from workbench.recording.formats.numbers import Bytes, column, read_columns, stacked, table_bytes
+from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.mocap.quaternions import from_euler
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 _BODIES = ("Rigid Body", "Bone")
+_LARGEST = 1e15  # a frame number that a float holds to the last digit
+_LEAP = 100_000  # frames at least: a quarter of an hour at 120 Hz, and a hundred times what the file holds
+_FEW = 10  # rows that tell no rate
+_DISAGREE = 0.01  # of header and Time column, which is rounded to a millisecond
 
 
 def read_motive(path: str | Path) -> Recording:
@@ -29,13 +41,14 @@ def read_motive(path: str | Path) -> Recording:
     are NaN. InputError names the line where a file is cut or holds what is no number.
     """
     source = str(path)
-    mapped = map_file(path)
+    mapped, written = table_bytes(path)
     header = parse_header(source, memoryview(mapped))
     scale = metres_per_unit(source, header)
     table = _read_body(source, mapped, header)
-    frames = _frames(source, header, table)
     problems: list[str] = []
+    frames = _frames(source, header, table, problems)
     rate = _rate(source, header, table, frames, problems)
+    frames, rate = _on_clock(header, table, frames, rate, problems)
     problems += _missing(source, header, mapped, frames)
     bodies: dict[str, BodyTrack] = {}
     markers: dict[str, Array] = {}
@@ -51,14 +64,19 @@ def read_motive(path: str | Path) -> Recording:
     metadata |= {f"Parent of {child}": parent for child, parent in header.parents.items()}
     if header.timecode is not None:
         metadata["First TimeCode"] = str(table.column(str(header.timecode))[0].as_py() or "")
+    if metadata.get("Coordinate Space", "Global").lower() != "global":
+        problems.append(f"the header says Coordinate Space {metadata['Coordinate Space']}, poses against each one's parent; "
+                        "expected Global, and taken as that")
+    if written:
+        metadata["written with"] = written
     if "Length Units" not in metadata:
         problems.append("the header does not say the length units; metres are assumed")
     return Recording(source=source, kind="motive", version=header.version, time=(frames - frames[0]) / rate, frames=frames,
                      rate=rate, units=metadata.get("Length Units", "Meters"), rigid_bodies=bodies, markers=markers,
-                     metadata=metadata, problems=tuple(problems))
+                     metadata=metadata, problems=tuple(problems), sensing="mocap")
 
 
-def _read_body(source: str, content: mmap.mmap, header: MotiveHeader) -> pa.Table:
+def _read_body(source: str, content: Bytes, header: MotiveHeader) -> pa.Table:
     wanted = {0, 1} if header.columns > 1 else {0}
     for a in header.assets:
         wanted |= {*a.rotation.values(), *a.position.values()}
@@ -88,14 +106,46 @@ def _track(source: str, header: MotiveHeader, asset: Asset, table: pa.Table, sca
     return BodyTrack(p=p.T, quat=quat, error=error)
 
 
-def _frames(source: str, header: MotiveHeader, table: pa.Table) -> NDArray[np.int64]:
+def _frames(source: str, header: MotiveHeader, table: pa.Table, problems: list[str]) -> NDArray[np.int64]:
+    """Frame numbers; a leap of hours is told, and taken as one frame."""
     frames = column(table, 0)
-    bad = ~np.isfinite(frames)
+    bad = ~np.isfinite(frames) | (np.abs(frames) > _LARGEST) | (frames != np.round(frames))
     bad[1:] |= ~(np.diff(frames) > 0)
     if bad.any():
         n = int(np.argmax(bad))
-        raise InputError(source, f"line {header.lines + 1 + n}: frame {frames[n]:g} does not follow; expected increasing numbers")
-    return frames.astype(np.int64)
+        raise InputError(source, f"line {header.lines + 1 + n}: frame {frames[n]:g} does not follow; expected increasing "
+                                 "numbers, whole and below 1e15")
+    out = frames.astype(np.int64)
+    steps = np.diff(out)
+    leaps = steps > max(_LEAP, 100 * len(out))
+    if leaps.any():
+        k = int(np.argmax(leaps))
+        problems.append(f"line {header.lines + 2 + k}: frame number leaps from {out[k]} to {out[k + 1]}, which no take has; what "
+                        "follows is taken as the next frames")
+    steps = np.where(leaps, 1, steps)
+    return np.concatenate([out[:1], out[0] + np.cumsum(steps)])
+
+
+def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], rate: float,
+              problems: list[str]) -> tuple[NDArray[np.int64], float]:
+    """Frames and rate that agree with the Time column, which was written frame by frame, where the header does not."""
+    time = column(table, 1) if header.columns > 1 else np.zeros(0)
+    good = np.isfinite(time)
+    if good.sum() < _FEW or header.timecode == 1:
+        return frames, rate
+    span, ticks = np.ptp(time[good]), frames[good][-1] - frames[good][0]
+    seconds = float(np.median(np.diff(time[good])))
+    steady = seconds > 0 and np.median(np.abs(np.diff(time[good]) - seconds)) < 0.2 * seconds
+    if not steady or not span > 0 or abs(span * rate / ticks - 1) < _DISAGREE:
+        return frames, rate
+    step = int(np.median(np.diff(frames)))
+    if step > 1 and abs(rate * seconds - 1) < 0.1 and np.all(np.diff(frames) % step == 0):
+        problems.append(f"frame numbers count every {step} although {rate:g} frames a second are exported; taken as one each, as "
+                        "the Time column has it")
+        return frames[0] + (frames - frames[0]) // step, rate
+    told = float(ticks / span)
+    problems.append(f"the header says {rate:g} frames a second, the Time column {told:.4g}; the Time column is taken")
+    return frames, told
 
 
 def _rate(source: str, header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], problems: list[str]) -> float:
@@ -110,7 +160,7 @@ def _rate(source: str, header: MotiveHeader, table: pa.Table, frames: NDArray[np
     return float((frames[-1] - frames[0]) / (time[-1] - time[0]))
 
 
-def _missing(source: str, header: MotiveHeader, mapped: mmap.mmap, frames: NDArray[np.int64]) -> list[str]:
+def _missing(source: str, header: MotiveHeader, mapped: Bytes, frames: NDArray[np.int64]) -> list[str]:
     problems = []
     steps = np.diff(frames)
     holes = np.flatnonzero(steps > 1)
@@ -132,3 +182,6 @@ def _unused(name: str, taken: Collection[str]) -> str:
     while out in taken:
         out, n = f"{name} {n}", n + 1
     return out
+
+
+FORMAT = RecordingFormat("motive", "a Motive CSV", looks_like_motive, read_motive)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from workbench.robot import InputError
+from workbench.robot.numerals import number_of
+from workbench.robot.tables import is_binary, split_row
 
 _METRES = {"meters": 1.0, "metres": 1.0, "m": 1.0, "centimeters": 0.01, "centimetres": 0.01, "cm": 0.01,
            "millimeters": 0.001, "millimetres": 0.001, "mm": 0.001}
@@ -48,6 +49,8 @@ class MotiveHeader:
 
 def looks_like_motive(head: bytes) -> bool:
     """Whether a file that begins with `head` is a Motive export, with or without its metadata row."""
+    if is_binary(head):
+        return False
     text = head.decode("utf-8", "replace").lstrip("\ufeff").lstrip()
     return text.lstrip('"').startswith("Format Version") or re.search(r'(?m)^"?Frame"?,"?Time', text) is not None
 
@@ -64,7 +67,7 @@ def parse_header(source: str, content: memoryview) -> MotiveHeader:
         line, offset = _next_line(content, offset)
         if line is None:
             break
-        rows.append([cell.strip() for cell in next(csv.reader([_decode(line)]), [])])
+        rows.append(split_row(_decode(line)))
         if rows[-1] and rows[-1][0] == "Frame":
             return _header(source, rows, offset)
     raise InputError(source, f"header: no row starts with 'Frame' in the first {len(rows)} lines; expected a whole Motive export")
@@ -158,10 +161,7 @@ def number(source: str, header: MotiveHeader, key: str) -> float | None:
     text = header.metadata.get(key, "")
     if not text:
         return None
-    try:
-        value = float(text.replace(",", "."))
-    except ValueError:
-        value = -1.0
-    if not value > 0 or value == float("inf"):
-        raise InputError(source, f"header: {key} is '{text}'; expected a positive number")
+    value = number_of(text.replace(",", "."))
+    if value is None or not 1e-3 <= value <= 1e9:
+        raise InputError(source, f"header: {key} is '{text[:40]}'; expected a positive number")
     return value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import mmap
 from collections.abc import Collection, Sequence
@@ -12,18 +11,23 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import compute as arrow_compute
 from pyarrow import csv as arrow_csv
 
 from workbench.robot import InputError
+from workbench.robot.files import MOST_TEXT, regular_file
+from workbench.robot.numerals import number_of
+from workbench.robot.tables import HEAD, plain_table, split_row
 
 Array = NDArray[np.float64]
+Bytes = bytes | mmap.mmap
 _BLANK = ["", " ", "NaN", "nan"]
 
 
 def map_file(path: str | Path) -> mmap.mmap:
     """The bytes of a file, mapped, not copied; InputError where it is empty or cannot be read."""
     try:
-        with open(path, "rb") as file:
+        with regular_file(path).open("rb") as file:
             file.seek(0, 2)
             if file.tell() == 0:
                 raise InputError(path, "the file is empty")
@@ -32,7 +36,18 @@ def map_file(path: str | Path) -> mmap.mmap:
         raise InputError(path, f"cannot be read ({e.strerror})") from None
 
 
-def read_columns(source: str, content: mmap.mmap, offset: int, lines: int, width: int, text: Collection[int] = (),
+def table_bytes(path: str | Path) -> tuple[Bytes, str]:
+    """The bytes of a table made plain (`plain_table`), mapped where they are plain already, and how it was written if not."""
+    mapped = map_file(path)
+    written = plain_table(mapped[:HEAD])[1]
+    if not written:
+        return mapped, ""
+    if len(mapped) > MOST_TEXT:
+        raise InputError(path, f"{written}: more than {MOST_TEXT >> 20} MB are read in UTF-8 with commas alone")
+    return plain_table(mapped[:])[0], written
+
+
+def read_columns(source: str, content: Bytes, offset: int, lines: int, width: int, text: Collection[int] = (),
                  wanted: Collection[int] | None = None) -> pa.Table:
     """Rows from byte `offset` on, `lines` lines into the file, `width` cells each; columns are named "0", "1", ….
 
@@ -55,23 +70,30 @@ def read_columns(source: str, content: mmap.mmap, offset: int, lines: int, width
         raise InputError(source, _where_broken(content, offset, lines, width, text) or f"after line {lines}: {e}") from None
     if table.num_rows == 0:
         raise InputError(source, f"line {lines + 1}: expected at least one row of data")
+    for name, kind in types.items():
+        column_of = table.column(name)
+        if kind == pa.float64() and arrow_compute.any(arrow_compute.is_inf(column_of)).as_py():
+            where = _where_broken(content, offset, lines, width, text)
+            raise InputError(source, where or f"column {int(name) + 1}: expected finite numbers")
     return table
 
 
-def _where_broken(content: mmap.mmap, offset: int, lines: int, width: int, text: Collection[int]) -> str | None:
+def _where_broken(content: Bytes, offset: int, lines: int, width: int, text: Collection[int]) -> str | None:
     """The first row that is not as wide as the header or not of numbers; looked for only once the fast reader has failed."""
-    rows = content[offset:].decode("utf-8", "replace").splitlines()
-    for n, row in enumerate(csv.reader(rows), start=lines + 1):
-        if not any(c.strip() for c in row):
+    n = lines
+    while offset < len(content):
+        end = content.find(b"\n", offset)
+        last = end < 0
+        line = content[offset:len(content) if last else end]
+        offset, n = len(content) if last else end + 1, n + 1
+        row = split_row(line.decode("utf-8", "replace"))
+        if not any(row):
             continue
         if len(row) != width:
-            cut = "; the file is cut mid-row" if n == lines + len(rows) and len(row) < width else ""
+            cut = "; the file is cut mid-row" if last and len(row) < width else ""
             return f"line {n}: {len(row)} of {width} columns{cut}"
         for i, cell in enumerate(row):
-            try:
-                if i not in text and cell.strip():
-                    float(cell)
-            except ValueError:
+            if i not in text and cell not in _BLANK and number_of(cell) is None:
                 return f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'"
     return None
 
@@ -110,7 +132,10 @@ def rate_of(time: Array) -> float:
 def number_columns(path: str | Path, text: str, first_line: int, skip_blank: bool = False) -> dict[str, Array]:
     """Columns by name of a table that the workbench wrote: a header, then numbers; a blank cell is NaN, a line that is too short
     or too long an InputError. first_line: of the file, on which `text` begins. skip_blank: blank lines do not count."""
-    width = text.partition("\n")[0].count(",")
+    header = text.partition("\n")[0]
+    width = header.count(",")
+    if '"' in header:
+        raise InputError(path, f"line {first_line}: expected names of columns without quotes")
     for i, line in enumerate(text.splitlines()):
         if line.count(",") != width and not (skip_blank and not line):
             raise InputError(path, f"line {i + first_line}: expected {width + 1} cells, got {line.count(',') + 1}")

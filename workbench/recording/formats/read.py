@@ -4,72 +4,76 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workbench.recording.formats.bam_log import read_bam_log
-from workbench.recording.formats.joint_log import looks_like_joint_log, read_joint_log
-from workbench.recording.formats.motive import read_motive
-from workbench.recording.formats.motive_header import looks_like_motive
-from workbench.recording.formats.sage import read_sage_npz, read_sage_raw, sage_programmes
+from workbench.recording.formats.foreign import refusal
+from workbench.recording.formats.registry import RecordingFormat, format_of, format_of_folder, known_formats
+from workbench.recording.plausibility import checked
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
-
-_HEAD = 1 << 16
+from workbench.robot.tables import plain_head
 
 
 def recording_of_take(path: Path, take: str) -> Path:
-    """What `read_recording` is to read for a session's take: `path` itself, a file, the folder of a SAGE programme or
-    FILE#PROGRAMME; of an npz of several programmes the one that is called as the take is. InputError says what is missing."""
-    file, programme = _programme_of(path)
-    if path.is_dir():
-        if not (path / "state_motor.csv").is_file():
-            raise InputError(None, f"expected a recording, found a folder without state_motor.csv: {path}")
-        return path
-    if not file.is_file():
+    """What `read_recording` is to read for a session's take: `path` itself, a file or a folder of a format, or FILE#PART; of
+    several recordings in one file the one that is called as the take is. InputError says what is missing."""
+    file, part = split_part(path)
+    if not file.exists():
         raise InputError(None, f"file not found: {file}")
-    known = sage_programmes(file) if programme is not None or file.suffix == ".npz" else ()
-    if programme is not None and programme not in known:
-        raise InputError(None, f"no programme '{programme}' in {file}; expected one of {', '.join(known) or 'an npz of them'}")
-    if programme is None and len(known) > 1:
+    known: tuple[str, ...] = ()
+    try:
+        known = _format(file).parts(file)
+    except InputError as e:
+        if file.is_dir():
+            raise InputError(None, f"{e.problem}: {file}") from None
+        # what is damaged is told when it is read
+    if part is not None and part not in known:
+        raise InputError(None, f"no programme '{part}' in {file}; expected one of {_listed(known) or 'a file of several'}")
+    if part is None and len(known) > 1:
         if take not in known:
-            raise InputError(None, f"{file} holds {len(known)} programmes; expected FILE#PROGRAMME, or a take called like one")
+            raise InputError(None, f"{file} holds {len(known)} programmes ({_listed(known)}); expected FILE#PROGRAMME, or a take "
+                                   "called like one")
         return file.with_name(f"{file.name}#{take}")
     return path
 
 
-def _programme_of(path: Path) -> tuple[Path, str | None]:
-    if path.exists() or "#" not in path.name:
+def split_part(path: Path) -> tuple[Path, str | None]:
+    """The file or folder, and which of its recordings FILE#PART names."""
+    if "#" not in path.name or path.exists():
         return path, None
-    name, _, programme = path.name.partition("#")
-    return path.with_name(name), programme
+    name, _, part = path.name.partition("#")
+    return path.with_name(name), part
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Reads a Motive CSV, a joint log, a BAM log, or a SAGE programme (npz, folder of raw CSV, or one file of it).
+    """Reads a recording of any known format, told by its content; its joints' channels checked, and mended where that is certain.
 
-    One programme of an npz of several is called FILE#PROGRAMME. InputError where the content is none of these or is damaged.
+    One recording of a file of several is called FILE#PART. InputError where the content is of no format or is damaged.
     """
-    path, programme = _programme_of(Path(path))
+    path, part = split_part(Path(path))
+    known = _format(path)
+    if part is None:
+        return checked(known.read(path))
+    names = known.parts(path)
+    if known.read_part is None or part not in names:
+        raise InputError(path, f"no programme '{part}'; expected one of {_listed(names)}" if names
+                         else f"'#{part}' chooses one of several recordings; this is one")
+    return checked(known.read_part(path, part))
+
+
+def _format(path: Path) -> RecordingFormat:
     if path.is_dir():
-        if (path / "state_motor.csv").is_file():
-            return read_sage_raw(path)
-        raise InputError(path, "expected a recording, found a folder without state_motor.csv")
-    try:
-        with open(path, "rb") as file:
-            head = file.read(_HEAD)
-    except OSError as e:
-        raise InputError(path, f"cannot be read ({e.strerror})") from None
-    text = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-    if head.startswith(b"PK"):
-        return read_sage_npz(path, programme)
-    if programme is not None:
-        raise InputError(path, f"'#{programme}' chooses a programme of an npz; this is none")
-    if text.startswith((b"{", b"[")):
-        return read_bam_log(path)
-    if looks_like_motive(head):
-        return read_motive(path)
-    if looks_like_joint_log(head):
-        return read_joint_log(path)
-    if text.startswith((b"type,timestamp,", b'"type","timestamp"')):
-        return read_sage_raw(path)
+        found = format_of_folder(path)
+        if found is None:
+            marks = " or ".join(f.marks for f in known_formats() if f.marks)
+            raise InputError(path, f"expected a recording, found a folder without {marks}")
+        return found
+    head = plain_head(path)
     if not head:
         raise InputError(path, "the file is empty; expected a recording")
-    raise InputError(path, "line 1: not a recording; expected a Motive CSV, a joint log, a BAM log or a SAGE programme")
+    found = format_of(head)
+    if found is None:
+        raise refusal(path, head)
+    return found
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

@@ -16,7 +16,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.formats.numbers import number_columns
 from workbench.recording.take import Take
 from workbench.robot import InputError
-from workbench.robot.files import read_text, write_whole
+from workbench.robot.files import parse_json, read_text, write_whole
 
 Array = NDArray[np.float64]
 
@@ -65,13 +65,13 @@ def load_rollout(path: str | Path) -> Take:
         raise InputError(path, f"line 1: expected a table that starts with '{HEADER}'")
     if lines[0].rstrip() != f"{HEADER}, format 1":
         raise InputError(path, f"line 1: expected format 1, got '{lines[0].rstrip()}'")
+    about = parse_json(path, lines[1].lstrip("# "), "line 2: ")
     try:
-        about = json.loads(lines[1].lstrip("# "))
         name, source, zeroed, base = (about[k] for k in ("name", "source", "zeroed", "base"))
         start = float("nan") if about["starts_at"] is None else float(about["starts_at"])
         commands = None if about["commands"] is None else _commands_in(about["commands"])
-        problems = tuple(about["problems"])
-    except (ValueError, KeyError, TypeError, IndexError) as e:
+        problems = tuple(map(str, about["problems"]))
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as e:
         raise InputError(path, f"line 2: expected what the take is, as JSON ({type(e).__name__}: {e})") from None
     columns = number_columns(path, lines[3], first_line=4, skip_blank=True)
     joints = tuple(c.removeprefix("position.") for c in columns if c.startswith("position."))

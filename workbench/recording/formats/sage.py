@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-import json
+import struct
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -13,22 +16,31 @@ from pyarrow import csv as arrow_csv
 
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.numbers import map_file, rate_of
+from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.joint_names import SO101_JOINTS as JOINTS
+from workbench.recording.joint_names import URDF_JOINTS
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
-from workbench.robot.files import read_text
+from workbench.robot.files import parse_json, read_text, regular_file
+from workbench.robot.tables import plain_head
 
 Array = NDArray[np.float64]
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
+MOST_UNPACKED = 256 << 20
+"""Of all arrays in one file [bytes]: hours of an arm's log."""
+_DAMAGED = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, AttributeError, NotImplementedError, RuntimeError,
+            KeyError, TypeError, OverflowError, MemoryError, SyntaxError, struct.error, tokenize.TokenError)
+"""What numpy and zipfile raise on damaged archives."""
 _MORE = {"v_meas": "velocity", "tau_abs": "torque_magnitude"}
 
 
 def sage_programmes(path: str | Path) -> tuple[str, ...]:
     """Names of the programmes in an npz, without reading them; none where it is no such file."""
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
-            return tuple(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError, AttributeError):
+        with zipfile.ZipFile(regular_file(path)) as content:
+            names = [n.removesuffix(".npy") for n in content.namelist() if n.endswith(".npy")]
+            return tuple(dict.fromkeys(n.rpartition("/")[0] for n in names))
+    except _DAMAGED:
         return ()
 
 
@@ -40,18 +52,35 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
     """
     source = str(path)
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as content:
+        _check_size(path)
+        with regular_file(path).open("rb") as file, np.load(file, allow_pickle=False) as content:
             names = list(dict.fromkeys(key.rpartition("/")[0] for key in content.files))
             wanted = [k for k in content.files if programme is None or k.rpartition("/")[0] == programme]
-            fields = {key: np.asarray(content[key], dtype=float) for key in wanted}
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError) as e:
-        raise InputError(source, f"not a whole npz of number arrays: {e}") from None
+            fields = {key: _real(source, key, content[key]) for key in wanted}
+    except InputError:
+        raise
+    except _DAMAGED as e:
+        raise InputError(source, f"damaged, or not an npz of number arrays: {e}") from None
     if programme is not None and programme not in names:
         raise InputError(source, f"no programme '{programme}'; expected one of {', '.join(names)}")
     parts = [_npz_programme(source, fields, n) for n in ([programme] if programme is not None else names)]
     if not parts:
         raise InputError(source, "expected arrays '<programme>/<field>', found none")
     return parts[0] if len(parts) == 1 else _all_of(source, names, parts)
+
+
+def _check_size(path: str | Path) -> None:
+    """InputError where what is packed would fill the memory: the archive says how large each array is."""
+    with zipfile.ZipFile(path) as content:
+        total = sum(entry.file_size for entry in content.infolist())
+    if total > MOST_UNPACKED:
+        raise InputError(path, f"unpacks to {total / 2**20:.0f} MB; expected at most {MOST_UNPACKED >> 20} MB")
+
+
+def _real(source: str, key: str, values: Any) -> Array:
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+        raise InputError(source, f"'{key}': expected real numbers, found {getattr(values, 'dtype', type(values).__name__)}")
+    return np.asarray(values, dtype=float)
 
 
 def _npz_programme(source: str, fields: dict[str, Array], name: str) -> Recording:
@@ -85,16 +114,19 @@ def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, d
     try:
         table = arrow_csv.read_csv(pa.BufferReader(pa.py_buffer(memoryview(content))), convert_options=arrow_csv.ConvertOptions(
             column_types={"timestamp": pa.float64(), **dict.fromkeys(columns, pa.string())}))
-    except pa.ArrowInvalid as e:
+    except (pa.ArrowInvalid, UnicodeDecodeError) as e:
         raise InputError(source, f"{e}") from None
     missing = [c for c in ("timestamp", *columns) if c not in table.column_names]
     if missing:
         raise InputError(source, f"line 1: column '{missing[0]}' is missing")
     out = {}
     for name in columns:
-        cells = table.column(name).to_pylist()
         try:
-            rows = json.loads("[" + ",".join(cells) + "]")
+            cells = table.column(name).to_pylist()
+        except UnicodeDecodeError as e:
+            raise InputError(source, f"column '{name}': not a text in UTF-8 ({e.reason})") from None
+        try:
+            rows = parse_json(source, "[" + ",".join(cells) + "]")
             out[name] = np.array(rows, dtype=float).reshape(len(cells), width)
         except (ValueError, TypeError):
             n = next(i for i, c in enumerate(cells) if not _is_vector(c, width))
@@ -105,7 +137,7 @@ def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, d
 
 def _is_vector(cell: str | None, width: int) -> bool:
     try:
-        return len(np.array(json.loads(cell or ""), dtype=float).reshape(-1)) == width
+        return len(np.array(parse_json("", cell or ""), dtype=float).reshape(-1)) == width
     except (ValueError, TypeError):
         return False
 
@@ -113,19 +145,27 @@ def _is_vector(cell: str | None, width: int) -> bool:
 def _recording(source: str, name: str, joints: tuple[str, ...], t_cmd: Array, goals: Array, time: Array,
                measured: dict[str, Array]) -> Recording:
     for what, t in (("command", t_cmd), ("measurement", time)):
-        if len(t) == 0 or not np.all(np.diff(t) > 0):
+        if len(t) == 0 or not np.isfinite(t).all() or not np.all(np.diff(t) > 0) or not np.all(np.diff(t - t[0]) > 0):
             raise InputError(source, f"{name}: {what} times do not increase")
     for what, values in {"goal": goals, **measured}.items():
         rows = len(t_cmd) if what == "goal" else len(time)
         if values.shape != (rows, len(joints)):
             raise InputError(source, f"{name}: {what} has shape {values.shape}; expected {(rows, len(joints))}")
+    for what, values in {"goal": goals, **measured}.items():
+        if np.isinf(values).any() or (what in ("goal", "position") and not np.isfinite(values).any()):
+            raise InputError(source, f"{name}: {what} holds no finite number" if not np.isfinite(values).any()
+                             else f"{name}: {what}: expected finite numbers")
     commands = commands_of_rows(t_cmd, joints, goals, np.ones(goals.shape, dtype=bool))
     latest = np.maximum(np.searchsorted(t_cmd, time, side="right") - 1, 0)
     channels = {f"goal.{j}": goals[latest, i] for i, j in enumerate(joints)}
     channels |= {f"{what}.{j}": values[:, i] for what, values in measured.items() for i, j in enumerate(joints)}
     return Recording(source=source, kind="sage", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
                      units="radians", channels=channels, commands=commands,
-                     metadata={"programme": name, "first command": repr(float(t_cmd[0]))})
+                     metadata={"programme": name, "first command": repr(float(t_cmd[0]))}, aliases=_aliases(joints))
+
+
+def _aliases(joints: tuple[str, ...]) -> dict[str, str]:
+    return URDF_JOINTS if set(joints) == set(URDF_JOINTS) else {}
 
 
 def _all_of(source: str, names: list[str], parts: list[Recording]) -> Recording:
@@ -135,6 +175,21 @@ def _all_of(source: str, names: list[str], parts: list[Recording]) -> Recording:
         source=source, kind="sage", version="", time=time, frames=np.arange(len(time)),
         rate=float(np.median([p.rate for p in parts])), units="radians",
         channels={c: np.concatenate([p.channels[c] for p in parts]) for c in common},
-        metadata={"programmes": ", ".join(names)},
+        metadata={"programmes": ", ".join(names)}, aliases=parts[0].aliases,
         problems=(f"holds {len(names)} programmes, each on its own clock; choose one as FILE#PROGRAMME",))
 
+
+
+def _npz(head: bytes) -> bool:
+    return head.startswith(b"PK")
+
+
+def _raw(head: bytes) -> bool:
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith((b"type,timestamp,", b'"type","timestamp"'))
+
+
+FORMAT = RecordingFormat(
+    "sage", "a SAGE programme (npz, or a folder with state_motor.csv)", lambda head: _npz(head) or _raw(head),
+    lambda path: read_sage_raw(path) if path.is_dir() or _raw(plain_head(path)) else read_sage_npz(path),
+    marks="state_motor.csv",
+    parts=lambda path: () if path.is_dir() else sage_programmes(path), read_part=read_sage_npz)

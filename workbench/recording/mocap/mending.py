@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.swaps import unswap
 from workbench.recording.mocap.tracks import Tracks, tracks_of
+from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
 
@@ -22,8 +24,12 @@ _ARM = 0.1  # [m] a rotation weighs as much as the way of a point this far off
 
 
 def mend(tracks: Tracks, model: RobotModel | None = None, longest: float = LONGEST_MENDED) -> Tracks:
-    """Sign flips undone, exchanged labels put back, lone spikes cut out, gaps up to `longest` [s] filled (positions linearly,
-    rotations by slerp). All is told in `problems`; `model` lets exchanged labels be judged by the robot's tree."""
+    """Poses that were not seen blanked, lengths and axes set right, sign flips undone, exchanged labels put back, lone spikes cut
+    out, gaps up to `longest` [s] filled (positions linearly, rotations by slerp). All is told in `problems`; `model` lets
+    lengths, axes and exchanged labels be judged by the robot's tree."""
+    tracks = without_unseen(tracks)
+    if model is not None:
+        tracks = conventional(tracks, model)
     tracks = _continuous_signs(tracks)
     tracks = unswap(tracks, model)
     tracks = _without_spikes(tracks, longest)

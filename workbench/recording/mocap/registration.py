@@ -43,7 +43,7 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
     stated. Logs carry
     their own commands and clock. InputError where a start cannot be found.
     """
-    if recording.kind != "motive":
+    if recording.sensing == "encoders":
         return _register_log(recording, model, starts_at)
     check_assets(recording, model)
     tracks = mend(tracks_of(recording), model)

@@ -13,6 +13,10 @@ from workbench.recording.recording import Recording
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]
+FARTHEST = 1000.0
+"""From the capture's origin [m]; no volume is as large."""
+NOT_UNIT = 2e-3
+"""By which a quaternion of four digits still misses unit length."""
 _MAX_HOLE = 20  # a clock with more than this many missing frames for each one seen is not filled up
 
 
@@ -85,17 +89,34 @@ def tracks_of(recording: Recording) -> Tracks:
     filled = total != len(frames) and total <= _MAX_HOLE * len(frames)
     count = total if filled else len(frames)
     at = frames if filled else np.arange(count)
+    problems: list[str] = []
     p, q = np.full((len(assets), count, 3), np.nan), np.full((len(assets), count, 4), np.nan)
     for i, body in enumerate(recording.rigid_bodies.values()):
         p[i, at] = model_axes(body.p)
-        norm = np.linalg.norm(body.quat, axis=1, keepdims=True)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            unit = np.where(norm > 0.5, body.quat / norm, np.nan)
+        far = np.abs(body.p).max(axis=1, initial=0.0) > FARTHEST
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            norm = np.linalg.norm(body.quat, axis=1, keepdims=True)
+            unit = np.where((norm > 0.5) & (norm < 2) & ~far[:, None], body.quat / norm, np.nan)
+        problems += _odd(assets[i], norm[:, 0], far)
         q[i, at] = np.concatenate([unit[:, :1], model_axes(unit[:, 1:])], axis=1)
     unseen = ~(np.isfinite(p).all(axis=-1) & np.isfinite(q).all(axis=-1))
     p[unseen], q[unseen] = np.nan, np.nan
     time = np.arange(count) / recording.rate if filled else recording.time
-    return Tracks(time, recording.rate, assets, p, q, np.zeros((len(assets), count)), np.zeros(count, dtype=bool))
+    return Tracks(time, recording.rate, assets, p, q, np.zeros((len(assets), count)), np.zeros(count, dtype=bool),
+                  tuple(problems))
+
+
+def _odd(asset: str, norm: Array, far: NDArray[np.bool_]) -> list[str]:
+    """What is wrong with a body's numbers: quaternions that are not of unit length, places that no capture volume holds."""
+    out = []
+    lengths = norm[np.isfinite(norm) & (norm > 0)]
+    off = lengths[np.abs(lengths - 1) > NOT_UNIT]
+    if len(off) > 0.01 * len(lengths):
+        out.append(f"{asset}: {len(off)} of {len(lengths)} quaternions are not of unit length ({off.min():.4g} to "
+                   f"{off.max():.4g}); made so, or, beyond 0.5 to 2, not seen")
+    if far.any():
+        out.append(f"{asset}: {int(far.sum())} frame(s) more than {FARTHEST:g} m away: not seen")
+    return out
 
 
 @dataclass(frozen=True)

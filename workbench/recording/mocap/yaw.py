@@ -48,7 +48,7 @@ def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Se
     median over joints and takes is robust to a loose mount. Half a turn stays open: where the bodies stand decides,
     else the sign in which joints follow their commands.
     """
-    tracks = [_prepared(r, model) for r in recordings if r.kind == "motive"]
+    tracks = [_prepared(r, model) for r in recordings if r.sensing == "mocap"]
     return yaw_of(tracks, model, [*commands, *[None] * (len(tracks) - len(commands))], base)
 
 

@@ -110,23 +110,30 @@ def run(tree: Tree, servos: Servos, shapes: Shapes, schedule: Schedule, state: S
     for k in range(4):
         w.turned[k] = 0.0
     rows = log.q.shape[0]
+    wanted = max(log.torque.shape[0], log.force.shape[0])
     for k in range(schedule.steps + 1):
         row = k // schedule.log_every if k % schedule.log_every == 0 else rows
+        elapsed = max(k * schedule.dt - schedule.begin, 0.0)
         if row < rows:
             _write_state(tree, state, row, log, w)
+        is_put = puts < schedule.put_step.shape[0] and schedule.put_step[puts] == k
+        if is_put and row < wanted:  # the log is of the robot as it came here
+            count = _solve_step(tree, servos, shapes, schedule.dt, elapsed, state, w)
+            if count < 0:
+                return -count
+            _write_forces(tree, servos, shapes, schedule.dt, count, state, row, log, w)
         while puts < schedule.put_step.shape[0] and schedule.put_step[puts] == k:
             put(tree, shapes, schedule, puts, rest, state, w)
             puts += 1
         while commands < schedule.command_step.shape[0] and schedule.command_step[commands] == k:
             command(schedule, commands, servos, state)
             commands += 1
-        if k == schedule.steps and row >= max(log.torque.shape[0], log.force.shape[0]):
+        if k == schedule.steps and row >= wanted:
             break
-        elapsed = max(k * schedule.dt - schedule.begin, 0.0)
         count = _solve_step(tree, servos, shapes, schedule.dt, elapsed, state, w)
         if count < 0:
             return -count
-        if row < rows:
+        if row < wanted and not is_put:
             _write_forces(tree, servos, shapes, schedule.dt, count, state, row, log, w)
         advance_servos(tree, servos, schedule.dt, state, w)
         _integrate(tree, schedule.dt, state, w)

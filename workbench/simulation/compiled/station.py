@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from workbench.effects.apply import Physics, physics_of, played
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
-from workbench.robot import InputError
 from workbench.simulation.compiled.arrays import Log, Schedule, State, Work, work_for
 from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.compiled.machine import Machine, machine_of
@@ -59,13 +58,10 @@ def _check(job: Job) -> None:
         raise NotCoveredError("a trajectory or a path to follow")
     if abs(c.logged_every / c.time_step - round(c.logged_every / c.time_step)) > 1e-9:
         raise NotCoveredError("a log between the steps")
-    whole = job.times is None
-    if whole and job.steadied is not None:
-        raise NotCoveredError("torques of a run that is put back")
-    if whole and job.commands is not None and not job.commands.enabled.all():
+    if job.times is None and job.commands is not None and not job.commands.enabled.all():
         raise NotCoveredError("torques of servos that are switched off")
-    if job.start is not None and c.base == "free":
-        raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path'")
+    if job.start is not None and c.base == "free" and Start(*job.start).base is None:
+        raise NotCoveredError("a free base whose pose is not given")  # an error, which the station words
 
 
 @dataclass
@@ -153,7 +149,7 @@ class CompiledJob:
                      memory=np.zeros((4, m)), stepped=np.zeros(1))
 
     def _put(self, start: Start, state: State) -> None:
-        """As `Simulation` puts its joints where a log's were; held bases alone."""
+        """As `Simulation` starts from a given state."""
         servos = np.asarray(start.q, dtype=float)
         structure = self._structure()
         if start.logged:
@@ -161,9 +157,14 @@ class CompiledJob:
         elif structure is not None:
             servos = structure.servo_angles(servos, state.q[[self.tables.joints.index(j) for j in structure.joints]])
         joint = self.machine.servos.joint
-        state.q[joint], state.v[joint] = servos, start.v
+        state.q[joint], state.v[(6 if self.free else 0) + joint] = servos, start.v
+        if self.free and start.base is not None:
+            state.base[:4] = start.base.quat_WB / np.linalg.norm(start.base.quat_WB)
+            state.base[4:], state.v[:3], state.v[3:6] = start.base.p_WB, start.base.w_WB, start.base.v_WB
         commands = self.plan.commands
         state.reference[:] = servos if commands is None else commands.goals[0] + self.physics.zero
+        if start.reference is not None:
+            state.reference[:] = state.goal[:] = start.reference
         state.memory[:], state.stepped[:] = 0.0, 0.0
 
     def _structure(self) -> Structure | None:

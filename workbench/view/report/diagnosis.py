@@ -10,7 +10,7 @@ import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
-from workbench.identify.shooting import WINDOW
+from workbench.identify.options import PROBLEM
 from workbench.identify.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
@@ -21,6 +21,7 @@ from workbench.view.report.words import (
     capital,
     change,
     headline,
+    in_words,
     intervals_of,
     is_error,
     layers_of,
@@ -29,7 +30,6 @@ from workbench.view.report.words import (
     name_of,
     next_said,
     quantity,
-    reason_of,
     rival_of,
     sentence_of,
     this_or,
@@ -113,8 +113,10 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
         what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
     if any(s.recorded.base == "free" for s in takes):
-        what.append(f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {WINDOW:g} s; "
-                    "paths and 3D show it left to itself.")
+        what.append(
+            f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
+            "paths and 3D show it left to itself."
+        )
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
@@ -182,7 +184,7 @@ def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
     if take.recorded.base == "free":
-        said += f", or the model's body had just been put back beside the recorded one, as every {WINDOW:g} s"
+        said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
 
@@ -269,7 +271,7 @@ def _left(diagnosis: Diagnosis) -> Section:
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
                   "effect that was tried explains it."), *_folded(header, off, "more")] if off else []
-    return Section("What is left", [*still, *(Text(f"{capital(u.description)}.") for u in order if not is_error(u))])
+    return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
@@ -281,10 +283,10 @@ def _tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
     """A table; without a column of errors where none was measured."""
     measured = any(r.validation is not None for r in rejected)
     header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
-    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), reason_of(r.reason)]
+    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
             for r in rejected]
     parts = _folded(header, rows, summary)
-    if any("chi squared" in r.reason for r in rejected):
+    if any(r.reason.of_chi_squared for r in rejected):
         parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
     return parts
 

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from workbench.robot import InputError, load_servo_constants, resolve_model
-from workbench.robot.files import read_text
-from workbench.robot.kinematics import Kinematics
+from workbench.robot import InputError, RobotModel, load_servo_constants
+from workbench.robot.files import read_json, read_text, regular_file
+from workbench.robot.tables import is_binary, plain_head
 from workbench.robot.yaml_file import read_yaml
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
 _SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units")
 """Of a Motive header: what other fields of the inspection say."""
+_RESULTS = {"findings": ("verdict", "findings"), "comparison": ("takes", "joints_by_error"), "certificate": ("claim", "margins"),
+            "bench": ("figures",)}
+"""JSON files that the workbench writes, by keys that they have."""
 
 
 @dataclass(frozen=True)
@@ -62,62 +65,90 @@ class Inspection:
             "gaps": None if self.share_of_gaps is None else f"{100 * self.share_of_gaps:.2f} %",
             **{f"  {name}": f"{100 * share:.2f} %" for name, share in list(self.gaps.items())[:_LISTED]},
             **{key: _names(value) if isinstance(value, list) else value for key, value in self.details.items()}}
-        said = {key: str(value) for key, value in lines.items() if value not in (None, "")}
+        said = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
         width = max(map(len, said))
-        out = [self.file] + [f"  {key:<{width}}  {value}" for key, value in said.items()]
-        return "\n".join(out + ([f"  problem: {p}" for p in self.problems] or ["  no problems"]))
+        out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in said.items()]
+        return "\n".join(out + ([f"  problem: {_line(p)}" for p in self.problems] or ["  no problems"]))
 
 
-def inspect_file(file: str | Path) -> Inspection:
-    """Tells what `file` is; InputError where it cannot be read or is of no known kind."""
+def inspect_file(file: str | Path, packages: Mapping[str, str] | None = None) -> Inspection:
+    """Tells what `file` is; InputError where it cannot be read or is of no known kind. packages: as of RobotModel."""
     name = str(file)
     path = Path(file)
     if name.startswith("package://"):
-        return _model(name)
+        return _model(name, packages)
     if path.is_dir():
-        return _firmware_tables(path) if (path / "pos.txt").is_file() else _recording(path)
-    whole = path if path.is_file() else Path(name.partition("#")[0])  # FILE.mtn#PAGE, FILE.npz#PROGRAMME
-    if not whole.is_file():
+        return _folder(path)
+    whole = path if path.exists() else Path(name.partition("#")[0])  # FILE.mtn#PAGE, FILE.npz#PROGRAMME
+    if whole.is_dir():
+        return _recording(path)
+    if not whole.exists():
         raise InputError(path, "file not found")
-    return _reader(whole, part=whole != path)(path)
+    regular_file(whole)
+    read = _reader(whole, part=whole != path)
+    return _model(name, packages) if read is None else read(path)
 
 
-def _reader(path: Path, part: bool) -> Callable[[Path], Inspection]:
-    """The function that knows files of this kind, or the `part` of one that is named."""
+def _folder(path: Path) -> Inspection:
+    """Firmware tables, a session, a recording that is a folder, or what a verb wrote."""
+    if (path / "session.yaml").is_file():
+        return _session(path / "session.yaml")
+    if (path / "pos.txt").is_file():
+        return _firmware_tables(path)
+    results = [name for name in ("findings.json", "comparison.json", "certificate.json", "rollout.csv", "inverse_dynamics.csv")
+               if (path / name).is_file()]
+    if results:
+        return replace(inspect_file(path / results[0]), file=str(path))
+    try:
+        return _recording(path)
+    except InputError as e:
+        if "found a folder" not in e.problem:
+            raise
+        raise InputError(path, "expected a session (session.yaml), firmware tables (pos.txt), results of the workbench, or a "
+                               "recording that is a folder (state_motor.csv, meta/info.json); found none of them") from None
+
+
+def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:
+    """The function that knows files of this kind, or the `part` of one that is named; None for a robot's description."""
     suffix = path.suffix.lower()
-    if suffix in (".npz", ".json"):
+    if suffix in (".npz", ".parquet"):
         return _recording
+    if suffix == ".json":
+        return _json
     if suffix in (".yaml", ".yml"):
         return _yaml
     if suffix == ".mtn":
         return _motion if part else _motion_file
     from workbench.recording.formats.file_kind import file_kind
 
-    with path.open(encoding="utf-8-sig", errors="replace") as stream:
-        first = next((line for line in stream if line.strip()), "").strip()
+    head = plain_head(path)
+    if is_binary(head):
+        return _figure if head.startswith(b"\x89PNG") else _recording
+    first = next((line for line in head.decode("utf-8-sig", "replace").splitlines() if line.strip()), "").strip()
+    if first.lower().startswith(("<!doctype html", "<html")):
+        return _page
     if first.startswith("<"):
-        return lambda p: _model(str(p))
+        return None
     if first.startswith("# joints:"):
         return lambda p: _firmware_tables(p.parent)
+    if first.startswith("# workbench inverse dynamics"):
+        return _inverse_dynamics
     return {"rollout": _rollout, "motion": _motion, "recording": _recording}[file_kind(path)]
 
 
 def _recording(path: Path) -> Inspection:
+    from workbench.compare.file_problems import recording_problems
     from workbench.recording.formats.read import read_recording
-    from workbench.recording.mocap.mending import mend
-    from workbench.recording.mocap.tracks import tracks_of
 
     r = read_recording(path)
-    found = mend(tracks_of(r)).problems if r.rigid_bodies else ()
     missing = {name: np.isnan(body.p).any(axis=1) for name, body in r.rigid_bodies.items()}
     missing |= {name: np.isnan(p).any(axis=1) for name, p in r.markers.items()}
     missing |= {name: np.isnan(values) for name, values in r.channels.items()}
-    joints = tuple(dict.fromkeys(c.partition(".")[2] for c in r.channels if "." in c))
     metadata = {k: v for k, v in r.metadata.items() if v and k not in _SAID}
     return Inspection(
         str(path), r.kind, r.version or None, r.units or None, _finite(r.rate), len(r.time), _duration(r.time),
-        tuple(r.rigid_bodies), tuple(r.markers), joints, *_gaps(missing), details=metadata,
-        problems=tuple(dict.fromkeys((*r.problems, *found))))
+        tuple(r.rigid_bodies), tuple(r.markers), r.joints, *_gaps(missing), details=metadata,
+        problems=tuple(recording_problems(path, r)))
 
 
 def _rollout(path: Path) -> Inspection:
@@ -137,19 +168,15 @@ def _rollout(path: Path) -> Inspection:
 
 
 def _motion(path: Path) -> Inspection:
+    from workbench.compare.file_problems import motion_problems
     from workbench.motion import load_motion
 
     motion = load_motion(path)
-    problems = [] if motion.closes else ["the last row differs from the first: played in a loop, the motion jumps"]
-    try:
-        motion.as_table()
-    except InputError as e:
-        problems.append(e.problem)
     degrees = np.rad2deg(motion.angles)
     return Inspection(
         str(path), "motion", units="deg, s", duration=motion.duration, joints=motion.joints,
         details={"poses": len(motion.times) - 1, "largest angle": f"{np.abs(degrees).max():.1f} deg"},
-        problems=tuple(problems))
+        problems=tuple(motion_problems(motion)))
 
 
 def _motion_file(path: Path) -> Inspection:
@@ -173,16 +200,31 @@ def _firmware_tables(folder: Path) -> Inspection:
         joints=table.joints, details={"poses": len(table)})
 
 
-def _model(name: str) -> Inspection:
-    path = resolve_model(name)
-    kinematics = Kinematics.from_file(path)
-    version = re.search(r"""<sdf[^>]*version=["']([^"']+)""", read_text(path))
+def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
+    """A robot's description, built as `simulate` builds it."""
+    from workbench.simulation import MakePuppyStation, SimulationConfig
+
+    model = RobotModel(description=name, packages=packages or {})
+    kinematics = model.kinematics
+    model = replace(model, base=kinematics.root)
+    problems = list(model.problems)
+    try:
+        if kinematics.joints:
+            MakePuppyStation(SimulationConfig(base="fixed" if kinematics.fixed_to_world else "free"), model)
+        else:
+            problems.append("no joint that turns: nothing for a servo to move")
+    except (RuntimeError, ValueError) as e:
+        text = e.problem if isinstance(e, InputError) else " ".join(str(e).split())[:300]
+        problems.append(f"cannot be simulated: {text}")
+    source = model.source
+    version = re.search(r"""<sdf[^>]*version=["']([^"']+)""", read_text(source.source)) if source.source == source.path else None
     return Inspection(
-        name, "model", f"SDF {version[1]}" if version else path.suffix.lstrip(".").upper(), "m, kg, rad",
+        name, "model", f"SDF {version[1]}" if version else source.source.suffix.lstrip(".").upper(), "m, kg, rad",
         joints=kinematics.joints,
         details={"links": list(kinematics.links), "root": kinematics.root,
                  "mass": f"{kinematics.mass:.4f} kg",
-                 "base": "fixed to the world" if kinematics.fixed_to_world else "free"})
+                 "base": "fixed to the world" if kinematics.fixed_to_world else "free",
+                 "for Drake": "; ".join(source.notes)}, problems=tuple(problems))
 
 
 def _yaml(path: Path) -> Inspection:
@@ -192,30 +234,66 @@ def _yaml(path: Path) -> Inspection:
     if "takes" in content or "predict" in content:
         return _session(path)
     if "effects" in content or "servos" in content:
-        return _fitted_model(path, content)
+        return _fitted_model(path)
     if "stall_torque" in content:
-        law = "proportional_gain" if load_servo_constants(path).proportional_gain is not None else "compliance"
-        details = {"model": content.get("model"), "law": law}
-        return Inspection(str(path), "servo_constants", units="N m, rad/s, V", details=details)
+        servo = load_servo_constants(path)
+        law = "proportional_gain" if servo.proportional_gain is not None else "compliance"
+        details = {"model": servo.model, "law": law}
+        return Inspection(str(path), "servo_constants", units="N m, rad/s, V", details=details, problems=servo.doubts)
     raise InputError(path, "expected a session (takes), a model (effects, servos) or servo constants (stall_torque)")
 
 
 def _session(path: Path) -> Inspection:
+    from workbench.compare.file_problems import session_problems
     from workbench.compare.session import load_session
 
     session = load_session(path)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,
         details={"model": session.model.description, "base": session.model.base,
-                 "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict]})
+                 "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict]},
+        problems=tuple(session_problems(session)))
 
 
-def _fitted_model(path: Path, content: Mapping[str, Any]) -> Inspection:
-    effects = content.get("effects") or []
-    if not isinstance(effects, list) or not all(isinstance(e, Mapping) and "effect" in e for e in effects):
-        raise InputError(path, "effects: expected a list of effect, where, parameters")
-    named = [" ".join([str(e["effect"]), *map(str, e.get("where") or ())]) for e in effects]
-    return Inspection(str(path), "fitted_model", str(content.get("format")), details={"effects": named or ["none"]})
+def _fitted_model(path: Path) -> Inspection:
+    from workbench.compare.file_problems import model_problems_of
+    from workbench.robot import load_model
+
+    model = load_model(path)
+    named = [" ".join([e.effect, *e.where]) for e in model.effects]
+    return Inspection(str(path), "fitted_model", "1", joints=model.joints, details={"effects": named or ["none"]},
+                      problems=tuple(model_problems_of(model)))
+
+
+def _json(path: Path) -> Inspection:
+    """Results of the workbench by their keys, else a recording."""
+    content = read_json(path)
+    found = content if isinstance(content, dict) else {}
+    for kind, keys in _RESULTS.items():
+        if all(key in found for key in keys):
+            details = {"verdict": found.get("verdict"), "claim": found.get("claim")}
+            for key in ("takes", "findings"):
+                if isinstance(found.get(key), list):
+                    details[key] = [str(e.get("name") or e.get("effect")) for e in found[key] if isinstance(e, dict)]
+            return Inspection(str(path), kind, str(found.get("format", "")) or None, details=details)
+    return _recording(path)
+
+
+def _inverse_dynamics(path: Path) -> Inspection:
+    from workbench.dynamics import load_inverse_dynamics
+
+    table = load_inverse_dynamics(path)
+    return Inspection(str(path), "inverse_dynamics", "1", "m, deg, s, N, N m", frames=len(table.time), joints=tuple(table.joints),
+                      duration=_duration(table.time), problems=tuple(table.problems))
+
+
+def _page(path: Path) -> Inspection:
+    title = re.search(r"<title>([^<]{0,200})", plain_head(path).decode("utf-8", "replace"))
+    return Inspection(str(path), "page", details={"title": title[1].strip() if title else "", "open": "in a web browser"})
+
+
+def _figure(path: Path) -> Inspection:
+    return Inspection(str(path), "figure", details={"open": "in any viewer of pictures"})
 
 
 def _gaps(missing: Mapping[str, Any]) -> tuple[float | None, dict[str, float]]:
@@ -234,3 +312,8 @@ def _finite(value: float) -> float | None:
 def _names(names: tuple[str, ...] | list[Any]) -> str:
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return f"{len(names)}: {' '.join(map(str, names[:_LISTED]))}{more}" if names else ""
+
+
+def _line(text: str) -> str:
+    """Of one line, whatever a file's names hold."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 
-from workbench.compare.channels import ACROSS, BODY, joint_of
+from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
 from workbench.identify.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
+from workbench.identify.reasons import Dependence, Statement
 from workbench.robot import EffectSpec
 
 NAMED = 0.1
@@ -19,10 +19,7 @@ LAYERS: dict[Layer, str] = {
     "inertia": "where the mass is", "ground": "what the floor does", "measurement": "how it was measured"}
 _BODY = {"forward": "how far the body goes", "left": "how far the body drifts to the left", "heading": "the body's heading",
          "height": "the body's height", "roll": "the body's roll", "pitch": "the body's pitch"}
-_EFFECT = re.compile(r"\b([a-z]+(?:_[a-z]+)+|backlash|payload)\(([^()]*)\)")
 _SMALL = {"m": ("mm", 1e3), "s": ("ms", 1e3), "kg": ("g", 1e3)}
-_LEFT = re.compile(r"(?P<take>[^:]+): (?:across its axis \((?P<across>[^)]+)\), |(?P<body>\w+), )?goes with (?P<what>.+?)"
-                   r"(?: \(correlation (?P<r>[\d.]+)\))?")
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -70,9 +67,9 @@ def name_of(effect: str) -> str:
     return (known.title if known else "") or effect.replace("_", " ")
 
 
-def reason_of(text: str) -> str:
-    """A reason with effects as a person says them: "ground_friction() takes" -> "ground friction takes"."""
-    return _EFFECT.sub(lambda m: title_of(m[1], [w.strip() for w in m[2].split(",") if w.strip()]), text)
+def in_words(statement: Statement) -> str:
+    """A reason or a description with effects as a person calls them: "ground friction takes …"."""
+    return statement.said(title_of)
 
 
 def sentence_of(finding: Finding) -> str:
@@ -166,22 +163,17 @@ def is_error(u: Unexplained) -> bool:
 
 def left_row(u: Unexplained) -> list[str]:
     """What is off, in which take, by how much, over noise, and what it goes with."""
-    found = _LEFT.fullmatch(u.description)
     over = f"{u.error / u.floor:.1f}×" if u.floor > 0 else "–"
-    if found is None:
-        return [listed(u.where) or "whole robot", "", quantity(u.error, u.unit), over, u.description]
-    across = found["across"]
-    what = (f"{joint_of(across)}, across its axis ({across.partition(ACROSS)[2]})" if across else
-            _BODY.get(found["body"], found["body"]) if found["body"] in BODY else f"joint {listed(u.where)}" if u.where else
-            "whole robot")
-    with_what = found["what"]
-    if with_what == "nothing tried":
-        return [what, found["take"], quantity(u.error, u.unit), over, "with nothing that was looked at" if u.where else
-                "not with time"]
-    r = float(found["r"] or 0)
-    closely = "closely" if r > 0.7 else "partly" if r > 0.5 else "loosely"
-    own = "" if with_what == "time" else "its " if with_what != "size of the angle" else "the "
-    return [what, found["take"], quantity(u.error, u.unit), over, f"{closely} with {own}{with_what} ({r:.2f})"]
+    by, d = quantity(u.error, u.unit), u.description
+    if not isinstance(d, Dependence):
+        return [listed(u.where) or "whole robot", "", by, over, in_words(d)]
+    joint, _, axis = d.channel.partition(ACROSS)
+    what = f"{joint}, across its axis ({axis})" if axis else _BODY.get(d.channel, f"joint {joint}")
+    if d.signal is None:
+        return [what, d.take, by, over, "with nothing that was looked at" if u.where else "not with time"]
+    closely = "closely" if d.correlation > 0.7 else "partly" if d.correlation > 0.5 else "loosely"
+    own = {"time": "", "size of the angle": "the "}.get(d.signal, "its ")
+    return [what, d.take, by, over, f"{closely} with {own}{d.signal} ({d.correlation:.2f})"]
 
 
 def next_said(n: NextExperiment) -> str:

@@ -1,0 +1,182 @@
+"""The fuzzers: do they find what is planted, how much do they reach, and do they find nothing else?
+
+    python firmware/fuzz/campaign.py plant|clean|cover [--seconds N]
+
+`plant` puts ten faults into copies of the core, one at a time; each has to be found within the time. `clean` runs every target
+on the core as it is. `cover` says which share of its branches the kept corpus reaches (gcov). Corpus: firmware/fuzz/corpus.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+FIRMWARE = HERE.parent
+CORPUS = HERE / "corpus"
+TARGETS = ("robot", "table", "answer")
+MAX_LENGTH = {"robot": 400, "table": 800, "answer": 300}
+
+PLANTED = (
+    ("robot", "upload.c", "if (offset > u->got || offset + n > u->size) return UPLOAD_OFFSET;",
+     "if (offset > u->got) return UPLOAD_OFFSET;"),
+    ("robot", "upload.c", "if (u->got != u->size) return UPLOAD_OFFSET;", ""),
+    ("robot", "upload.c", "return fault ? fault : table_fits(u->spare, u->active);", "return fault;"),
+    ("robot", "upload.c", "if (!fault && u->checked++ < table_poses(u->spare)) return false;",
+     "if (!fault && u->checked++ < 1u) return false;"),
+    ("robot", "bridge.c", "if (b->got == 4u && (byte < 2u || byte + 4u > BUS_BYTES)) b->got = 0;", ""),
+    ("robot", "motion.c", "r->speeds[j] = (uint16_t)(speed > RAMP_SLOWEST ? speed : RAMP_SLOWEST);",
+     "r->speeds[j] = (uint16_t)speed;"),
+    ("table", "table.c", "if (table_joints(t) == 0 || table_joints(t) > MAX_JOINTS) return TABLE_JOINTS;", ""),
+    ("table", "table.c", "p < table_poses(t) && !fault; p++", "p + 1u < table_poses(t) && !fault; p++"),
+    ("answer", "frame.c", "if (r->state > LENGTH && r->length > FRAME_PAYLOAD) r->state = FIRST;", ""),
+    ("answer", "remote.c", "if (count == 1) return byte == 0x55;", ""),
+)
+"""target, file, what stands there, what is put in its place."""
+
+
+def compile_target(target: str, core: Path, out: Path) -> None:
+    """One fuzzer with ASan and UBSan."""
+    flags = ["-std=c11", "-O2", "-g", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
+    table = f'-DTABLE_FILE="{FIRMWARE / "robotis_walk.table"}"'
+    root = core.parent
+    sources = [root / f"fuzz/fuzz_{target}.c", *sorted(core.glob("*.c")), root / "tests/sim.c"]
+    subprocess.run(["clang", *flags, table, *map(str, sources), "-o", str(out)], check=True)
+
+
+def fuzz(binary: Path, target: str, seconds: int, corpus: Path, seed: int = 1) -> tuple[bool, float, str]:
+    """Whether it crashed, after how long [s], and the last lines."""
+    began = time.monotonic()
+    command = [str(binary), f"-max_total_time={seconds}", "-len_control=0", f"-max_len={MAX_LENGTH[target]}", f"-seed={seed}",
+               f"-artifact_prefix={corpus.parent}/", "-timeout=20", str(corpus)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    return run.returncode != 0, time.monotonic() - began, "\n".join(run.stderr.splitlines()[-12:])
+
+
+def copy_of(folder: Path) -> Path:
+    """Core, fuzz and tests in a folder of their own."""
+    for name in ("core", "fuzz", "tests"):
+        shutil.copytree(FIRMWARE / name, folder / name, ignore=shutil.ignore_patterns("corpus", "*.py", "__pycache__"))
+    return folder / "core"
+
+
+def plant(seconds: int) -> int:
+    """Each planted fault in turn; returns how many were not found."""
+    missed = 0
+    for number, (target, name, old, new) in enumerate(PLANTED, 1):
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            core = copy_of(folder)
+            text = (core / name).read_text()
+            if old not in text:
+                raise SystemExit(f"planted fault {number}: {name} no longer holds {old!r}")
+            (core / name).write_text(text.replace(old, new))
+            compile_target(target, core, folder / "fuzzer")
+            start = folder / "corpus"
+            shutil.copytree(CORPUS / target, start)
+            found, took, _ = fuzz(folder / "fuzzer", target, seconds, start)
+        missed += not found
+        print(f"{number:2} {target:7} {name:12} {'found' if found else 'NOT FOUND'} after {took:.1f} s", flush=True)
+    print(f"{len(PLANTED) - missed} of {len(PLANTED)} planted faults found within {seconds} s each")
+    return missed
+
+
+def clean(seconds: int) -> int:
+    """The core as it is; what is new in the corpus is kept. Returns how many targets crashed."""
+    crashed = 0
+    for target in TARGETS:
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            compile_target(target, FIRMWARE / "core", folder / "fuzzer")
+            new = folder / "corpus"
+            new.mkdir()
+            (CORPUS / target).mkdir(parents=True, exist_ok=True)
+            for path in (CORPUS / target).iterdir():
+                shutil.copy(path, new)
+            found, took, said = fuzz(folder / "fuzzer", target, seconds, new)
+            print(f"{target:7} {'CRASHED' if found else 'clean'} in {took:.0f} s", flush=True)
+            if found:
+                print(said)
+                crashed += 1
+                continue
+            merged = folder / "merged"
+            merged.mkdir()
+            subprocess.run([str(folder / "fuzzer"), "-merge=1", str(merged), str(new)], capture_output=True, check=True)
+            shutil.rmtree(CORPUS / target)
+            shutil.copytree(merged, CORPUS / target)
+    return crashed
+
+
+REPLAY = r"""
+#include <stdio.h>
+#include <stdint.h>
+#include <stddef.h>
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+int main(int n, char **paths) {
+    static uint8_t bytes[65536];
+    for (int k = 1; k < n; k++) {
+        FILE *f = fopen(paths[k], "rb");
+        if (!f) return 1;
+        size_t size = fread(bytes, 1, sizeof bytes, f);
+        fclose(f);
+        LLVMFuzzerTestOneInput(bytes, size);
+    }
+    return 0;
+}
+"""
+
+
+def cover() -> float:
+    """Share of the core's branches that the corpus takes, by gcov."""
+    taken: dict[tuple[str, int, int], bool] = {}
+    for target in TARGETS:
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = Path(temporary)
+            core = copy_of(folder)
+            (folder / "replay.c").write_text(REPLAY)
+            sources = [folder / f"fuzz/fuzz_{target}.c", *sorted(core.glob("*.c")), folder / "tests/sim.c", folder / "replay.c"]
+            table = f'-DTABLE_FILE="{FIRMWARE / "robotis_walk.table"}"'
+            command = ["gcc", "-std=c11", "-O0", "--coverage", table, *map(str, sources), "-o", "replay"]
+            subprocess.run(command, cwd=folder, check=True)
+            inputs = sorted(map(str, (CORPUS / target).iterdir()))
+            subprocess.run(["./replay", *inputs], cwd=folder, check=True)
+            data = sorted(map(str, folder.glob("*.gcda")))
+            command = ["gcov", "-b", "--json-format", "--stdout", *data]
+            said = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+            for line in said.stdout.splitlines():
+                for file in json.loads(line)["files"]:
+                    name = Path(file["file"]).name
+                    if not (core / name).exists() or name.endswith(".h"):
+                        continue
+                    for entry in file["lines"]:
+                        for k, branch in enumerate(entry["branches"]):
+                            place = (name, entry["line_number"], k)
+                            taken[place] = taken.get(place, False) or branch["count"] > 0
+    share = sum(taken.values()) / len(taken)
+    for name in sorted({n for n, _, _ in taken}):
+        own = {p: t for p, t in taken.items() if p[0] == name}
+        missing = sorted({line for (_, line, _), t in own.items() if not t})
+        print(f"{name:14} {sum(own.values()):4} of {len(own):4} branches; not taken in lines {missing}")
+    print(f"{100 * share:.1f} % of {len(taken)} branches")
+    return share
+
+
+def main() -> int:
+    """Exit code 1 where something is not as it should be."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("plant", "clean", "cover"))
+    parser.add_argument("--seconds", type=int, default=60)
+    args = parser.parse_args()
+    if args.what == "cover":
+        return int(cover() < 0.95)
+    return int((plant if args.what == "plant" else clean)(args.seconds) > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

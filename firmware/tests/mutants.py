@@ -1,0 +1,83 @@
+"""Tests that are tested: so many small wrong changes of the core, one at a time; how many do the native tests notice?
+
+    python firmware/tests/mutants.py [--count 50] [--seed 1]
+
+Each mutant is compiled in a folder of its own and put under the native tests of tests/firmware (WORKBENCH_FIRMWARE says where).
+Those that live are shown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+FIRMWARE = Path(__file__).resolve().parents[1]
+TESTS = ("tests/firmware/test_core_play.py", "tests/firmware/test_core_reactions.py", "tests/firmware/test_table_file.py")
+CHANGES = (
+    (r"(?<![<>=!-])<(?![<=])", "<="), (r"<=", "<"), (r"(?<![->=])>(?![>=])", ">="), (r">=", ">"), (r"==", "!="), (r"!=", "=="),
+    (r"&&", "||"), (r"\|\|", "&&"), (r"(?<=[\w)] )\+(?= [\w(])", "-"), (r"(?<=[\w)] )-(?= [\w(])", "+"),
+    (r"\breturn true;", "return false;"),
+    (r"\breturn false;", "return true;"), (r"\+\+;", "--;"), (r"= false;", "= true;"), (r"= true;", "= false;"),
+    (r"\b0u\b", "1u"),
+    (r"\b2u\b", "3u"), (r"!(?=[\w(])", ""), (r"\* 1000u", "* 100u"),
+)
+
+
+def candidates() -> list[tuple[Path, int, int, str]]:
+    """File, where from, where to, what instead; not in comments, not in includes, and not the sums' tables."""
+    found = []
+    for path in sorted(FIRMWARE.glob("core/*.c")):
+        text = path.read_text()
+        dead = [m.span() for m in re.finditer(r"/\*.*?\*/|^#.*?$|\"[^\"]*\"|'[^']*'|for \([^)]*\)", text, re.S | re.M)]
+        for pattern, new in CHANGES:
+            found += [(path, *m.span(), new) for m in re.finditer(pattern, text)
+                      if not any(a <= m.start() < b for a, b in dead)]
+    return found
+
+
+def survives(path: Path, begin: int, end: int, new: str) -> bool:
+    """Whether the tests pass although this was changed."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "firmware"
+        shutil.copytree(FIRMWARE, folder, ignore=shutil.ignore_patterns("corpus", "build"))
+        text = path.read_text()
+        (folder / "core" / path.name).write_text(text[:begin] + new + text[end:])
+        environment = os.environ | {"WORKBENCH_FIRMWARE": str(folder), "MOMENTS": "12"}
+        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow", *TESTS]
+        try:
+            run = subprocess.run(command, cwd=FIRMWARE.parent, env=environment, capture_output=True, timeout=150, check=False)
+        except subprocess.TimeoutExpired:
+            return False  # it hangs: noticed
+        return run.returncode == 0
+
+
+def main() -> int:
+    """Exit code 1 where fewer than 94 % are noticed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    chosen = random.Random(args.seed).sample(candidates(), args.count)
+    alive, began = 0, time.monotonic()
+    for number, (path, begin, end, new) in enumerate(chosen, 1):
+        text = path.read_text()
+        line = text.count("\n", 0, begin)
+        lives = survives(path, begin, end, new)
+        alive += lives
+        said = text.splitlines()[line].strip()
+        change = f"{text[begin:end]} -> {new or 'nothing'}"
+        print(f"{number:3} {'LIVES  ' if lives else 'noticed'} {path.name}:{line + 1}: {change} in: {said}", flush=True)
+    print(f"{args.count - alive} of {args.count} mutants noticed in {time.monotonic() - began:.0f} s")
+    return int(alive > 0.06 * args.count)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,127 @@
+"""Loading a program: against an emulated loader, with the line cut everywhere, wrong devices, wrong images, silence."""
+
+from __future__ import annotations
+
+import random
+import struct
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.image import Robot, image, needs_compiler
+from workbench.device.link import ControllerState
+from workbench.device.loader import (
+    HALF,
+    LOADED,
+    UNKNOWN,
+    UNTOUCHED,
+    LoadError,
+    Loading,
+    Transcript,
+    check_image,
+    load_loader_profile,
+)
+from workbench.device.virtual.loader import Controller, EmulatedLoader
+from workbench.robot import InputError
+
+PROFILE = load_loader_profile()
+IMAGE = struct.pack("<II", 0x20010000, 0x08003101) + random.Random(0).randbytes(3000)
+
+
+def load(line: EmulatedLoader, data: bytes = IMAGE) -> Transcript:
+    transcript = Transcript(now=lambda: line.time)
+    Loading(line, PROFILE, transcript).run(data)
+    return transcript
+
+
+def test_a_program_is_loaded_and_started_and_the_transcript_tells_all() -> None:
+    line = EmulatedLoader(PROFILE, Controller())
+    transcript = load(line)
+    assert (line.controller.runs, line.controller.program) == ("new", IMAGE)
+    text = transcript.text
+    for said in ("we send: '#'", "CM-530 loader", "we send: 'LOAD\\r'", "Ready", "the image, 3009 bytes", "Success", "'GO\\r'"):
+        assert said in text
+
+
+def test_the_line_cut_at_each_of_200_places_says_the_truth_and_a_second_run_succeeds() -> None:
+    whole = EmulatedLoader(PROFILE, Controller())
+    load(whole)
+    places = sorted({round(k * (whole.crossed - 1) / 199) for k in range(200)})
+    assert len(places) == 200
+    truth = {UNTOUCHED: {"factory"}, HALF: {"factory", "nothing"}, UNKNOWN: {"new", "nothing"}, LOADED: {"new"}}
+    seen = set()
+    for place in places:
+        controller = Controller()
+        with pytest.raises(LoadError) as caught:
+            load(EmulatedLoader(PROFILE, controller, cut_after=place))
+        assert "the line was cut" in caught.value.what
+        runs = controller.runs
+        assert runs in truth[caught.value.state], place
+        seen.add(caught.value.state)
+        load(EmulatedLoader(PROFILE, controller))
+        assert (controller.runs, controller.program) == ("new", IMAGE)
+    assert seen >= {UNTOUCHED, HALF, LOADED}
+
+
+def test_silence_another_device_and_unknown_texts_stop_before_anything_is_replaced() -> None:
+    for options, said in (
+        ({"mute": True}, "silent while it was switched on"),
+        ({"says": {"banner": b"CM-510 loader\r\n-"}}, "which is no CM-530"),
+        ({"says": {"banner": b"\r\nCM-530 v2\r\n$ "}}, "does not hold"),
+    ):
+        line = EmulatedLoader(PROFILE, Controller(), **options)
+        with pytest.raises(LoadError, match=said) as caught:
+            load(line)
+        assert caught.value.state == UNTOUCHED
+        assert line.controller.runs == "factory"
+
+
+def test_a_loader_that_answers_load_or_the_image_in_unknown_words_is_not_believed() -> None:
+    line = EmulatedLoader(PROFILE, Controller(), says={"ready": b"Bereit"})
+    with pytest.raises(LoadError, match="Bereit"):
+        load(line)
+    line = EmulatedLoader(PROFILE, Controller(), says={"success": b"done"})
+    with pytest.raises(LoadError, match="does not hold") as caught:
+        load(line)
+    assert caught.value.state == UNKNOWN
+
+
+def test_a_program_that_does_not_speak_is_said_to_be_loaded_but_not_seen() -> None:
+    line = EmulatedLoader(PROFILE, Controller(), starts=lambda program: b"")
+    with pytest.raises(LoadError, match="did not speak") as caught:
+        load(line)
+    assert caught.value.state == LOADED
+    assert line.controller.runs == "new"
+
+
+@pytest.mark.parametrize(("data", "said"), [
+    (b"", "0 bytes"), (b"\0" * 600_000, "600000 bytes"), (b"#!/bin/sh\n" + b"x" * 400, "no stack and start"),
+    (struct.pack("<II", 0x20010000, 0x08000101) + b"\0" * 400, "no stack and start"),
+])
+def test_a_wrong_image_is_refused(data: bytes, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        check_image(data, PROFILE, "x.bin")
+
+
+def test_a_loader_file_with_a_fault_is_named(tmp_path: Path) -> None:
+    good = Path(PROFILE.source).read_text()
+    for change, said in (("rate: 57600", "'rate' is missing"), ('ready: ["Ready"]', "'ready' is missing")):
+        path = tmp_path / "loader.yaml"
+        path.write_text(good.replace(change, ""))
+        with pytest.raises(InputError, match=said):
+            load_loader_profile(path)
+
+
+@needs_compiler
+def test_the_image_itself_is_loaded_started_and_speaks() -> None:
+    check_image(image(), PROFILE, "cm530.bin")
+
+    def start(program: bytes) -> bytes:
+        robot = Robot(data=program)
+        robot.run(60)
+        return bytes(robot.board.pc.received)
+
+    line = EmulatedLoader(PROFILE, Controller(), starts=start)
+    said = Loading(line, PROFILE, Transcript(now=lambda: line.time)).run(image())
+    assert said.state == ControllerState.CHECK
+    assert said.woke_from == "power on"

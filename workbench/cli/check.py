@@ -1,0 +1,74 @@
+"""What every verb says of its files before the long work: their problems, on stderr, and whether so much work is meant."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from workbench.cli.progress import warn
+
+if TYPE_CHECKING:
+    from workbench.compare.session import Session
+    from workbench.motion import Motion
+    from workbench.robot import RobotModel
+
+
+def add_yes(parser: argparse.ArgumentParser) -> None:
+    """--yes: long work is meant."""
+    parser.add_argument("--yes", action="store_true",
+                        help="simulate that long (asked for beyond ten minutes of the robot's time)")
+
+
+def check_session(verb: str, session: Session, yes: bool = True) -> None:
+    """Warns of a session's problems; InputError where a take lasts so long that it is mostly a slip, unless `yes`."""
+    from workbench.compare.file_problems import session_check
+
+    found = session_check(session)
+    warn(verb, found.warnings)
+    _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
+
+
+def check_model(verb: str, model: RobotModel) -> None:
+    """Warns of a robot's problems."""
+    from workbench.compare.file_problems import model_problems_of, told
+
+    problems = model_problems_of(model)
+    warn(verb, [f"{model.description}: {told(problems)}"] if problems else [])
+
+
+def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -> None:
+    """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
+    from workbench.compare.file_problems import motion_problems, told
+
+    problems = motion_problems(motion, cycles)
+    warn(verb, [f"{motion.source}: {told(problems)}"] if problems else [])
+    _ask(motion.source, cycles * motion.duration, yes)
+
+
+def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int = 1, yes: bool = True) -> None:
+    """Warns of the problems of a robot, and of motions and recordings of it."""
+    from workbench.compare.file_problems import recording_problems, serious, told
+    from workbench.motion import load_motion
+    from workbench.recording.formats.file_kind import file_kind
+    from workbench.recording.formats.read import read_recording
+
+    check_model(verb, model)
+    for file in files:
+        kind = file_kind(file)
+        if kind == "motion":
+            check_motion(verb, load_motion(file, model), cycles, yes)
+        elif kind == "recording":
+            recording = read_recording(file)
+            problems = serious(recording_problems(file, recording, model))
+            warn(verb, [f"{file}: {told(problems)}"] if problems else [])
+            _ask(file, float(recording.time[-1] - recording.time[0]), yes)
+
+
+def _ask(what: str, seconds: float, yes: bool) -> None:
+    from workbench.compare.file_problems import long_work
+    from workbench.robot import InputError
+
+    text = long_work(seconds)
+    if text and not yes:
+        raise InputError(None, f"{what}: {text} Say --yes if it is meant")

@@ -1,0 +1,93 @@
+"""`workbench flash MOTION`: conversion, build, load and start, in one command."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+from workbench.cli.options import add_model, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "flash",
+        help="build a motion into the controller's program, load and start it",
+        description="Turns a motion (CSV, .mtn, or a binary .table) into a table, builds the CM-530's program with it, "
+        "loads that through the controller's own loader and starts it. It replaces the program that is there, "
+        "says so, and goes on only at a yes.",
+    )
+    parser.add_argument("motion", metavar="MOTION")
+    add_model(parser)
+    parser.add_argument("--port", metavar="PORT", help="serial port of the PC link (default: the only one there is)")
+    parser.add_argument("--cycles", type=positive, metavar="N", help="stop in neutral after N cycles (default: go on until told)")
+    parser.add_argument("--force", action="store_true", help="although a limit is broken, with a warning")
+    parser.add_argument("--yes", action="store_true", help="do not ask before the program in the controller is replaced")
+    parser.add_argument("--dry-run", action="store_true", help="do all but open the port, and say what would be sent")
+    parser.add_argument("--loader", metavar="FILE", help="texts of the loader (default: data/loaders/cm530.yaml)")
+    parser.add_argument("--out", metavar="DIR", type=Path, default=Path("runs/flash"),
+                        help="for image, table and transcript (default: runs/flash)")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Builds, asks, loads, keeps the transcript."""
+    from workbench.cli.export import uncertified_by
+    from workbench.cli.progress import Progress
+    from workbench.device.loader import FACTORY, LoadError, Loading, Transcript, load_loader_profile
+    from workbench.device.program import build_program
+    from workbench.motion import load_motion
+    from workbench.robot import InputError
+    from workbench.robot.files import write_whole
+
+    profile = load_loader_profile(args.loader)
+    with Progress("flash") as progress:
+        progress("building")
+        model = load_model(args.model)
+        if Path(args.motion).suffix != ".table" and not args.force:
+            uncertified = uncertified_by(args.motion, load_motion(args.motion, model), model)
+            if uncertified is not None:
+                raise uncertified
+        program = build_program(args.motion, model, profile, args.out, args.cycles, args.force)
+    for violation in program.violations:
+        print(f"workbench flash: warning: {violation}", file=sys.stderr)
+    table = program.table.table
+    print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints")
+    if not profile.confirmed:
+        print(f"workbench flash: warning: no text in {profile.source} was seen on a real controller yet; it stops at the first "
+              "that differs, and the transcript shows it", file=sys.stderr)
+    print(FACTORY)
+    if args.dry_run:
+        print(f"dry run: would hold '{profile.key.decode()}' at {profile.rate} bit/s until the loader's prompt, send "
+              f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
+              f"{profile.start.decode()}, and wait for the program's word; no port was opened")
+        return 0
+    if not args.yes and not _agreed():
+        raise InputError("flash", "not loaded: say yes, or give --yes")
+    line = _line(args.port, profile.rate)
+    transcript = Transcript()
+    kept = args.out / f"transcript-{time.strftime('%Y%m%d-%H%M%S')}.txt"
+    try:
+        with Progress("flash") as progress:
+            said = Loading(line, profile, transcript, progress).run(program.image)
+    except LoadError as e:
+        raise InputError("flash", f"{e} (transcript: {kept})") from None
+    finally:
+        line.close()
+        write_whole(kept, transcript.text)
+    print(f"started: it is at {said.state.name.lower()}, woke from {said.woke_from}; transcript: {kept}")
+    return 0
+
+
+def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its module is imported late
+    from workbench.device.serial_line import SerialLine, default_port
+
+    return SerialLine(port or default_port(), rate)
+
+
+def _agreed() -> bool:
+    if not sys.stdin.isatty():
+        return False
+    return input("Replace the program in the controller? [yes/no] ").strip().lower() == "yes"

@@ -1,0 +1,70 @@
+"""`workbench run MOTION`: on the robot and back, in one command."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus
+from workbench.cli.options import add_model, add_out, load_model, positive
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "run",
+        help="play a motion on the robot, record it, and compare it with the simulation",
+        description="Checks all servos, plays the motion while the cameras record it, and compares what came out with the "
+        "simulation; with --diagnose says which physics is missing. On an emulated robot, unless --port names a real one; never "
+        "replaces the controller's program. Writes a session: takes, joint log, registers, comparison.")
+    parser.add_argument("motion", metavar="MOTION")
+    add_bus(parser, default=VIRTUAL)
+    add_model(parser)
+    parser.add_argument("--motive", metavar="HOST",
+                        help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
+    parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
+    parser.add_argument("--cycles", type=positive, default=10, metavar="N", help="how often the motion is played (default: 10)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulated cameras")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--diagnose", action="store_true", help="search for the physics that is missing, too")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    add_out(parser, default="runs/run")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Plays, records, compares and says what came of it."""
+    from workbench.cli.progress import Progress
+    from workbench.compare.compare_session import compare_session
+    from workbench.compare.robot_run import run_on_robot
+    from workbench.compare.session import load_session
+    from workbench.device.capture import Recorder, UdpLink
+    from workbench.device.limits import refuse_broken_limits
+    from workbench.device.stop import stop_on_signals
+    from workbench.motion import load_motion
+    from workbench.view.report.comparison import write_comparison
+
+    model = load_model(args.model)
+    motion = load_motion(args.motion, model)
+    refuse_broken_limits(motion.as_table(), model, args.force)
+    virtual = make_virtual(args, model)
+    recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
+    with Progress("run") as progress:
+        with open_bus(args, model, virtual) as bus, stop_on_signals() as stop:
+            done = run_on_robot(bus, model, motion, args.cycles, args.out, lambda: stop.reason, base=args.base, virtual=virtual,
+                                recorder=recorder, seed=args.seed, progress=progress)
+        for warning in done.warnings:
+            print(f"workbench run: warning: {warning}", file=sys.stderr)
+        print(f"wrote {done.session}: {done.played.poses} poses, the worst {1000 * done.played.worst_late:.1f} ms late")
+        if done.played.stopped:
+            return 130 if done.played.stopped == "Ctrl-C" else 2
+        session = load_session(done.session)
+        comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
+        write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)
+    print(comparison.table())
+    print(f"wrote {args.out / 'comparison'}: comparison.json, report.html")
+    if args.diagnose:
+        from workbench.cli.main import main
+
+        return main(["diagnose", str(args.out), "--out", str(args.out / "diagnosis"), "--jobs", str(args.jobs)])
+    return 0

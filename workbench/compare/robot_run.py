@@ -1,0 +1,87 @@
+"""A motion on the robot, from the preflight to a session that can be compared and diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from workbench.compare.session_file import write_session
+from workbench.device.bus.bus import Bus
+from workbench.device.bus.survey import survey
+from workbench.device.capture import Capture, Recorder, VirtualLink, VirtualMotive, record_take
+from workbench.device.capture.background import BackgroundRecording
+from workbench.device.play import Played, PlayOptions, perform, preflight
+from workbench.motion import Motion, save_motion
+from workbench.robot import RobotModel
+from workbench.robot.servo_registers import save_registers
+from workbench.simulation.virtual_robot import VirtualRobot
+
+Progress = Callable[[str, float | None], None]
+CAMERAS = 120.0
+"""Frames per second of the virtual robot's cameras."""
+
+
+@dataclass(frozen=True)
+class RobotRun:
+    """session: its file. capture: of the cameras, None where there were none."""
+
+    session: Path
+    played: Played
+    capture: Capture | None
+    warnings: tuple[str, ...]
+
+
+def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folder: Path, stop: Callable[[], str], *,
+                 base: str = "free", virtual: VirtualRobot | None = None, recorder: Recorder | None = None,
+                 options: PlayOptions | None = None, seed: int = 0, progress: Progress | None = None) -> RobotRun:
+    """Checks all servos, plays the motion while the cameras record, and writes takes, registers, motion and session.
+
+    virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError
+    where something has to be mended first; nothing was moved then.
+    """
+    tell = progress or (lambda what, done: None)
+    found = survey(bus, model, ids=(), progress=tell)
+    preflight(found)
+    registers = found.registers()
+    commands = motion.commands(cycles)
+    name = motion.name
+    background = None if recorder is None else BackgroundRecording(recorder, folder / f"{name}.csv")
+    if background is not None:
+        tell("waiting for the cameras", None)
+        background.start()
+    played = None
+    try:
+        played = perform(bus, found, virtual.controller(commands) if virtual else commands, folder / f"{name}_joints.csv", stop,
+                         options, progress=tell)
+    finally:
+        capture = None if background is None else background.stop(played.ended if played else None)
+    if virtual is not None and played.poses:
+        tell("what the cameras saw", None)
+        capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
+    save_registers(registers, folder / "registers.yaml")
+    save_motion(motion, folder / f"{name}_motion.csv")
+    takes = _takes(name, cycles, base, played, capture)
+    session = write_session(folder, model, takes, "registers.yaml")
+    warnings = [f"register {d}" for d in registers.departures(model)] + list(capture.problems if capture else ())
+    if played.stopped:
+        warnings.insert(0, f"stopped: {played.stopped}")
+    return RobotRun(session, played, capture, tuple(warnings))
+
+
+def _filmed(virtual: VirtualRobot, played: Played, take: Path, seed: int) -> Capture:
+    names, scene, begin, end = virtual.scene(played.started, seed)
+    motive = VirtualMotive(names, scene, rate=CAMERAS, started=begin, seed=seed)
+    seconds = end - begin - 1 / CAMERAS
+    return record_take(Recorder(VirtualLink(motive)), take, lambda: False, seconds, until_time=lambda: played.ended)
+
+
+def _takes(name: str, cycles: int, base: str, played: Played, capture: Capture | None) -> list[dict[str, Any]]:
+    """Of the cameras, with the start that both clocks tell, and of the servos themselves."""
+    takes: list[dict[str, Any]] = []
+    if capture is not None:
+        starts = played.started - capture.first_host
+        takes.append({"name": name, "motion": f"{name}_motion.csv", "cycles": cycles, "recording": f"{name}.csv", "base": base}
+                     | ({"starts_at": round(starts, 5)} if starts > 0 else {}))
+    return [*takes, {"name": f"{name}_joints", "recording": f"{name}_joints.csv", "base": base}]

@@ -1,0 +1,68 @@
+"""dynamixel-sdk on the PC link of a virtual CM-530: what is written goes to its USART, and time is the board's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dynamixel_sdk import PortHandler
+
+from workbench.device.virtual.clock import MILLISECOND, SECOND
+from workbench.device.virtual.cm530.board import Board
+
+
+class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
+    """The serial port that a PC would have; waiting costs no wall time but the board's."""
+
+    patience = 3.0
+
+    def __init__(self, board: Board, rate: int = 57_600) -> None:
+        super().__init__("virtual CM-530")
+        self.board = board
+        self._read = len(board.pc.received)
+        self.setupPort(rate)
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """The board's link has one rate; a wrong one reads as silence here."""
+        self.baudrate = cflag_baud
+        self.tx_time_per_byte = 10_000 / cflag_baud
+        self.is_open = True
+        return True
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        """Starts the time-out for an answer of so many bytes."""
+        self.setPacketTimeoutMillis(packet_length * self.tx_time_per_byte + self.patience)
+
+    def closePort(self) -> None:
+        """Closes."""
+        self.is_open = False
+
+    def clearPort(self) -> None:
+        """Forgets what came in."""
+        self._read = len(self.board.pc.received)
+
+    def writePort(self, packet: Sequence[int]) -> int:
+        """Sends; time goes on until it is out, as it would with a port that waits."""
+        end = self.board.send(self.board.pc, bytes(packet))
+        self.board.run(end)
+        return len(packet)
+
+    def readPort(self, length: int) -> bytes:
+        """What is there; where nothing is, half a millisecond goes by."""
+        if self.getBytesAvailable() == 0:
+            self.board.run(self.board.clock.now + MILLISECOND // 2)
+        data = bytes(self.board.pc.received[self._read:self._read + max(length, 0)])
+        self._read += len(data)
+        return data
+
+    def getBytesAvailable(self) -> int:
+        """How many bytes wait."""
+        return len(self.board.pc.received) - self._read
+
+    def getCurrentTime(self) -> float:
+        """Virtual milliseconds."""
+        return self.board.clock.now / MILLISECOND
+
+    def pause(self, seconds: float) -> None:
+        """Lets virtual time go by [s]."""
+        if seconds > 0:
+            self.board.run(self.board.clock.now + round(seconds * SECOND))

@@ -1,0 +1,220 @@
+"""Every number that a diagnosis is run with, outside the selection: unit, meaning and reason in one place for each stage."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ProblemOptions:
+    """From recordings to residuals: rollouts, windows, stretches, gaps."""
+
+    time_step: float = 2e-3
+    """Of the rollouts [s]. What this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
+    coarse: float = 2.0
+    """Time step of a first look, in search steps: good for differences alone."""
+    fine: float = 0.25
+    """Time step of last numbers, in search steps."""
+    rest: float = 0.1
+    """Rest before the first command in rollouts [s]."""
+    station_joints: int = 17
+    """What building a station costs, in joints. Measured: 30 ms for a second of one joint, 33 of three joints, 53 of fifteen."""
+    puppy_joints: int = 15
+    """Joints of the robot in whose seconds work is counted."""
+    window: float = 0.6
+    """Between two base resets of a walk [s]. Over as much even a robot that is about to tip over goes where another engine sends
+    it, too."""
+    settles: float = 0.1
+    """After a base reset, until feet have found the floor again [s]: a millimetre's fall takes 15 ms."""
+    pose_frames: int = 7
+    """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
+    block: float = 0.4
+    """Length of a stretch [s]."""
+    uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")
+    """What each of consecutive stretches is for: two are fitted, one decides, one validates."""
+    part: float = 0.1
+    """Length of a part [s]: with the base held, a joint forgets within one."""
+    parts: int = 3
+    """With the base held, every so many parts of what does not validate, one decides: a joint may meet its stop but once."""
+    deciding_part: int = 1
+    """Which of these."""
+    least_body_sigma: tuple[float, ...] = (1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004)
+    """Of the body's channels [m, m, rad, m, rad, rad]: below this no contact model is believed."""
+    late: float = 0.1
+    """By how much every model may shift an estimated start [s]: a robot whose servos got each other's speeds sets out so unlike
+    the nominal one that its start was estimated 62 ms early."""
+    shifts: int = 4
+    """Steps in which the start is shifted."""
+    smoothing: float = 0.065
+    """Span of the running mean in which a gap is looked for [s]: noise averages out, what a model lacks does not."""
+    gap_ratio: float = 1.3
+    """RMS over sigma from which on a channel has a gap. Quiet practice recordings stay below 1.15."""
+    gap_ratio_smoothed: float = 2.0
+    """The same of running means; quiet recordings stay below 1.8."""
+    follows: float = 0.5
+    """On a free base, a joint that errs less than this share of the worst one, and not at all on a fixed base, errs because the
+    worst one does."""
+    long: float = 60.0
+    """Recording from which on a search looks at a part of it [s]."""
+    looked_at: float = 40.0
+    """How much that is [s]: what an effect must bring is measured by recordings of this length, too."""
+    piece: float = 12 * 0.4
+    """What that part grows by [s]: three times the stretches of all uses."""
+    starved: float = 0.1
+    """Share of what a channel lacks with the base held below which the frames that decide show too little of it."""
+    heavy: float = 0.15
+    """Share of the robot's mass from which on a link's centre of mass is a candidate: of lighter ones it hardly shows."""
+    heavy_trunk: float = 0.09
+    """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
+
+
+@dataclass(frozen=True)
+class ReadOffOptions:
+    """Estimators without a search: geometry, stops, mounts, frames, dropped commands."""
+
+    least_along: float = 0.5
+    """Cosine between a link's length and what of it two axes tell, at least."""
+    length_error: float = 1e-4
+    """What a take's distance between axes is off by at the least [m]."""
+    direction_error: float = math.radians(0.25)
+    """The same of a direction, for what the model says of droop [rad]."""
+    geometry_sure: float = 5.0
+    """Standard deviations from which on a link is not as drawn."""
+    least_change: float = 5e-4
+    """Change of length below which no gait shows anything [m]."""
+    least_turned: float = math.radians(1.5)
+    """Turn of a horn below which no gait shows anything [rad]."""
+    geometry_worse: float = 0.05
+    """Share of chi squared by which takes may be told worse with the measured geometry, as beside what else is missing the right
+    leg may walk the wrong way."""
+    least_cut: float = math.radians(1.5)
+    """A stop is a candidate where the model goes this much further than the recording ever does [rad]."""
+    at_stop: float = math.radians(0.6)
+    """And where the recording stands this close to its end whenever the model is beyond it [rad]."""
+    furthest_stop: float = 2.0
+    """Times what was cut off, that a stop may have cut off: it was read off."""
+    least_asset_turn: float = math.radians(0.3)
+    """A marker frame is a candidate that is turned by more than this at rest [rad]."""
+    most_dropped: float = 0.6
+    """Share of poses that may be dropped: of more, something else is the matter."""
+    stayed: float = 0.3
+    """Share of the way within which a joint that got no command stays."""
+    went: float = 0.5
+    """Share of the way that the model has gone at least by then."""
+    dropped_explains: float = 0.5
+    """Share of a joint's gap that its dropped commands must explain."""
+    dropped_explains_free: float = 0.8
+    """The same where none was dropped with the base held: on the ground a joint may be kept from going."""
+    dropped_probability: float = 0.95
+    """Probability that commands were dropped where they explain that much."""
+    least_step: float = math.radians(2.0)
+    """A pose that moves a joint by less does not tell whether it came [rad]."""
+    calm: float = 4.0
+    """Standard deviations within which a joint goes as the model has it."""
+    behind: float = 7.0
+    """Standard deviations beyond which it stays behind."""
+    before: float = 0.03
+    """Time before a command that shows how the joint went until then [s]."""
+    lag: float = 0.05
+    """Time by which what a command does shows later [s]."""
+    pose_explains: float = 0.8
+    """Share of what a joint lacks until the next command that leaving out one pose must explain."""
+    most_dropped_in_motion: float = 0.5
+    """Share of poses that may be dropped in motion: of more, something else is the matter."""
+    turns: int = 12
+    """Poses that may be dropped one after another."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Scaled parameters, responses, fits and their covariance."""
+
+    least_move: float = 0.3
+    """What a finite difference is a share of at least, in typical sizes."""
+    vector_move: float = 0.5
+    """The same of one of a vector's numbers, in its length."""
+    least_mass: float = 0.05
+    """What positions of a point mass are divided by at least, in typical masses."""
+    most_moment: float = 100.0
+    """How far moments of a point mass go, in typical ones."""
+    away: float = 2.5
+    """Typical distances at which a point mass is probed, along each axis."""
+    swung_distance: float = 0.08
+    """From its axis, at which a mass that swings about it is looked for at first [m]."""
+    swung_doublings: tuple[float, float] = (-3.0, 2.6)
+    """How many doublings off that distance it may be."""
+    scanned: tuple[float, ...] = (1.0, 4.0)
+    """Sizes at which a candidate's response is scanned, in typical ones."""
+    scanned_between: float = 2.0
+    """One more, on a fixed base, for what may begin at any load, as what ends a motor's torque."""
+    scanned_ground: tuple[float, ...] = (0.7, 2.0)
+    """Sizes at which the floor's candidates are scanned on a walk."""
+    scanned_around: float = 2.0
+    """Size of several numbers on a walk, beyond what it makes of anything small."""
+    shaped: tuple[float, ...] = (0.0, 2.0, -2.0)
+    """Doublings, on a fixed base, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+    stride_fixed: float = 0.15
+    """Share of a number by which it is moved for a finite difference on a fixed base."""
+    stride_free: float = 0.4
+    """The same on a free base, which answers small moves with noise."""
+    stride_end: float = 0.08
+    """The same there near the end of a fit."""
+    wide: float = 0.35
+    """The same where slopes led nowhere and all that was seen lies closer."""
+    tiny: float = 1e-6
+    """Of a number, below which a move tells nothing of slopes."""
+    converged: float = 3e-3
+    """A fit ends where a step takes less than this share off the sum of squares."""
+    refit_steps: int = 3
+    """Steps of a fit of effects that fixed-base takes told before."""
+    against: float = 100.0
+    """Chi squared by which fixed-base takes must speak against what walks make of a number."""
+    least_gain: float = 150.0
+    """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds
+    that is half its noise: engines, and a robot and its model, differ by as much."""
+    finer: float = 0.5
+    """Time step, in search steps, for the last slopes of several numbers that walks tell: what a load's height does is less than
+    what a coarse step makes of it."""
+    finer_steps: int = 3
+    """Steps of that fit."""
+    overdispersion_free: float = 60.0
+    """What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of
+    the same effect that begin elsewhere end some hundreds apart there."""
+    contact_error: float = 0.06
+    """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by
+    that."""
+    drift: float = 0.25
+    """Share of a number by which it must change within a take to be a drift: two engines, or a robot and a model, differ by
+    less."""
+    drift_sure: float = 5.0
+    """Standard errors that this change must be."""
+
+
+@dataclass(frozen=True)
+class ConclusionOptions:
+    """From a fit to findings."""
+
+    z90: float = 1.645
+    """Half width of a 90 % interval, in standard deviations."""
+    wider: float = 1.3
+    """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
+    engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials held the truth, with 1.3 it is 91 %."""
+    least_relative: float = 0.005
+    """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
+    worth_an_experiment: float = 0.05
+    """Probability from which on the likeliest rival of a finding is worth an experiment."""
+    correlated: float = 0.3
+    """Correlation from which on a residual goes with a signal."""
+    same_elsewhere: float = 0.1
+    """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
+    surest: float = 0.98
+    """What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
+    aside: float = math.tan(math.radians(15.0))
+    """Share of a force's vertical part that it may pull aside by and still is one straight down."""
+
+
+PROBLEM = ProblemOptions()
+READ_OFF = ReadOffOptions()
+FIT = FitOptions()
+CONCLUSIONS = ConclusionOptions()

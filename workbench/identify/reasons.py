@@ -1,0 +1,167 @@
+"""Why an effect was rejected, and what a residual goes with: typed values, put into words for a file or for a person."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from workbench.compare.channels import ACROSS, BODY
+
+Naming = Callable[[str, Sequence[str]], str]
+"""How the reader wants an effect at a place called."""
+Signal = Literal["time", "angle", "size of the angle", "speed", "direction of motion"]
+"""What a residual is correlated with."""
+
+
+def effect_at(effect: str, where: Sequence[str]) -> str:
+    """As findings.json calls it: "backlash(flm)"."""
+    return f"{effect}({','.join(where)})"
+
+
+class Statement(ABC):
+    """Something that is said in findings.json and in the report."""
+
+    @abstractmethod
+    def said(self, naming: Naming = effect_at) -> str:
+        """In words, without a full stop."""
+
+    def __str__(self) -> str:
+        return self.said()
+
+
+class Reason(Statement):
+    """Why an effect that was tried is not kept."""
+
+    of_chi_squared: ClassVar[bool] = False
+    """Whether it speaks of chi squared, which a report has to explain."""
+
+
+@dataclass(frozen=True)
+class WorseInPlace(Reason):
+    """Fitted in the place of an effect that was found, it leaves `behind` more of chi squared on stretches that no fit saw."""
+
+    of_chi_squared: ClassVar[bool] = True
+    effect: str
+    where: tuple[str, ...]
+    behind: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        more = f"{self.behind:.0f} more" if self.behind >= 0 else f"only {-self.behind:.0f} less"
+        return f"in place of {naming(self.effect, self.where)} it leaves {more} of chi squared on stretches that no fit saw"
+
+
+@dataclass(frozen=True)
+class ScreenedOut(Reason):
+    """By its response alone, without a fit."""
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return "its signature is not that of what is missing"
+
+
+@dataclass(frozen=True)
+class TooLittle(Reason):
+    """Nothing was accepted at its place."""
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return "what it takes away is no more than chance, or too little of what is missing there"
+
+
+@dataclass(frozen=True)
+class Outdone(Reason):
+    """Another effect took more off chi squared: `taken`, this one `gain`."""
+
+    of_chi_squared: ClassVar[bool] = True
+    effect: str
+    where: tuple[str, ...]
+    taken: float
+    gain: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return (f"{naming(self.effect, self.where)} takes {self.taken:.0f} off chi squared on the choosing stretches, this "
+                f"{self.gain:.0f}")
+
+
+@dataclass(frozen=True)
+class LessLikely(Reason):
+    """The likeliest model that has it is `behind` [nats] in log posterior."""
+
+    behind: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return f"the likeliest model with it is behind by {self.behind:.1f} nats (a factor of e each)"
+
+
+@dataclass(frozen=True)
+class SpokenAgainst(Reason):
+    """Takes that were kept back are less likely with it, by so many nats."""
+
+    by: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return f"takes that were kept back are less likely with it, by {self.by:.0f} nats"
+
+
+@dataclass(frozen=True)
+class RefutedByRegister(Reason):
+    """What a servo's own register says of its parameter, and the standard error, in `unit`."""
+
+    parameter: str
+    value: float
+    error: float
+    unit: str
+
+    def said(self, naming: Naming = effect_at) -> str:
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{unit}"
+
+
+class Description(Statement):
+    """What something that stays unexplained looks like."""
+
+
+@dataclass(frozen=True)
+class Dependence(Description):
+    """A channel's residual in a take, and what it goes with; None: with nothing that was looked at. worst: the event where it is
+    largest, in words."""
+
+    take: str
+    channel: str
+    signal: Signal | None = None
+    correlation: float = 0.0
+    worst: str = ""
+
+    def said(self, naming: Naming = effect_at) -> str:
+        what = (f"{self.channel}, " if self.channel in BODY else
+                f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
+        goes = "nothing tried" if self.signal is None else f"{self.signal} (correlation {self.correlation:.2f})"
+        return f"{self.take}: {self.worst}{'; ' if self.worst else ''}{what}goes with {goes}"
+
+
+@dataclass(frozen=True)
+class ParameterDrift(Description):
+    """A parameter that would have to change within a take, from `first` to `last`, in `unit`."""
+
+    effect: str
+    where: tuple[str, ...]
+    parameter: str
+    first: float
+    last: float
+    unit: str
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return (f"{self.parameter} of {naming(self.effect, self.where)} would have to go from {self.first:.3g} to "
+                f"{self.last:.3g} {self.unit} within a take: something that changes looks like it")
+
+
+@dataclass(frozen=True)
+class DownwardPull(Description):
+    """A force on the base that points straight down, with the weight of `mass` [kg]."""
+
+    effect: str
+    mass: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return (f"the {self.effect.replace('_', ' ')} is a pull straight down, with the weight of {1e3 * self.mass:.0f} g that "
+                "does not resist being moved as a load does: something that hangs and swings looks like it")

@@ -1,0 +1,24 @@
+"""What the servos' own registers say (`registers` of a session): physics that is known before the first step."""
+
+from __future__ import annotations
+
+from workbench.compare.session import Session
+from workbench.identify.estimators.geometry import Measured
+
+EXACT = 0.005
+"""Standard deviation of what a register sets, as a share: it is a number that the servo itself calculates with."""
+
+
+def read_off_registers(session: Session) -> tuple[Measured, ...]:
+    """Effects that registers tell, one for each that is not as the nominal model has it; none where the session names no file."""
+    if session.registers is None:
+        return ()
+    out = []
+    for departure in session.registers.departures(session.model):
+        if departure.effect is not None:
+            ((_, value),) = departure.effect.parameters.items()
+            assert isinstance(value, float)
+            seen = (f" The servo's own register says so, without any recording: {departure.key} is {departure.found:g}, the "
+                    f"model has {departure.nominal:g}.")
+            out.append(Measured(departure.effect.effect, departure.joint, value, EXACT * abs(value), seen))
+    return tuple(out)

@@ -1,0 +1,42 @@
+"""Pose logs that clients of NatNet write: poses without bodies' names, header or frame numbers; told apart, and refused."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from workbench.recording.formats.registry import RecordingFormat
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.tables import is_binary, split_row
+
+_POSE = (r"(pos(ition)?|t|p|trans(lation)?)?[ _.]?x", r"(rot(ation)?|quat(ernion)?|q|r|o(rientation)?)[ _.]?x",
+         r"(rot(ation)?|quat(ernion)?|q|r|o(rientation)?)[ _.]?w")
+
+
+def _cells(head: bytes) -> list[str]:
+    line = next((line for line in head.split(b"\n") if line.strip()), b"")
+    return split_row(line.decode("utf-8-sig", "replace"))
+
+
+def matches(head: bytes) -> bool:
+    """Whether the first line names columns of a position and a quaternion, and nothing that Motive's own export has."""
+    if is_binary(head):
+        return False
+    cells = [c.lower() for c in _cells(head)]
+    return len(cells) > 6 and all(any(re.fullmatch(p, c) for c in cells) for p in _POSE)
+
+
+def read(path: Path) -> Recording:
+    """InputError that says what it looks like and what is wanted: which body of the robot this is, and when, nothing says."""
+    from workbench.robot.tables import plain_head
+
+    cells = _cells(plain_head(path))
+    timed = any(re.fullmatch(r"(?i)(time.*|t|stamp|frame.*|secs?)", c) for c in cells)
+    lacks = "no body's name" if timed else "neither times nor a body's name"
+    raise InputError(path, f"line 1: looks like a NatNet client's pose log ({', '.join(cells[:8])}), with {lacks}; expected "
+                           "Motive's own export (File, Export Tracking Data, CSV, with header, quaternions, Global) of all the "
+                           "robot's rigid bodies in one file")
+
+
+FORMAT = RecordingFormat("natnet_log", "", matches, read, priority=1)

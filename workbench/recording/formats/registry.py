@@ -1,0 +1,67 @@
+"""The formats in which recordings come: those of this folder, one file each, and those of other packages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from pkgutil import iter_modules
+
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+
+ENTRY_POINT_GROUP = "workbench.formats"
+
+
+@dataclass(frozen=True)
+class RecordingFormat:
+    """One format. A package adds its own as an entry point of the group `workbench.formats` that names such an object.
+
+    name: of recordings' `kind`. called: by which messages call it, empty where it is only refused. matches: whether a file that
+    begins with these bytes (64 kB, or all; a text made plain as by `plain_table`) is of the format. read: the whole of it,
+    InputError where it is damaged. marks: file by which a folder is known as a recording of the format. parts: names of the
+    several recordings that a file or folder holds, empty where it is one; read_part: one of them. Formats are asked in the order
+    of `priority`, then of their names.
+    """
+
+    name: str
+    called: str
+    matches: Callable[[bytes], bool]
+    read: Callable[[Path], Recording]
+    marks: str = ""
+    parts: Callable[[Path], tuple[str, ...]] = lambda path: ()
+    read_part: Callable[[Path, str], Recording] | None = None
+    priority: int = 0
+
+
+@cache
+def known_formats() -> tuple[RecordingFormat, ...]:
+    """All formats, in the order in which they are asked; an installed plug-in may not take the name of another format."""
+    import workbench.recording.formats as room
+
+    found: dict[str, RecordingFormat] = {}
+    for module in iter_modules(room.__path__):
+        known = getattr(import_module(f"{room.__name__}.{module.name}"), "FORMAT", None)
+        if isinstance(known, RecordingFormat):
+            found[known.name] = known
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        known = entry.load()
+        if not isinstance(known, RecordingFormat):
+            raise InputError(entry.value, f"entry point '{entry.name}' of group {ENTRY_POINT_GROUP}: expected a RecordingFormat")
+        if known.name in found:
+            raise InputError(entry.value, f"format '{known.name}' is known already")
+        found[known.name] = known
+    return tuple(sorted(found.values(), key=lambda f: (f.priority, f.name)))
+
+
+def format_of(head: bytes) -> RecordingFormat | None:
+    """The format of a file that begins with `head` (made plain); None where no format knows it."""
+    return next((f for f in known_formats() if f.matches(head)), None)
+
+
+def format_of_folder(folder: Path) -> RecordingFormat | None:
+    """The format of which a folder is a recording, if any."""
+    return next((f for f in known_formats() if f.marks and (folder / f.marks).is_file()), None)

@@ -1,0 +1,108 @@
+"""Tables that ROS tools make of a joint trajectory controller's state: `rostopic echo -p`, PlotJuggler, `ros2 topic` exports.
+
+Columns end in the field's name, a joint's name or index: `.../reference/positions[0]` (or desired, or setpoint, or command) and
+`.../feedback/positions[0]` (or actual, or position); with `joint_names` beside, these name the joints. Radians.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
+from workbench.recording.formats.registry import RecordingFormat
+from workbench.recording.recording import Recording
+from workbench.robot import InputError
+from workbench.robot.tables import is_binary, split_row
+
+Array = NDArray[np.float64]
+_TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.IGNORECASE)
+_GOAL = r"(reference|desired|setpoint|goal|command)"
+_SEEN = r"(feedback|actual|measured|state|output)"
+_INDEXED = r"[./]positions?[._]?\[?(\d+)\]?"
+_FIELDS = {"goal": re.compile(rf"(?:.*[./])?{_GOAL}{_INDEXED}", re.IGNORECASE),
+           "position": re.compile(rf"(?:.*[./])?{_SEEN}{_INDEXED}", re.IGNORECASE)}
+_NAMED = {"goal": re.compile(rf"(?:.*[./])?([^./]+)[./]{_GOAL}(?:[./]position)?", re.IGNORECASE),
+          "position": re.compile(r"(?:.*[./])?([^./]+)[./](?:position|state[./]position)", re.IGNORECASE)}
+_JOINT = re.compile(r"(?:.*[./])?joint_?names?[._]?\[?(\d+)\]?", re.IGNORECASE)
+
+
+def _columns(cells: list[str]) -> tuple[int | None, dict[str, dict[str, int]], dict[str, int]]:
+    """Column of the time; of goals and positions by joint or index; of joints' names by index."""
+    time = next((i for i, c in enumerate(cells) if _TIME.fullmatch(c)), None)
+    found: dict[str, dict[str, int]] = {"goal": {}, "position": {}}
+    names: dict[str, int] = {}
+    for i, cell in enumerate(cells):
+        if (m := _JOINT.fullmatch(cell)) is not None:
+            names[m.group(1)] = i
+            continue
+        for kind in found:
+            m = _FIELDS[kind].fullmatch(cell)
+            if m is not None:
+                found[kind].setdefault(m.group(2), i)
+                break
+            m = _NAMED[kind].fullmatch(cell)
+            if m is not None:
+                found[kind].setdefault(m.group(1), i)
+                break
+    return time, found, names
+
+
+def matches(head: bytes) -> bool:
+    """Whether the header has a time, and goals and positions of the same joints, by ROS's names with slashes or brackets."""
+    if is_binary(head):
+        return False
+    line = head.partition(b"\n")[0].decode("utf-8-sig", "replace")
+    if "/" not in line and "[" not in line and "field." not in line:
+        return False
+    time, found, _ = _columns(split_row(line))
+    return time is not None and bool(set(found["goal"]) & set(found["position"]))
+
+
+def read_ros_csv(path: Path) -> Recording:
+    """Reads goals and positions [rad] of the joints that have both; nanoseconds become seconds. Rows in which another topic alone
+    has a value are left out. InputError where a cell is no number or time does not increase."""
+    source = str(path)
+    content, _ = table_bytes(path)
+    end = content.find(b"\n")
+    cells = split_row(content[:end if end >= 0 else len(content)].decode("utf-8-sig", "replace"))
+    time_at, found, names = _columns(cells)
+    keys = [k for k in found["goal"] if k in found["position"]]
+    if time_at is None or not keys:
+        raise InputError(source, "line 1: expected a time, and goals and positions of the same joints")
+    wanted = {time_at, *(found[kind][k] for kind in found for k in keys)}
+    table = read_columns(source, content, end + 1 if end >= 0 else len(content), 1, len(cells), set(names.values()),
+                         wanted | set(names.values()))
+    goals, positions = (np.column_stack([column(table, found[kind][k]) for k in keys]) for kind in ("goal", "position"))
+    time = column(table, time_at)
+    whole = np.isfinite(time) & np.isfinite(goals).all(axis=1) & np.isfinite(positions).all(axis=1)
+    time, goals, positions = time[whole], goals[whole], positions[whole]
+    if len(time) < 2 or not np.all(np.diff(time) > 0):
+        raise InputError(source, f"column '{cells[time_at]}': expected increasing times in two rows or more")
+    scale = 1e-9 if time[0] > 1e14 else 1.0  # since 1970: 1.7e18 ns, 1.7e9 s
+    time = (time - time[0]) * scale
+    joints = tuple(_name(table, names, k) for k in keys)
+    channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}
+    channels |= {f"position.{j}": positions[:, i] for i, j in enumerate(joints)}
+    return Recording(source=source, kind="ros_csv", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
+                     units="radians", channels=channels,
+                     commands=commands_of_rows(time, joints, goals, np.ones(goals.shape, dtype=bool)))
+
+
+def _name(table: pa.Table, names: dict[str, int], key: str) -> str:
+    """A joint's name by its key: that itself, or of an index what stands in the column of names, or joint_1 and so on."""
+    if not key.isdecimal():
+        return key
+    if key in names:
+        told = next((s for s in strings(table, names[key]) if s), "")
+        if told:
+            return told.strip()
+    return f"joint_{int(key) + 1}"
+
+
+FORMAT = RecordingFormat("ros_csv", "a table of a ROS controller's state", matches, read_ros_csv)

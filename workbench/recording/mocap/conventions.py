@@ -1,0 +1,85 @@
+"""Axes and lengths of a capture against the robot's own: what an export's settings change without its header saying so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.mocap.tracks import Tracks
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+_FIRST = 10  # frames of a body that tell where it was at first
+_LEAST = 4  # bodies that tell
+_NEAR = 0.2
+"""How far a ratio of lengths may be from a power of ten, in its logarithm: pivots lie anywhere on their links."""
+_SHARE = 0.25
+"""Of the robot's size: how badly the bodies must lie with y up, to ask whether z is; of that, how well they then must."""
+
+
+def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
+    """Tracks in metres with z up in the model's axes, as the robot's links say where the file's header is wrong; told."""
+    at = _first_places(tracks)
+    if len(at) < _LEAST or any(tracks.assets[i] not in model.rigid_bodies for i in at):
+        return tracks
+    poses = model.kinematics.forward(np.zeros((1, len(model.joints))))
+    nominal = []
+    for i in at:
+        link = model.rigid_bodies[tracks.assets[i]]
+        if link not in poses:
+            return tracks
+        p, R = poses[link]
+        nominal.append(p[0] + R[0] @ model.kinematics.centers.get(link, np.zeros(3)))
+    places, links = np.array(list(at.values())), np.array(nominal)
+    problems = list(tracks.problems)
+    factor = _power_of_ten(places, links)
+    if factor != 1:
+        problems.append(f"distances between bodies are {1 / factor:g} times those of the robot's links: the header's Length "
+                        f"Units are wrong, and lengths are taken {factor:g} times as large")
+    p, q = tracks.p * factor, tracks.q
+    places = places * factor
+    size = float(np.sqrt(np.mean(np.sum((links - links.mean(axis=0)) ** 2, axis=1))))
+    as_said, turned_up = _misfit(places, links), _misfit(_z_up(places), links)
+    if as_said > _SHARE * size and turned_up < 2 * _SHARE * as_said:
+        problems.append("heights and links say that z is up in this export, not y; turned")
+        p, q = _z_up(p), np.concatenate([q[..., :1], _z_up(q[..., 1:])], axis=-1)
+    return replace(tracks, p=p, q=q, problems=tuple(problems)) if problems != list(tracks.problems) else tracks
+
+
+def _first_places(tracks: Tracks) -> dict[int, Array]:
+    out = {}
+    for i in range(len(tracks.assets)):
+        rows = np.flatnonzero(tracks.seen[i])[:_FIRST]
+        if len(rows):
+            out[i] = np.median(tracks.p[i, rows], axis=0)
+    return out
+
+
+def _z_up(v: Array) -> Array:
+    """(..., 3) of x, -z, y of the capture's x, y, z as x, y, z."""
+    return np.stack([v[..., 0], v[..., 2], -v[..., 1]], axis=-1)
+
+
+def _power_of_ten(places: Array, links: Array) -> float:
+    """Factor that brings distances between places (A, 3) to those of links (A, 3); 1 unless it is near a power of ten."""
+    pairs = [(np.linalg.norm(places[a] - places[b]), np.linalg.norm(links[a] - links[b]))
+             for a, b in combinations(range(len(places)), 2)]
+    ratios = [d / nominal for d, nominal in pairs if nominal > 0.02 and d > 0]
+    if len(ratios) < _LEAST:
+        return 1.0
+    exponent = float(np.log10(np.median(ratios)))
+    nearest = round(exponent)
+    return 10.0 ** -nearest if nearest and abs(exponent - nearest) < _NEAR else 1.0
+
+
+def _misfit(places: Array, links: Array) -> float:
+    """RMS distance [m] of places from links (A, 3), laid over each other by a shift and a turn about z."""
+    a, b = places - places.mean(axis=0), links - links.mean(axis=0)
+    cosine, sine = float(np.sum(a[:, :2] * b[:, :2])), float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
+    yaw = np.arctan2(sine, cosine)
+    c, s = np.cos(yaw), np.sin(yaw)
+    turned = np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1], a[:, 2]])
+    return float(np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1))))

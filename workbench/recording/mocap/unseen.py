@@ -1,0 +1,99 @@
+"""Poses that no camera saw although the file has numbers there: lost bodies at the origin, and poses that are held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.mocap.tracks import Tracks
+
+Array = NDArray[np.float64]
+_APART = 0.02
+"""From a lost body at the origin to where it is seen before or after [m]: no walking robot gets as far in a frame."""
+_FEW = 20  # poses that tell no noise
+_ALTERNATES = -0.4
+"""Correlation of neighbouring third differences below which they are noise: -0.75 for white noise, towards 1 for motion."""
+_ROUNDINGS = 1.5
+"""Noise of so many units of the last digit never repeats a pose of seven numbers by chance."""
+_LEAST = 1e-7  # of noise [m]
+
+
+def without_unseen(tracks: Tracks) -> Tracks:
+    """Blanks the poses in which a body was not seen; told in `problems`."""
+    p, q, problems = tracks.p.copy(), tracks.q.copy(), list(tracks.problems)
+    rate = None
+    for i, asset in enumerate(tracks.assets):
+        lost = _lost(p[i], q[i])
+        if lost.any():
+            problems.append(f"{asset}: {int(lost.sum())} frame(s) at the origin without a rotation: lost, not seen")
+            p[i, lost], q[i, lost] = np.nan, np.nan
+        held = _held(p[i], q[i])
+        if not held.any():
+            continue
+        p[i, held], q[i, held] = np.nan, np.nan
+        share = held.sum() / np.isfinite(tracks.p[i, :, 0]).sum()
+        if share > 0.4 and _longest(held)[1] <= 2:
+            rate = tracks.rate * (1 - share)
+            continue
+        first, longest = _longest(held)
+        problems.append(f"{asset}: {int(held.sum())} frame(s) repeat the pose before to the last digit, which noise never does: "
+                        f"not seen (the longest {longest} frames from {tracks.time[first]:.3f} s)")
+    if rate is not None:
+        problems.append(f"poses change in only {rate:.0f} of {tracks.rate:.0f} frames a second: the others repeat them, and are "
+                        "not seen")
+    return replace(tracks, p=p, q=q, problems=tuple(problems))
+
+
+def _lost(p: Array, q: Array) -> NDArray[np.bool_]:
+    """(N,) frames exactly at the origin and unturned, in runs that begin or end with a leap."""
+    at = (p == 0).all(axis=1) & (q[:, 1:] == 0).all(axis=1)
+    seen = np.flatnonzero(np.isfinite(p).all(axis=1) & np.isfinite(q).all(axis=1))
+    if not at.any() or at[seen].all():
+        return np.zeros(len(p), dtype=bool)
+    step = np.linalg.norm(np.diff(p[seen], axis=0), axis=1)
+    edge = np.diff(at[seen].astype(int)) != 0
+    return at if np.all(step[edge] > _APART) else np.zeros(len(p), dtype=bool)
+
+
+def _held(p: Array, q: Array) -> NDArray[np.bool_]:
+    """(N,) frames that repeat the pose seen before to the last digit, in a body whose poses are noisy."""
+    held = np.zeros(len(p), dtype=bool)
+    poses = np.hstack([p, q])
+    seen = np.flatnonzero(np.isfinite(poses).all(axis=1))
+    same = (poses[seen[1:]] == poses[seen[:-1]]).all(axis=1)
+    if same.any() and _noisy(p[seen][np.concatenate([[True], ~same])]):
+        held[seen[1:][same]] = True
+    return held
+
+
+def _noisy(places: Array) -> bool:
+    """Whether two or more coordinates of the places (N, 3) [m] of poses that all differ jitter by more than rounding does."""
+    if len(places) < _FEW:
+        return False
+    noisy = 0
+    for values in places.T:
+        third = np.diff(values, n=3)
+        spread = 1.4826 * float(np.median(np.abs(third)))
+        if spread / np.sqrt(20) <= max(_ROUNDINGS * _last_digit(values), _LEAST):
+            continue
+        third = np.clip(third, -4 * spread, 4 * spread)
+        noisy += float(third[1:] @ third[:-1]) < _ALTERNATES * float(third @ third)
+    return noisy >= 2
+
+
+def _last_digit(values: Array) -> float:
+    """One unit of the last decimal that values (N,) are written with; 0 where they have all digits of a float."""
+    for digits in range(10):
+        scaled = values * 10.0**digits
+        if np.all(np.abs(scaled - np.round(scaled)) < 1e-3):
+            return 10.0**-digits
+    return 0.0
+
+
+def _longest(held: NDArray[np.bool_]) -> tuple[int, int]:
+    """First frame and length of the longest run."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], held, [False]]).astype(int))).reshape(-1, 2)
+    k = int(np.argmax(edges[:, 1] - edges[:, 0]))
+    return int(edges[k, 0]), int(edges[k, 1] - edges[k, 0])

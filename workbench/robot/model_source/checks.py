@@ -1,0 +1,153 @@
+"""What is doubtful in a robot once Drake has built it: a base without mass, inertias and lengths of another unit, no feet."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot.errors import InputError
+from workbench.robot.files import cached_by_content
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModelChecks:
+    """gyration: of a link's radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m].
+    dense: no link of its reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
+
+    gyration: float = 1.5
+    smallest: float = 0.03
+    dense: float = 12000.0
+    longest: float = 5.0
+
+
+CHECKS = ModelChecks()
+
+
+def drake_error(error: Exception) -> str:
+    """What Drake says, without the places in its own source and the file's path, which the caller names."""
+    text = re.sub(r"Failure at \S+ in \w+\(\): ", "", str(error))
+    text = re.sub(r"(?:^|\s)/?\S*?:(\d+): error: ", r" line \1: ", text)
+    return " ".join(text.split())[:600]
+
+
+@contextmanager
+def quiet_drake() -> Iterator[None]:
+    """Drake's warnings about a description are told as problems; its own lines would stand on stderr beside them."""
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
+
+
+@cached_by_content(maxsize=32)
+def model_problems(path: Path, source: Path) -> tuple[str, ...]:
+    """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
+    none."""
+    from pydrake.geometry import SceneGraph
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+
+    from workbench.robot.resources import ConfigureParser
+
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
+    parser = Parser(plant)
+    ConfigureParser(parser)
+    try:
+        with quiet_drake():
+            instances = parser.AddModels(str(path))
+            plant.Finalize()
+    except (RuntimeError, ValueError) as e:
+        raise InputError(source, f"Drake cannot read this model: {drake_error(e)}") from None
+    if len(instances) != 1:
+        return ()
+    bodies = [plant.get_body(b) for b in plant.GetBodyIndices(instances[0])]
+    groups = _fixed_together(plant)
+    return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies), *_feet(plant, scene_graph, bodies))
+
+
+def _fixed_together(plant: Any) -> dict[str, set[str]]:
+    """The bodies that are welded to each but to the world, itself among them, by name."""
+    from pydrake.multibody.tree import BodyIndex
+
+    out = {}
+    for index in range(1, plant.num_bodies()):
+        group = plant.GetBodiesWeldedTo(plant.get_body(BodyIndex(index)))
+        if all(b.index() != plant.world_body().index() for b in group):
+            out[plant.get_body(BodyIndex(index)).name()] = {b.name() for b in group}
+    return out
+
+
+def _without_mass(plant: Any, groups: dict[str, set[str]]) -> Iterator[str]:
+    floating = {plant.get_body(b).name() for b in plant.GetFloatingBaseBodies()}
+    told: set[str] = set()
+    for name, group in groups.items():
+        mass = sum(plant.GetBodyByName(n).default_mass() for n in group)
+        if mass > 0 or told & group:
+            continue
+        told |= group
+        if floating & group:
+            yield f"link '{name}': the base floats and weighs nothing (with all that is fixed to it)"
+        else:
+            yield f"link '{name}' weighs nothing, nor does what is fixed to it, though a joint moves it"
+
+
+def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any]) -> Iterator[str]:
+    reaches = {b.name(): _reach(plant, scene_graph, b) for b in bodies}
+    overall = max(reaches.values(), default=0.0)
+    for body in bodies:
+        name, mass, reach = body.name(), body.default_mass(), reaches[body.name()]
+        if reach > CHECKS.longest:
+            yield f"link '{name}' reaches {reach:.3g} m from its frame: are lengths in millimetres?"
+        if mass <= 0:
+            continue
+        about = body.default_rotational_inertia().CopyToFullMatrix3()
+        c = body.default_com()
+        central = about - mass * (c @ c * np.eye(3) - np.outer(c, c))
+        gyration = float(np.sqrt(max(np.linalg.eigvalsh(central).max(), 0.0) / mass))
+        if gyration > CHECKS.gyration * max(reach or overall, CHECKS.smallest):
+            largest = float(np.linalg.eigvalsh(central).max())
+            yield (f"link '{name}': an inertia of {largest:.3g} kg m^2 on {mass:.3g} kg is that of a body "
+                   f"{2 * gyration:.2g} m wide; the link reaches {reach or overall:.2g} m")
+        if mass > CHECKS.dense * max(reach, CHECKS.smallest) ** 3:
+            yield (f"link '{name}' weighs {mass:.4g} kg and reaches {reach:.2g} m: heavier than lead; are masses in grams, or "
+                   "lengths in another unit?")
+
+
+def _reach(plant: Any, scene_graph: Any, body: Any) -> float:
+    """How far a link's shapes, centre of mass and next joints are from its frame [m]."""
+    from pydrake.geometry import HalfSpace, Role
+
+    inspector = scene_graph.model_inspector()
+    far = [float(np.linalg.norm(body.default_com())) if body.default_mass() > 0 else 0.0]
+    frame = plant.GetBodyFrameIdOrThrow(body.index())
+    for role in (Role.kProximity, Role.kIllustration):
+        for g in inspector.GetGeometries(frame, role):
+            if isinstance(inspector.GetShape(g), HalfSpace):
+                continue
+            box = inspector.GetObbInGeometryFrame(g)
+            X = inspector.GetPoseInFrame(g).multiply(box.pose())
+            far.append(float(np.linalg.norm(X.translation()) + np.linalg.norm(box.half_width())))
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if joint.parent_body().index() == body.index():
+            far.append(float(np.linalg.norm(joint.frame_on_parent().GetFixedPoseInBodyFrame().translation())))
+    return max(far)
+
+
+def _feet(plant: Any, scene_graph: Any, bodies: list[Any]) -> Iterator[str]:
+    if plant.GetFloatingBaseBodies() and not any(plant.GetCollisionGeometriesForBody(b) for b in bodies):
+        yield "no link has a collision shape: a robot whose base floats falls through the ground"

@@ -1,0 +1,120 @@
+"""The description that Drake reads, of the one that the user has."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from workbench.robot.errors import InputError
+from workbench.robot.files import write_whole
+from workbench.robot.model_source.meshes import READ, drake_mesh, find_mesh
+from workbench.robot.model_source.structure import check_structure
+from workbench.robot.model_source.urdf import sdf_of_urdf
+from workbench.robot.model_source.xml_file import check_includes, check_numbers, read_xml
+
+_NAMES: dict[str, str] = {}
+"""The user's file by the one that was made of it, for errors to name."""
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """source: the user's file. path: what Drake reads, the same file or an SDF made of it. problems: what is doubtful in it, and
+    notes: what was made otherwise for Drake, a line each."""
+
+    source: Path
+    path: Path
+    problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def named(path: Path) -> Path:
+    """The user's file of which `path` was made; `path` itself where it is that."""
+    return Path(_NAMES.get(str(path), path))
+
+
+def prepared(source: Path, packages: Mapping[str, str] | None = None) -> ModelSource:
+    """Reads a description once, checks it, and makes what Drake cannot read readable, in the user's cache.
+
+    packages: folder of each ROS package that mesh URIs name. InputError names file, link or joint, and what was expected.
+    """
+    try:
+        content = source.read_bytes() if source.is_file() else b""
+    except OSError:
+        content = b""
+    done = _prepared(source, hashlib.sha256(content).hexdigest(), tuple(sorted((packages or {}).items())))
+    _NAMES[str(done.path)] = str(source)
+    return done
+
+
+@lru_cache(maxsize=64)
+def _prepared(source: Path, digest: str, packages: tuple[tuple[str, str], ...]) -> ModelSource:
+    root = read_xml(source)
+    check_numbers(source, root)
+    notes: list[str] = []
+    problems: list[str] = []
+    changed = root.tag == "robot"
+    if changed:
+        root, problems = sdf_of_urdf(root, source)
+        notes.append("URDF, written as SDF")
+    else:
+        check_includes(source, root)
+    problems += check_structure(source, root)
+    cache = cache_folder() / "models"
+    made, moved = _with_meshes(root, source, dict(packages), cache)
+    notes += [f"{n} {kind} mesh(es) made OBJ for Drake" for kind, n in made.items()]
+    if not (changed or made or moved):
+        return ModelSource(source, source, tuple(problems), tuple(notes))
+    text = ElementTree.tostring(root, encoding="unicode")
+    name = f"{source.stem}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.sdf"
+    if not (cache / name).is_file():
+        write_whole(cache / name, text)
+    return ModelSource(source, cache / name, tuple(problems), tuple(notes))
+
+
+def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache: Path) -> tuple[Counter[str], bool]:
+    """Sets each mesh's URI to a file that is there and that Drake reads; how many were converted, by kind, and whether any URI is
+    not as it was."""
+    made: Counter[str] = Counter()
+    moved = False
+    for link in root.iter("link"):
+        place = f"link '{link.get('name', '')}'"
+        for uri in link.iter("uri"):
+            text = (uri.text or "").strip()
+            if not text:
+                raise InputError(source, f"{place}: mesh: expected a file's name in <uri>")
+            found = find_mesh(source, place, text, packages)
+            path = drake_mesh(found, source, place, cache)
+            if path != found:
+                made[found.suffix[1:].upper()] += 1
+            plain = text.startswith("package://puppy/") or (path == found and "://" not in text and "\\" not in text)
+            if not plain or path.suffix.lower() not in READ:
+                uri.text, moved = str(path), True
+    if moved or made:
+        for uri in root.iter("uri"):
+            text = (uri.text or "").strip()
+            if "://" not in text and not Path(text).is_absolute():
+                uri.text = str((source.parent / text).resolve())
+    return made, moved
+
+
+def cache_folder() -> Path:
+    """Where what was made of users' files lies: in XDG_CACHE_HOME or ~/.cache, or where that cannot be written, the temporary
+    folder."""
+    for root in (os.environ.get("XDG_CACHE_HOME"), os.path.expanduser("~/.cache")):
+        if root and os.path.isabs(root):
+            folder = Path(root) / "workbench"
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError:
+                continue
+            if os.access(folder, os.W_OK):
+                return folder
+    return Path(tempfile.gettempdir()) / f"workbench-{os.getuid()}"

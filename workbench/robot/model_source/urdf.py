@@ -1,0 +1,153 @@
+"""URDF written as SDF: the same links, joints and frames, so that whatever changes an SDF changes it too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement
+
+from workbench.robot.errors import InputError
+from workbench.robot.model_source.xml_file import DRAKE
+
+_TYPES = {"revolute": "revolute", "continuous": "revolute", "fixed": "fixed", "prismatic": "prismatic"}
+_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
+    """An <sdf> of a <robot>, and a line for each thing in it that is otherwise here.
+
+    A link's frame lies at the joint that carries it; a joint's pose is its origin in its parent. A link without <inertial>: no
+    mass. A link called as a joint gets "_link" after its name, as SDF's names are of one kind. InputError names what is
+    missing or unknown.
+    """
+    sdf = Element("sdf", {"version": "1.9"})
+    model = SubElement(sdf, "model", {"name": root.get("name") or path.stem})
+    joints, links = root.findall("joint"), root.findall("link")
+    taken = {j.get("name") for j in joints}
+    names = {name: f"{name}_link" if name in taken else name for name in (k.get("name") or "" for k in links)}
+    said = [f"link '{a}' has a joint's name and is called '{b}'" for a, b in names.items() if a != b]
+    carrier: dict[str, str] = {}
+    for joint in joints:
+        child = _end(joint, "child", path)
+        if child in carrier:
+            raise InputError(path, f"link '{child}' hangs on joints '{carrier[child]}' and '{joint.get('name')}': a kinematic "
+                                   "loop; expected a tree")
+        carrier[child] = joint.get("name") or ""
+    colours = {m.get("name"): m for m in root.findall("material")}
+    for link in links:
+        name = link.get("name") or ""
+        if name == "world":
+            continue
+        out = SubElement(model, "link", {"name": names[name]})
+        if name in carrier:
+            SubElement(out, "pose", {"relative_to": carrier[name]}).text = "0 0 0 0 0 0"
+        _inertial(out, link.find("inertial"))
+        for kind in ("visual", "collision"):
+            for k, shape in enumerate(link.findall(kind)):
+                _shape(out, shape, f"{kind}_{k}", colours, f"link '{name}'", path)
+    for joint in joints:
+        said += _joint(model, joint, names, path)
+    for group in root.findall(f"{{{DRAKE}}}collision_filter_group"):
+        _filter_group(model, group, names)
+    return sdf, said
+
+
+def _end(joint: Element, tag: str, path: Path) -> str:
+    found = joint.find(tag)
+    link = None if found is None else found.get("link")
+    if not link or not joint.get("name"):
+        raise InputError(path, f"joint '{joint.get('name', '')}': expected a name and <{tag} link=...>")
+    return link
+
+
+def _pose(origin: Element | None) -> str:
+    return "0 0 0 0 0 0" if origin is None else f"{origin.get('xyz', '0 0 0')} {origin.get('rpy', '0 0 0')}"
+
+
+def _value(parent: Element, tag: str, text: str | None) -> None:
+    if text is not None:
+        SubElement(parent, tag).text = text
+
+
+def _inertial(out: Element, inertial: Element | None) -> None:
+    """As the URDF has it; SDF's own default would be 1 kg."""
+    to = SubElement(out, "inertial")
+    mass = None if inertial is None else inertial.find("mass")
+    moments = None if inertial is None else inertial.find("inertia")
+    _value(to, "pose", _pose(None if inertial is None else inertial.find("origin")))
+    _value(to, "mass", "0" if mass is None else mass.get("value", "0"))
+    inertia = SubElement(to, "inertia")
+    for key in _MOMENTS:
+        _value(inertia, key, "0" if moments is None else moments.get(key, "0"))
+
+
+def _shape(out: Element, shape: Element, name: str, colours: dict[str | None, Element], place: str, path: Path) -> None:
+    geometry = shape.find("geometry")
+    if geometry is None or not len(geometry):
+        raise InputError(path, f"{place}: {shape.tag}: expected a <geometry> with a shape")
+    to = SubElement(out, shape.tag, {"name": shape.get("name") or name})
+    if out.findall(f"{shape.tag}[@name='{to.get('name')}']")[:-1]:
+        to.set("name", name)
+    _value(to, "pose", _pose(shape.find("origin")))
+    given = geometry[0]
+    solid = SubElement(SubElement(to, "geometry"), str(given.tag))
+    if given.tag == "mesh":
+        _value(solid, "uri", given.get("filename", ""))
+        _value(solid, "scale", given.get("scale"))
+    else:
+        for key in ("size", "radius", "length"):
+            _value(solid, key, given.get(key))
+    material = shape.find("material")
+    if material is not None:
+        colour = material.find("color")
+        known = colours.get(material.get("name"))
+        colour = known.find("color") if colour is None and known is not None else colour
+        if colour is not None and colour.get("rgba"):
+            _value(SubElement(to, "material"), "diffuse", colour.get("rgba"))
+    proximity = shape.find(f"{{{DRAKE}}}proximity_properties")
+    if proximity is not None:
+        properties = SubElement(to, f"{{{DRAKE}}}proximity_properties")
+        for entry in proximity:
+            _value(properties, str(entry.tag), entry.get("value", ""))
+
+
+def _joint(model: Element, joint: Element, names: dict[str, str], path: Path) -> list[str]:
+    name, kind = joint.get("name") or "", joint.get("type") or ""
+    if kind not in _TYPES:
+        raise InputError(path, f"joint '{name}' is {kind or 'of no type'}; expected revolute, continuous or fixed")
+    parent, child = _end(joint, "parent", path), _end(joint, "child", path)
+    for link in (parent, child):
+        if link not in names and link != "world":
+            raise InputError(path, f"joint '{name}': no link '{link}'; links: {', '.join(list(names)[:20])}")
+    to = SubElement(model, "joint", {"name": name, "type": _TYPES[kind]})
+    pose = SubElement(to, "pose")
+    pose.text = _pose(joint.find("origin"))
+    if parent != "world":
+        pose.set("relative_to", names[parent])
+    _value(to, "parent", names.get(parent, parent))
+    _value(to, "child", names[child])
+    if _TYPES[kind] == "fixed":
+        return []
+    axis = SubElement(to, "axis")
+    given = joint.find("axis")
+    _value(axis, "xyz", "1 0 0" if given is None else given.get("xyz", "1 0 0"))
+    limit = joint.find("limit")
+    if limit is not None:
+        bounds = SubElement(axis, "limit")
+        for key in ("lower", "upper") if kind != "continuous" else ():
+            _value(bounds, key, limit.get(key, "0"))
+        for key in ("effort", "velocity"):
+            _value(bounds, key, limit.get(key))
+    dynamics = joint.find("dynamics")
+    if dynamics is not None:
+        values = SubElement(axis, "dynamics")
+        for key in ("damping", "friction"):
+            _value(values, key, dynamics.get(key))
+    mimic = joint.find("mimic")
+    return [] if mimic is None else [f"joint '{name}' mimics '{mimic.get('joint')}'; here it is a joint of its own, with a servo"]
+
+
+def _filter_group(model: Element, group: Element, names: dict[str, str]) -> None:
+    to = SubElement(model, str(group.tag), {"name": group.get("name") or "group"})
+    for entry in group:
+        name = entry.get("link") or entry.get("name") or ""
+        SubElement(to, str(entry.tag)).text = names.get(name, name)

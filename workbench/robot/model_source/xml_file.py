@@ -1,0 +1,96 @@
+"""A robot description as an XML tree, read so that nothing in it can run away: sizes bounded, no entities, no circle of files."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from workbench.robot.errors import InputError
+from workbench.robot.files import regular_file
+from workbench.robot.numerals import number_of
+
+MOST_XML = 32 << 20
+"""Largest description [bytes]; a robot of a hundred links has 0.1 MB."""
+MOST_DEPTH = 200
+DRAKE = "http://drake.mit.edu"
+
+_NUMBERS = {"mass", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "lower", "upper", "effort", "velocity", "damping", "friction",
+            "spring_stiffness", "spring_reference", "pose", "xyz", "size", "radius", "length", "scale", "mu", "mu2"}
+"""SDF's elements whose text is numbers."""
+_ATTRIBUTES = {"mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "origin": ("xyz", "rpy"),
+               "axis": ("xyz",), "limit": ("lower", "upper", "effort", "velocity"), "dynamics": ("damping", "friction"),
+               "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "capsule": ("radius", "length"),
+               "mesh": ("scale",), "color": ("rgba",)}
+"""URDF's attributes that are numbers."""
+_ENDLESS = {"lower", "upper", "effort", "velocity"}
+"""Which may be infinite."""
+
+
+def read_xml(path: Path) -> Element:
+    """The root of a description; InputError where it is no whole XML, too large or nested too deep."""
+    try:
+        content = regular_file(path, MOST_XML).read_bytes()
+    except OSError as e:
+        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+        raise InputError(path, "a DOCTYPE or entities; expected a plain description")
+    ElementTree.register_namespace("drake", DRAKE)
+    try:
+        depth, root = 0, None
+        for event, element in ElementTree.iterparse(io.BytesIO(_bound_prefix(content)), events=("start", "end")):
+            root = element if root is None else root
+            depth += 1 if event == "start" else -1
+            if depth > MOST_DEPTH:
+                raise InputError(path, f"nested deeper than {MOST_DEPTH} levels")
+    except (ElementTree.ParseError, ValueError, LookupError) as e:  # LookupError: an unknown encoding
+        raise InputError(path, f"not whole XML in UTF-8, or in the encoding that it says: {e}") from None
+    if root is None or root.tag not in ("sdf", "robot"):
+        found = "nothing" if root is None else f"<{root.tag[:40]}>"
+        raise InputError(path, f"expected a robot as SDF (<sdf>) or URDF (<robot>), found {found}")
+    if b"xmlns:xacro" in content and any(str(e.tag).startswith("{") and "xacro" in str(e.tag) for e in root.iter()):
+        raise InputError(path, "holds xacro macros; expected the URDF that `xacro FILE > robot.urdf` makes of it")
+    return root
+
+
+def _bound_prefix(content: bytes) -> bytes:
+    """With Drake's prefix bound, which Drake itself does not ask for."""
+    if b"drake:" in content and b"xmlns:drake" not in content:
+        for tag in (b"<sdf", b"<robot"):
+            content = content.replace(tag, tag + f' xmlns:drake="{DRAKE}"'.encode(), 1)
+    return content
+
+
+def check_includes(path: Path, root: Element, seen: tuple[Path, ...] = ()) -> None:
+    """InputError where a file includes itself, by whatever way."""
+    seen = (*seen, path.resolve())
+    for include in root.iter("include"):
+        uri = (include.findtext("uri") or "").strip()
+        if "://" in uri and not uri.startswith("file://"):
+            continue
+        target = (path.parent / uri.removeprefix("file://")).resolve()
+        if target in seen:
+            raise InputError(path, f"<include> '{uri}': the model includes itself")
+        if target.is_file() and len(seen) < 20:
+            check_includes(target, read_xml(target), seen)
+
+
+def check_numbers(path: Path, root: Element) -> None:
+    """InputError that names link or joint where a number is none, or is not finite."""
+    for owner in root.iter():
+        if owner.tag not in ("link", "joint"):
+            continue
+        for element in owner.iter():
+            if element.tag in _NUMBERS and element.text and element.text.strip():
+                _check(path, owner, element.tag, element.text)
+            for key in _ATTRIBUTES.get(str(element.tag), ()):
+                if key in element.attrib:
+                    _check(path, owner, key if key != "value" else element.tag, element.attrib[key])
+
+
+def _check(path: Path, owner: Element, what: str, text: str) -> None:
+    for word in text.split():
+        endless = what in _ENDLESS and word.lower().lstrip("+-") in ("inf", "infinity")
+        if number_of(word) is None and not endless:
+            raise InputError(path, f"{owner.tag} '{owner.get('name', '')}': {what}: expected finite numbers, found '{word[:40]}'")
