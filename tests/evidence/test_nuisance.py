@@ -53,7 +53,8 @@ def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
     model = rig_model(tmp_path, ServoConstants())
     servo = model.servo("j")
     numbers = {n.name: n for n in uncertain_numbers(model, "j", zeroed=False)}
-    assert set(numbers) == {"torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia", "zero"}
+    assert set(numbers) == {"torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia",
+                            "zero"}
     for name, number in numbers.items():
         if name == "zero":
             continue

@@ -11,7 +11,7 @@ from workbench.compare.session_takes import ReadTake
 from workbench.effects.base import Registers
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.findings import Rejected
-from workbench.identify.parameters import LEAST_SIZE, Candidate
+from workbench.identify.parameters import Candidate
 from workbench.identify.reasons import RefutedByRegister
 
 
@@ -36,8 +36,8 @@ def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
 
 def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
                      ) -> tuple[list[Candidate], list[Rejected]]:
-    """Candidates as far as the registers let them go, and those that they refute: of which not even LEAST_SIZE of the typical
-    size is within `sure` standard errors of what a register says."""
+    """Candidates as far as the registers let them go, and those that they refute: of which not even `refuted` of the
+    typical size is within `sure` standard errors of what a register says."""
     logs, kept, refuted = registers_of(takes), [], []
     for c in candidates:
         told = c.effect.in_registers(logs, c.where)
@@ -46,7 +46,7 @@ def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake],
             continue
         value, error = told
         reach = abs(value - c.neutral[0]) + options.sure * error
-        if reach < LEAST_SIZE * abs(c.typical[0] - c.neutral[0]):
+        if reach < options.refuted * abs(c.typical[0] - c.neutral[0]):
             p = c.parameters[0]
             refuted.append(Rejected(c.name, c.where, RefutedByRegister(p.name, value, error, p.unit)))
         else:
