@@ -53,13 +53,13 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     zeros: list[EffectSpec] = []
     for number, by in z.items():
         if number.name == ZERO:
-            zeros += [_turned_horn(number.joint, number.sd * by)] if by else []
+            zeros += [turned_horn(number.joint, number.sd * by)] if by else []
         else:
             servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
     return replace(model, servos=servos, effects=(*model.effects, *zeros))
 
 
-def _turned_horn(joint: str, angle: float) -> EffectSpec:
+def turned_horn(joint: str, angle: float) -> EffectSpec:
     """The effect that turns a joint's zero by `angle` [rad]."""
     effect, *_ = estimated_by("turn about an axis")
     (p,) = effect.parameters
