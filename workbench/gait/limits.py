@@ -28,7 +28,8 @@ class GaitLimits:
     servo bus [1/s].
     fall_draws: share of draws that may fall: none. tilt: of the base [rad], 30 deg, where the feet's track no longer
     holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the
-    same, RMS over draws [rad/m]: 30 deg, by which it ends a quarter of a metre beside a line of one. aside: speed across over speed along.
+    same, RMS over draws [rad/m]: 30 deg, by which it ends a quarter of a metre beside a line of one. aside: speed across over
+    speed along.
     """
 
     rms: float | None = None
