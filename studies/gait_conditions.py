@@ -113,7 +113,8 @@ def _inside(model: RobotModel, gait: Played) -> tuple[Section, dict[str, Any]]:
         Picture(footfalls(stance, span=(last - 2, last)), "When each foot stands."),
         Picture(phase_portrait(worst, take.resampled(take.time[take.time > last - 2])), f"{worst}, the servo with most to do."),
         Table(["joint", "RMS [N m]", "peak [N m]", "beyond a fifth of stall", "least torque left [N m]",
-               "least speed left [deg/s]"], rows, "Motor torque by inverse dynamics of the simulated take, the servo's own friction included."),
+               "least speed left [deg/s]"], rows,
+              "Motor torque by inverse dynamics of the simulated take, the servo's own friction included."),
         Details("Asked and reached", [
             Picture(joint_grid(take, stance=by_joint(stance, model), span=(last - 1.5, last)))])]), numbers
 
