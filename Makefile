@@ -47,6 +47,7 @@ lint: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/counts.py
 
 # The slow tests, then the trial of diagnosis in runs/concealed_effects: hours; stopped and called again, it goes on.
 prove: $(STAMP)
@@ -54,7 +55,7 @@ prove: $(STAMP)
 	$(BIN)/python -m studies.concealed_effects --workers $(WORKERS)
 
 # Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`.
-STUDIES := $(filter-out concealed_effects,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
+STUDIES := $(filter-out concealed_effects replay,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
            $(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py))
 
 studies: $(STAMP)

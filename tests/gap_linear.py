@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.screening import CandidateFit
 from workbench.robot import puppy_model

@@ -10,7 +10,7 @@ import pytest
 from studies.concealed_effects.ask import Asker, StoppedError, asked
 from studies.concealed_effects.carried import carry, take_up
 from studies.concealed_effects.figures import confusion_figure, reliability_figure, sizes_figure, time_figure
-from studies.concealed_effects.published import README, as_text, keep, kept, kept_section, section
+from studies.concealed_effects.published import PAGE, as_text, keep, kept, kept_section, section
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.summary import confusion, reliability, sizes
 from studies.concealed_effects.trial import diagnose, forget_failed, publish, report, scored
@@ -146,7 +146,7 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
                  "gear ripple flm (outside)", "no such joint"):
         assert part in page, part
     readme = tmp_path / "README.md"
-    readme.write_text("# Before\n\n" + README.read_text().partition("## concealed_effects")[2])
+    readme.write_text("# Before\n\n" + PAGE.read_text().partition("## Blind trials")[2])
     keep(whole, tmp_path / "trial.json", readme)
     assert kept(tmp_path / "trial.json") == whole
     assert kept_section(readme) == section(whole)

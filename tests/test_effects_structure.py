@@ -565,12 +565,14 @@ def test_a_link_without_mass_or_end_is_named(rig, tmp_path):
         physics_of(with_effects(rig, ("link_length", "arm", {"change": 0.01})))
 
 
-def test_a_urdf_is_refused_with_a_reason(tmp_path):
+def test_a_urdf_takes_effects_as_an_sdf_does(tmp_path):
     path = tmp_path / "rig.urdf"
-    path.write_text('<robot name="r"><link name="base"/><link name="arm"/><joint name="j" type="revolute"><parent link="base"/>'
-                    '<child link="arm"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>')
-    with pytest.raises(InputError, match="need an SDF file"):
-        physics_of(with_effects(RobotModel(str(path), base="base"), ("backlash", "j", {"gap": 1.0})))
+    inertial = '<inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path.write_text(f'<robot name="r"><link name="base">{inertial}</link><link name="arm">{inertial}</link><joint name="j" '
+                    'type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 1 0"/>'
+                    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>')
+    physics = physics_of(with_effects(RobotModel(str(path), base="base"), ("backlash", "j", {"gap": 1.0})))
+    assert physics.stages["j"]
 
 
 @pytest.mark.parametrize(("name", "where", "parameters", "sentence"), [

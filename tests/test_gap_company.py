@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants

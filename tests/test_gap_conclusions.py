@@ -9,7 +9,7 @@ from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
 from workbench.identify.conclusions import estimates, finding, rejected, verdict_of
 from workbench.identify.findings import Alternative, Change, Finding, Unexplained
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import names, trial
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.selection import single_joint as sets_
 from workbench.identify.selection import swap as exchange
 from workbench.identify.selection.best_subsets import worst_joint

@@ -9,7 +9,8 @@ import pytest
 from tests.gap_worn import CONFIG, HIDDEN, NOMINAL, gathered
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import fit_blocks, together
 from workbench.identify.ledger import layer_of, ledger
 from workbench.identify.parameters import Candidate

@@ -42,7 +42,7 @@ def test_a_take_names_its_programme_by_hash_or_by_its_own_name(tmp_path: Path) -
     assert recording_of_take(one, "any") == one
     assert read_recording(recording_of_take(many, "slow")).metadata["programme"] == "slow"
     for path, words in ((many, "holds 2 programmes"), (tmp_path / "many.npz#no", "no programme 'no'.*step, slow"),
-                        (tmp_path / "none.npz#step", "file not found"), (tmp_path, "without state_motor.csv")):
+                        (tmp_path / "none.npz#step", "file not found"), (tmp_path, "or state_motor.csv")):
         with pytest.raises(InputError, match=words):
             recording_of_take(path, "any")
 

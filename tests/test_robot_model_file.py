@@ -23,7 +23,7 @@ from workbench.robot import (
     save_model,
 )
 from workbench.robot.model_file import parameter_names
-from workbench.simulation import MakePuppyStation
+from workbench.simulation import MakeStation
 
 EFFECTS = (EffectSpec("backlash", ("two",), {"gap": 3.1}),
            EffectSpec("payload", ("upper",), {"mass": 0.05, "position": (0.01, 0.0, -0.02)}),
@@ -78,7 +78,7 @@ def test_servos_alike_are_said_once(tmp_path: Path) -> None:
 
 def test_another_drake_project_simulates_it_in_one_line(tmp_path: Path) -> None:
     save_model(puppy_model().with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.0})), tmp_path / "model.yaml")
-    station = MakePuppyStation(model=load_model(tmp_path / "model.yaml"))
+    station = MakeStation(load_model(tmp_path / "model.yaml"))
     assert station.plant().num_velocities() == 6 + 15 + 1  # the play is a joint of its own
 
 

@@ -8,7 +8,7 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from workbench.motion import load_motion
 from workbench.robot import EffectSpec, Ground, InputError, ServoConstants, data_file, puppy_model
-from workbench.simulation import Job, MakePuppyStation, Simulation, SimulationConfig, simulate_batch
+from workbench.simulation import Job, MakeStation, Simulation, SimulationConfig, simulate_batch
 
 GRAVITY = 9.81
 
@@ -165,7 +165,7 @@ def test_batches_give_the_same_takes_on_one_and_two_processes(puppy, walk):
 
 
 def test_friction_of_the_ground_overrides_the_sdf(puppy):
-    inspector = MakePuppyStation(model=replace(puppy, ground=Ground(friction=0.3))).scene_graph().model_inspector()
+    inspector = MakeStation(replace(puppy, ground=Ground(friction=0.3))).scene_graph().model_inspector()
     coefficients = {inspector.GetProximityProperties(g).GetProperty("material", "coulomb_friction").dynamic_friction()
                     for g in inspector.GetAllGeometryIds() if inspector.GetProximityProperties(g) is not None}
     assert coefficients == {0.3}
@@ -173,14 +173,14 @@ def test_friction_of_the_ground_overrides_the_sdf(puppy):
 
 def test_feet_touch_with_one_set_of_shapes(puppy):
     for contact, present, absent in (("point", "foot_sphere", "foot_hydro"), ("hydroelastic", "foot_hydro", "foot_sphere")):
-        inspector = MakePuppyStation(SimulationConfig(contact=contact)).scene_graph().model_inspector()
+        inspector = MakeStation(puppy, SimulationConfig(contact=contact)).scene_graph().model_inspector()
         names = [inspector.GetName(g) for g in inspector.GetAllGeometryIds() if inspector.GetProximityProperties(g) is not None]
         assert any(present in n for n in names)
         assert not any(absent in n for n in names)
 
 
 def test_ports_are_named(puppy):
-    diagram = MakePuppyStation()
+    diagram = MakeStation(puppy_model())
     assert diagram.GetInputPort("goal_position").size() == 15
     for port in ("state", "motor_torque", "duty", "reference", "net_actuation", "contact_results"):
         assert diagram.HasOutputPort(port)

@@ -8,6 +8,10 @@ static void wait(const volatile uint32_t *where, uint32_t mask, uint32_t value) 
 }
 
 void clock_begin(void) {
+    RCC_CR |= RCC_CR_HSION; /* the loader may have the PLL on, and that takes no new factor while it runs */
+    RCC_CFGR = 0;
+    wait(&RCC_CFGR, RCC_CFGR_SWS, 0);
+    RCC_CR &= ~(uint32_t)RCC_CR_PLLON;
     RCC_CR |= RCC_CR_HSEON;
     wait(&RCC_CR, RCC_CR_HSERDY, RCC_CR_HSERDY);
     FLASH_ACR = 0x12; /* two wait states, prefetch */
@@ -35,7 +39,8 @@ void watchdog_feed(void) { IWDG_KR = 0xAAAA; }
 
 #define MARK 0x57424B31u
 
-/* Memory that start-up leaves alone: the mark is still there after a reset or a short dip of the supply, not after power off. */
+/* Memory that start-up leaves alone, and the loader too, as far from both ends: the mark is still there after a reset or a short
+   dip of the supply, not after power off. */
 __attribute__((section(".keep"))) static uint32_t mark, mark_complement;
 
 uint8_t reset_cause(void) {

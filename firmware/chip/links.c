@@ -17,14 +17,19 @@ void links_begin(void) {
     NVIC_ISER1 = 1u << (IRQ_USART3 - 32) | 1u << (IRQ_UART5 - 32);
 }
 
-void pc_interrupt(void) {
-    if (USART3_SR & USART_SR_RXNE) ring_put(&robot.link[LINK_PC].rx, (uint8_t)USART3_DR);
+/* An overrun without a byte interrupts for ever unless the register is read. */
+static void take(uint32_t status, volatile const uint32_t *data, struct ring *in) {
+    if (!(status & (USART_SR_RXNE | USART_SR_ORE))) return;
+    uint8_t byte = (uint8_t)*data;
+    if (status & USART_SR_RXNE) ring_put(in, byte);
 }
+
+void pc_interrupt(void) { take(USART3_SR, &USART3_DR, &robot.link[LINK_PC].rx); }
 
 void zigbee_interrupt(void) {
     uint32_t status = UART5_SR;
     struct ring *out = &robot.link[LINK_ZIGBEE].tx;
-    if (status & USART_SR_RXNE) ring_put(&robot.link[LINK_ZIGBEE].rx, (uint8_t)UART5_DR);
+    take(status, &UART5_DR, &robot.link[LINK_ZIGBEE].rx);
     if (!(UART5_CR1 & USART_CR1_TXEIE) || !(status & USART_SR_TXE)) return;
     if (ring_used(out)) UART5_DR = ring_get(out);
     else UART5_CR1 = ON;

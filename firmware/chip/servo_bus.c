@@ -62,9 +62,9 @@ void bus_interrupt(void) {
     uint32_t status = USART1_SR, enabled = USART1_CR1;
     if ((enabled & USART_CR1_TCIE) && (status & USART_SR_TC)) {
         sent();
-    } else if ((enabled & USART_CR1_RXNEIE) && (status & USART_SR_RXNE)) {
-        (void)USART1_DR;
-        robot.bus.stray++;
+    } else if (status & (USART_SR_RXNE | USART_SR_ORE)) {
+        (void)USART1_DR; /* takes an overrun away as well, which would interrupt for ever */
+        if (enabled & USART_CR1_RXNEIE) robot.bus.stray++;
     }
 }
 

@@ -20,6 +20,8 @@ void *memset(void *to, int value, size_t n) {
 }
 
 static void reset(void) {
+    SYST_CSR = 0; /* whatever the loader has left running */
+    NVIC_ICER0 = NVIC_ICER1 = NVIC_ICPR0 = NVIC_ICPR1 = ~(uint32_t)0;
     SCB_VTOR = 0x08003000;
     memcpy(data_start, data_load, (size_t)data_size);
     memset(bss_start, 0, (size_t)bss_size);

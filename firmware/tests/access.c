@@ -52,6 +52,9 @@ uint64_t sim_get(struct sim *s, const char *what, uint32_t k) {
 
 void sim_set(struct sim *s, const char *what, uint32_t k, uint32_t value) {
     if (!strcmp(what, "position")) s->servo[k].milli = 1000 * (int64_t)value;
+    if (!strcmp(what, "torque_limit")) put16(s->servo[k].table + DXL_TORQUE_LIMIT, value);
+    if (!strcmp(what, "cw_limit")) put16(s->servo[k].table + DXL_CW_LIMIT, value);
+    if (!strcmp(what, "ccw_limit")) put16(s->servo[k].table + DXL_CCW_LIMIT, value);
     if (number(s, what)) *number(s, what) = value;
     if (byte_of(s, what, k)) *byte_of(s, what, k) = (uint8_t)value;
     if (flag(s, what, k)) *flag(s, what, k) = value != 0;

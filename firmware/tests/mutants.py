@@ -2,8 +2,7 @@
 
     python firmware/tests/mutants.py [--count 50] [--seed 1]
 
-Each mutant is compiled in a folder of its own and put under the native tests of tests/firmware (WORKBENCH_FIRMWARE says where).
-Those that live are shown.
+Each mutant is compiled in a folder of its own and put under the native tests of tests/firmware. Those that live are shown.
 """
 
 from __future__ import annotations
@@ -13,14 +12,22 @@ import os
 import random
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
+from multiprocessing import get_context
 from pathlib import Path
 
+import pytest
+
 FIRMWARE = Path(__file__).resolve().parents[1]
-TESTS = ("tests/firmware/test_core_play.py", "tests/firmware/test_core_reactions.py", "tests/firmware/test_table_file.py")
+sys.path.insert(0, str(FIRMWARE.parent))
+
+from tests.firmware import native  # noqa: E402
+
+PATIENCE = 150
+"""Processor time of a whole run of the tests is about ten seconds [s]."""
+TESTS = [f"tests/firmware/test_{name}.py" for name in ("core_reactions", "core_play", "core_edges", "table_file", "link")]
 CHANGES = (
     (r"(?<![<>=!-])<(?![<=])", "<="), (r"<=", "<"), (r"(?<![->=])>(?![>=])", ">="), (r">=", ">"), (r"==", "!="), (r"!=", "=="),
     (r"&&", "||"), (r"\|\|", "&&"), (r"(?<=[\w)] )\+(?= [\w(])", "-"), (r"(?<=[\w)] )-(?= [\w(])", "+"),
@@ -50,13 +57,24 @@ def survives(path: Path, begin: int, end: int, new: str) -> bool:
         shutil.copytree(FIRMWARE, folder, ignore=shutil.ignore_patterns("corpus", "build"))
         text = path.read_text()
         (folder / "core" / path.name).write_text(text[:begin] + new + text[end:])
-        environment = os.environ | {"WORKBENCH_FIRMWARE": str(folder), "MOMENTS": "12"}
-        command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "-m", "not slow", *TESTS]
-        try:
-            run = subprocess.run(command, cwd=FIRMWARE.parent, env=environment, capture_output=True, timeout=150, check=False)
-        except subprocess.TimeoutExpired:
-            return False  # it hangs: noticed
-        return run.returncode == 0
+        child = get_context("fork").Process(target=judge, args=(folder,))  # forked: the libraries are loaded once
+        child.start()
+        child.join(PATIENCE)
+        if child.is_alive():
+            child.kill()  # it hangs: noticed
+            child.join()
+        return child.exitcode == 0
+
+
+def judge(folder: Path) -> None:
+    """The tests on the core in this folder; leaves with pytest's exit code."""
+    quiet = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(quiet, 1)
+    os.dup2(quiet, 2)
+    os.environ["MOMENTS"] = "12"
+    os.chdir(FIRMWARE.parent)
+    native.FIRMWARE = folder
+    os._exit(pytest.main(["-q", "-x", "-p", "no:cacheprovider", "-m", "not slow", *TESTS]))
 
 
 def main() -> int:

@@ -19,7 +19,7 @@ from pathlib import Path
 from studies.concealed_effects.ask import LIMIT, Asker
 from studies.concealed_effects.carried import carry, take_up
 from studies.concealed_effects.generator import is_what_was_sealed
-from studies.concealed_effects.published import README, RESULTS, keep
+from studies.concealed_effects.published import PAGE, RESULTS, keep
 from studies.concealed_effects.sealed import COUNT, Vault
 from studies.concealed_effects.trial import forget_failed, report, run
 
@@ -53,7 +53,7 @@ def main() -> int:
         under_way = carry(vault, result["sessions"])
         if under_way is None:
             keep(result)
-        print(f"wrote {under_way} for another machine" if under_way else f"wrote {RESULTS} and the table in {README}")
+        print(f"wrote {under_way} for another machine" if under_way else f"wrote {RESULTS} and the table in {PAGE}")
     return 0 if result["met"] else 1
 
 

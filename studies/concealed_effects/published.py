@@ -1,4 +1,4 @@
-"""What the repository keeps of a trial: results/trial.json, and a table of it in studies/README.md."""
+"""What the repository keeps of a trial: results/trial.json, and a table of it in docs/validation.md."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from studies.concealed_effects.summary import bounds
 from workbench.robot.files import read_text, write_whole
 
 RESULTS = Path(__file__).parent / "results" / "trial.json"
-README = Path(__file__).parents[1] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
 BEGIN, END = "<!-- trial: written by `python -m studies.concealed_effects --keep` -->", "<!-- /trial -->"
 
 
-def keep(result: Mapping[str, Any], results: Path = RESULTS, readme: Path = README) -> None:
-    """Writes both; ValueError where the README has no place for the table."""
-    text = read_text(readme)
+def keep(result: Mapping[str, Any], results: Path = RESULTS, page: Path = PAGE) -> None:
+    """Writes both; ValueError where the page has no place for the table."""
+    text = read_text(page)
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     if not after:
-        raise ValueError(f"{readme}: expected the lines '{BEGIN}' and '{END}'")
+        raise ValueError(f"{page}: expected the lines '{BEGIN}' and '{END}'")
     write_whole(results, as_text(result))
-    write_whole(readme, f"{before}{BEGIN}\n{section(result)}{END}{after}")
+    write_whole(page, f"{before}{BEGIN}\n{section(result)}{END}{after}")
 
 
 def kept(results: Path = RESULTS) -> dict[str, Any] | None:
@@ -32,9 +32,9 @@ def kept(results: Path = RESULTS) -> dict[str, Any] | None:
     return dict(json.loads(read_text(results))) if results.exists() else None
 
 
-def kept_section(readme: Path = README) -> str:
-    """What the README says of it."""
-    return read_text(readme).partition(BEGIN + "\n")[2].partition(END)[0]
+def kept_section(page: Path = PAGE) -> str:
+    """What the page says of it."""
+    return read_text(page).partition(BEGIN + "\n")[2].partition(END)[0]
 
 
 def as_text(result: Mapping[str, Any]) -> str:

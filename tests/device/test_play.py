@@ -266,3 +266,8 @@ def test_the_watch_needs_two_readings_of_the_same_servo(tmp_path):
     watch.answered(2, 0.2, hot, ())
     assert watch.reaction.how == "neutral"
     assert "servo 2 (two)" in watch.reaction.reason
+    watch = Watch(profile, {1: "one"}, {1: 70})
+    for time in (0.0, 0.1):
+        assert watch.reaction is None
+        watch.answered(1, time, {}, ("electrical shock",))
+    assert watch.reaction.how == "release"

@@ -36,11 +36,13 @@ def image(folder: str = "runs/firmware") -> bytes:
 
 
 class Ear:
-    """Hears the servo bus: packets of the board with the start of their first bit [ticks], and all bytes for the trace's hash."""
+    """Hears the servo bus: packets of the board with the start of their first bit [ticks], Sync Writes among them
+    (`poses`), and all bytes for the trace's hash."""
 
     def __init__(self, board: Board) -> None:
         self.board = board
         self.packets: list[tuple[int, bytes]] = []
+        self.poses: list[tuple[int, bytes]] = []
         self.digest = hashlib.sha256()
         self.bytes = 0
         talk = board.bus.talk
@@ -51,13 +53,11 @@ class Ear:
             self.bytes += len(values)
             if talker is board:
                 self.packets.append((starts, bytes(values)))
+                if values[4] == 0x83:
+                    self.poses.append(self.packets[-1])
             return end
 
         board.bus.talk = heard
-
-    def poses(self) -> list[tuple[int, bytes]]:
-        """Sync Writes."""
-        return [(t, p) for t, p in self.packets if p[4] == 0x83]
 
 
 class Robot:
@@ -76,6 +76,7 @@ class Robot:
         self.ear = Ear(self.board)
         self._reader = FrameReader()
         self._read = 0
+        self.worst = 0.0
         self.board.power_on()
 
     def run(self, ms: float) -> None:

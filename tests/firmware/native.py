@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-import os
 import subprocess
 import tempfile
 from functools import lru_cache
@@ -15,7 +14,7 @@ from workbench.device.table_file import TableFile, bounds_of, encode_table
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 
-FIRMWARE = Path(os.environ.get("WORKBENCH_FIRMWARE", Path(__file__).parents[2] / "firmware"))
+FIRMWARE = Path(__file__).parents[2] / "firmware"
 LINK_PC, LINK_ZIGBEE = 0, 1
 POWER_ON = 1
 NONE = 2**64 - 1
@@ -32,8 +31,9 @@ class CellRun(ctypes.Structure):
     ]
 
 
-def compile_core(source: Path = FIRMWARE, flags: tuple[str, ...] = ("-O2",)) -> Path:
+def compile_core(flags: tuple[str, ...] = ("-O2",)) -> Path:
     """A shared library of core and tests, made anew where a source has changed."""
+    source = FIRMWARE
     sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in ("sim", "cells", "access"))])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import random
 import struct
 from pathlib import Path
@@ -125,3 +126,58 @@ def test_the_image_itself_is_loaded_started_and_speaks() -> None:
     said = Loading(line, PROFILE, Transcript(now=lambda: line.time)).run(image())
     assert said.state == ControllerState.CHECK
     assert said.woke_from == "power on"
+
+
+class Babbler(EmulatedLoader):
+    """A loader that now and then says something else."""
+
+    def __init__(self, seed: int, controller: Controller) -> None:
+        super().__init__(PROFILE, controller)
+        self._rng = random.Random(seed)
+
+    def read(self, seconds: float) -> bytes:
+        said = super().read(seconds)
+        chance = self._rng.random()
+        if chance < 0.05:
+            return said + self._rng.randbytes(self._rng.randrange(40))
+        if chance < 0.1:
+            return said[: self._rng.randrange(len(said) + 1)]
+        if chance < 0.12:
+            return said + self._rng.choice([b"-", b"Ready", b"Success", b"Fail", b"CM-510", b"\xa5\x5a\x80\x00\x0c"])
+        return said
+
+
+def test_whatever_a_loader_says_it_ends_and_a_claim_of_success_needs_the_program_itself() -> None:
+    truth = {UNTOUCHED: {"factory"}, HALF: {"factory", "nothing"}, UNKNOWN: {"new", "nothing", "factory"},
+             LOADED: {"new", "nothing", "factory"}, "started": {"new"}}
+    ends = set()
+    for seed in range(300):
+        controller = Controller()
+        try:
+            load(Babbler(seed, controller))
+            state = "started"
+        except LoadError as e:
+            state = e.state
+        assert controller.runs in truth[state]
+        ends.add(state)
+    assert len(ends) >= 4
+
+
+@needs_compiler
+def test_flash_builds_and_says_what_it_would_do_and_needs_a_yes(tmp_path: Path, monkeypatch, capsys) -> None:
+    from workbench.cli.main import main
+    from workbench.robot import data_file
+
+    walk = str(data_file("robotis_walk.csv"))
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    assert main(["flash", walk, "--dry-run", "--cycles", "5", "--out", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert "RoboPlus Manager" in out
+    assert "no port was opened" in out
+    assert main(["flash", walk, "--out", str(tmp_path)]) == 2
+    assert "say yes" in capsys.readouterr().err
+    assert main(["flash", walk, "--yes", "--port", "/dev/no-such-port", "--out", str(tmp_path)]) == 2
+    assert "no such port" in capsys.readouterr().err
+    (tmp_path / "bad.table").write_bytes(b"WBTB")
+    assert main(["flash", str(tmp_path / "bad.table"), "--dry-run", "--out", str(tmp_path)]) == 2
+    assert "too short" in capsys.readouterr().err

@@ -22,10 +22,11 @@ def test_the_kept_corpus_still_runs_clean(target: str, tmp_path: Path) -> None:
     sources = [FIRMWARE / f"fuzz/fuzz_{target}.c", *sorted(FIRMWARE.glob("core/*.c")), FIRMWARE / "tests/sim.c"]
     flags = ["-std=c11", "-O1", "-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"]
     subprocess.run(["clang", *flags, table, *map(str, sources), "-o", str(tmp_path / "fuzzer")], check=True)
-    inputs = sorted(map(str, (FIRMWARE / "fuzz/corpus" / target).iterdir()))[::8]
+    kept = sorted(map(str, (FIRMWARE / "fuzz/corpus" / target).iterdir()))
+    inputs = kept if len(kept) < 100 else kept[::8]
     run = subprocess.run([str(tmp_path / "fuzzer"), *inputs], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr[-2000:]
-    assert len(inputs) >= 5
+    assert len(inputs) >= 2
 
 
 def campaign(*arguments: str) -> str:

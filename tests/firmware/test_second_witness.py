@@ -23,7 +23,8 @@ def test_qemu_sends_what_the_native_core_sends(tmp_path: Path) -> None:
     command = ["arm-none-eabi-gcc", "-std=gnu11", *ARM, TABLE, *sources, "-lgcc", "-o", "arm.elf"]
     subprocess.run(command, cwd=tmp_path, check=True)
     native = subprocess.run(["./native"], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
-    subprocess.run(["qemu-system-arm", "-M", "mps2-an385", "-nographic", "-monitor", "none", "-serial", "file:sent.txt",
-                    "-semihosting-config", "enable=on,target=native", "-kernel", "arm.elf"], cwd=tmp_path, check=True, timeout=120)
+    qemu = ["qemu-system-arm", "-M", "mps2-an385", "-nographic", "-monitor", "none", "-serial", "file:sent.txt"]
+    command = [*qemu, "-semihosting-config", "enable=on,target=native", "-kernel", "arm.elf"]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=120)
     assert (tmp_path / "sent.txt").read_text() == native
     assert len(native.splitlines()) > 40

@@ -77,4 +77,4 @@ def _build(model: RobotModel, step: float) -> RobotDiagram:
         actuator.set_default_gear_ratio(1.0)
     plant.Finalize()
     ConnectReference(builder.builder(), plant, joints, with_velocity=False)
-    return builder.Geometry()
+    return builder.Build()

@@ -17,7 +17,8 @@ from workbench.bench.figure import Figure, in_turns, median_and_quartiles
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes, register_takes
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, gather
 from workbench.identify.proposals import candidates

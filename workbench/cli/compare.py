@@ -34,10 +34,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Compares, writes, and prints the table."""
+    from workbench.api.sessions import compare_session
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.compare_files import compare_files
-    from workbench.compare.compare_session import compare_session
     from workbench.compare.session import load_session
     from workbench.simulation import SimulationConfig
     from workbench.view.report.comparison import write_comparison
@@ -49,14 +49,14 @@ def run(args: argparse.Namespace) -> int:
             if args.model != PUPPY:
                 session = session.with_model(load_model(args.model, args.packages))
             check_session("compare", session, args.yes)
-            model, title = session.model, f"Session {session.path}"
-            comparison = compare_session(session, config, progress=progress, n_jobs=args.jobs)
+            result = compare_session(session, config, progress=progress, jobs=args.jobs)
+            comparison, written = result.comparison, result.save(folder, progress)
         else:
-            model, title = load_model(args.model, args.packages), f"{args.a} and {args.b}"
+            model = load_model(args.model, args.packages)
             check_files("compare", (args.a, args.b), model, args.cycles, args.yes)
             comparison = compare_files(args.a, args.b, model, config, cycles=args.cycles, base=args.base, progress=progress,
                                        n_jobs=args.jobs)
-        written = write_comparison(comparison, model, folder, title, progress)
+            written = write_comparison(comparison, model, folder, f"{args.a} and {args.b}", progress)
     print(comparison.table())
     for name, reason in comparison.left_out:
         print(f"workbench compare: warning: take '{name}' left out: {reason}", file=sys.stderr)

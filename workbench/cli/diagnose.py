@@ -30,6 +30,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--memory", metavar="DIR", help="keep every rollout there, for other diagnoses of the same recordings "
+                        "(default: beside --out, until this one ends)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.set_defaults(run=run)
@@ -37,29 +39,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, predicts and writes."""
+    from workbench.api.sessions import DiagnoseOptions, diagnose
     from workbench.cli.memory import rollout_memory
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.compare.prediction import predict_session
     from workbench.compare.session import load_session
-    from workbench.experiment.next_experiment import with_next_experiment
-    from workbench.identify.diagnosis import diagnose_session
-    from workbench.motion import save_motion
-    from workbench.view.report.diagnosis import write_diagnosis
 
     session = load_session(args.session)
     check_session("diagnose", session, args.yes)
     with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
-          rollout_memory(args.out, session) as memory):
-        result = diagnose_session(session, progress, args.jobs, memory, args.thorough)
-        diagnosis, motion = with_next_experiment(result, args.jobs, progress)
-        paths = write_diagnosis(diagnosis, result.takes, folder, str(args.session), progress)
-        if motion is not None and diagnosis.next_experiment is not None:
-            paths.append(folder / diagnosis.next_experiment.motion)
-            save_motion(motion, paths[-1])
-        if session.predict:
-            (folder / "predict").mkdir()
-            predict_session(session, diagnosis.model, folder / "predict", progress, nominal=session.model, n_jobs=args.jobs)
+          rollout_memory(args.out, session, args.memory) as memory):
+        result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
+        paths = result.save(folder, progress, args.jobs)
+    diagnosis = result.diagnosis
     for name, reason in diagnosis.left_out:
         print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
     if diagnosis.stopped:
@@ -67,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {_line(finding)}")
-    print(f"wrote {args.out}: {', '.join(path.name for path in paths)}")
+    print(f"wrote {args.out}: {', '.join(path.name for path in paths if path.parent == folder)}")
     return 0
 
 

@@ -1,6 +1,8 @@
 """The `workbench` command: finds the verb, runs it, and turns what goes wrong into one line and an exit code.
 
 0: done. 1: a defect of the workbench (traceback). 2: bad input, one line on stderr. 130: interrupted.
+
+Shell completion (argcomplete): eval "$(register-python-argcomplete workbench)" in ~/.bashrc or ~/.zshrc.
 """
 
 from __future__ import annotations
@@ -13,14 +15,17 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import NoReturn
 
 import workbench
-from workbench.cli.progress import forget_warnings, show_warnings
+from workbench.cli.defaults import apply_defaults
+from workbench.cli.log import LOGGER, RunLog, speak_up
+from workbench.cli.progress import forget_warnings, progress_mode, show_warnings
 
 VERBS = (
-    "demo", "inspect", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
-    "servos", "play", "record", "run", "bench",
+    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "export", "flash",
+    "servos", "play", "record", "run", "bench", "doctor",
 )
 
 
@@ -38,16 +43,44 @@ def make_parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
     for verb in VERBS:
         import_module(f"workbench.cli.{verb.replace('-', '_')}").add_parser(subparsers)
+    for of in subparsers.choices.values():
+        loudness = of.add_mutually_exclusive_group()
+        loudness.add_argument("--quiet", action="store_true", help="no progress on stderr, only warnings and errors")
+        loudness.add_argument("--verbose", action="store_true", help="each step on stderr, with its time")
+    if "_ARGCOMPLETE" in os.environ:
+        from argcomplete import autocomplete
+
+        autocomplete(parser)
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one verb; `argv` without the program's name. Returns the exit code."""
-    args = make_parser().parse_args(argv)
-    logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
+    parser = make_parser()
+    try:
+        apply_defaults(_verbs(parser))
+    except ValueError as e:
+        return _refused("workbench", e)
+    args = parser.parse_args(argv)
+    log, heard = RunLog(sys.argv[1:] if argv is None else argv), speak_up(args.verbose, args.quiet)
+    LOGGER.addHandler(log)
+    progress_mode(args.quiet, args.verbose)
+    try:
+        code = _run(args, alone=argv is None)
+        log.write(args.out if isinstance(getattr(args, "out", None), Path) else None, code)
+        return code
+    finally:
+        for handler in (log, heard):
+            if handler is not None:
+                LOGGER.removeHandler(handler)
+
+
+def _run(args: argparse.Namespace, alone: bool) -> int:
+    """Runs the verb. alone: whether this process is for nothing else, so that libraries' warnings may be silenced."""
+    logging.getLogger("drake").addFilter(_serious)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     forget_warnings()
-    if argv is None and not sys.warnoptions:  # of the libraries, to those who develop with them
+    if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
         warnings.simplefilter("ignore")
         os.environ["PYTHONWARNINGS"] = "ignore"  # of worker processes, too
     try:
@@ -65,17 +98,27 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"workbench {args.verb}: error: out of memory ({' '.join(str(e).split()) or 'no more is free'})", file=sys.stderr)
         return 2
     except (OSError, ValueError) as e:
-        problem = _readable(e)
-        if problem is None:
-            raise
-        print(f"workbench {args.verb}: error: {problem}", file=sys.stderr)
-        return 2
+        return _refused(f"workbench {args.verb}", e)
     finally:
         signal.signal(signal.SIGTERM, previous)
 
 
-def _only_errors(record: logging.LogRecord) -> bool:
-    return record.levelno >= logging.ERROR
+def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    of = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    return dict(of.choices)
+
+
+def _refused(name: str, error: OSError | ValueError) -> int:
+    """Says in one line what the user can mend; what is a defect of ours goes on."""
+    problem = _readable(error)
+    if problem is None:
+        raise error
+    print(f"{name}: error: {problem}", file=sys.stderr)
+    return 2
+
+
+def _serious(record: logging.LogRecord) -> bool:
+    return record.levelno > logging.ERROR  # an error of its parser is raised as one
 
 
 def _readable(error: OSError | ValueError) -> str | None:

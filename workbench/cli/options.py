@@ -21,8 +21,8 @@ def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy
     """--model: which robot; PUPPY where nothing is said. default: what that stands for."""
     parser.add_argument(
         "--model", metavar="FILE", default=PUPPY,
-        help="robot: a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos and ground are taken "
-        f"(default: {default})")
+        help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos "
+        f"and ground are taken (default: {default})")
     add_packages(parser)
 
 
@@ -49,25 +49,9 @@ def _folder(text: str) -> Path:
 
 def load_model(name: str, packages: Sequence[tuple[str, str]] = ()) -> RobotModel:
     """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
-    from workbench.compare.session import load_session
-    from workbench.effects.apply import resolved
-    from workbench.robot import InputError, RobotModel, puppy_model
-    from workbench.robot.model_file import load_model as read_model_file
-    from workbench.robot.yaml_file import read_yaml
+    from workbench.api.robots import load_model as named
 
-    if name == PUPPY:
-        return puppy_model()
-    if Path(name).suffix.lower() in (".yaml", ".yml"):
-        content = read_yaml(name)
-        if isinstance(content, dict) and not {"takes", "predict"}.isdisjoint(content):
-            return load_session(name).model
-        model = read_model_file(name)
-        try:
-            list(resolved(model))
-        except InputError as e:
-            raise InputError(name, f"effects: {e.problem}") from None
-        return model
-    return RobotModel(name, packages=dict(packages))
+    return named(name, dict(packages))
 
 
 def positive(text: str) -> int:

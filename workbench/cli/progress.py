@@ -8,6 +8,8 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TextIO
 
+from workbench.cli.log import LOGGER
+
 _WAITING: list[str] = []
 """Warnings that were not shown yet."""
 QUIET = 1.5
@@ -15,11 +17,21 @@ QUIET = 1.5
 BEAT = 10.0
 """Longest silence [s]."""
 
+_MODE = {"silent": False}
+
+
+def progress_mode(quiet: bool, verbose: bool) -> None:
+    """Whether runs show no progress: with --quiet, and with --verbose, where the log speaks instead."""
+    _MODE["silent"] = quiet or verbose
+
 
 def warn(verb: str, lines: Iterable[str]) -> None:
     """Lines for stderr, shown once the run turns out to be long, or when it has ended well: where it is refused, the error stands
     alone."""
-    _WAITING.extend(f"workbench {verb}: warning: {line}" for line in lines)
+    said = [f"workbench {verb}: warning: {line}" for line in lines]
+    for line in said:
+        LOGGER.warning("%s", line)
+    _WAITING.extend(said)
 
 
 def show_warnings(stream: TextIO | None = None) -> None:
@@ -54,7 +66,7 @@ class Progress:
         self._last = -float("inf")
         self._now: tuple[str, float | None] = "", None
         self._shown = ""
-        self._speaks = quiet <= 0
+        self._speaks = quiet <= 0 and not _MODE["silent"]
         self._lock = threading.Lock()
         self._timer = threading.Timer(quiet, self._speak)
         self._timer.daemon = True
@@ -76,6 +88,8 @@ class Progress:
         with self._lock:
             if what.partition(" ")[0] != self._now[0].partition(" ")[0]:
                 self._entered = time.monotonic()
+            if what != self._now[0]:
+                LOGGER.debug("%s", what)
             self._now = what, done
             for k, begins in enumerate(self._stages):
                 if what.startswith(begins):
@@ -86,9 +100,9 @@ class Progress:
     def _speak(self) -> None:
         """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
         with self._lock:
-            self._speaks = True
+            self._speaks = not _MODE["silent"]
             show_warnings(self._stream)
-            if self._now[0]:
+            if self._speaks and self._now[0]:
                 self._show()
         threading.Thread(target=self._beats, daemon=True).start()
 

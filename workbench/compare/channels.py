@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.compare.options import COMPARE
 from workbench.compare.session_takes import RegisteredTake
 from workbench.recording.take import Take
 
 Array = NDArray[np.float64]
-GAIN_SPAN = 0.25
-"""Span over which path and heading are compared [s]."""
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 ACROSS = "~"
 """Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
@@ -56,7 +55,7 @@ def body_channels(take: Take) -> Array:
     angles = np.full((n, 3), np.nan)
     angles[good] = Rotation.from_quat(take.quat_WB[good], scalar_first=True).as_euler("ZYX")
     angles[good, 0] = np.unwrap(angles[good, 0])
-    step = max(1, round(GAIN_SPAN / float(np.median(np.diff(take.time)))))
+    step = max(1, round(COMPARE.gain_span / float(np.median(np.diff(take.time)))))
     gain = np.full((n, 3), np.nan)
     gain[:-step, :2] = take.p_WB[step:, :2] - take.p_WB[:-step, :2]
     gain[:-step, 2] = angles[step:, 0] - angles[:-step, 0]

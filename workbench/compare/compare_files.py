@@ -66,6 +66,11 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
     return Comparison((result,), provenance=provenance(model, config, time.monotonic() - began) | made_by)
 
 
+def recorded_take(path: str | Path, model: RobotModel, base: Base = "free") -> Take:
+    """A recording alone as a take, its start where its first joint leaves rest. InputError names the file and what is wrong."""
+    return _by_first_motion(_read(Path(path), model, base)).recorded
+
+
 def _by_first_motion(read: ReadTake) -> RegisteredTake:
     """A recording of which nothing is known but itself: its start is where its first joint leaves rest."""
     if read.recording.sensing == "encoders" or read.commands is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
+from workbench.compare.options import COMPARE
 from workbench.compare.results import Comparison, TakeComparison
 from workbench.compare.session import Session
 from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, read_takes, register_takes
@@ -17,9 +18,6 @@ from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.steady import BaseStates
-
-LEAD = 0.3
-"""Rest before the first command of each rollout [s]."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +77,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["finer"] = [replace(own, time_step=own.time_step / k, log_period=own.logged_every) for k in (2, 4)]
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
-        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, LEAD, name=run.name, start=run.start,
+        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start,
                           steadied=run.steadied))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end

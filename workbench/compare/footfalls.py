@@ -8,17 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.compare.options import COMPARE
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, foot_points
 
 Array = NDArray[np.float64]
 
-LIFT = 0.005
-"""A foot is off the ground above this share of the height at which the base rests: 1 mm for a puppy, five times what capture
-noise makes of a foot's height (0.2 mm in the practice sessions). On simulated walks the duty factor then lies within 0.04
-above that from contact forces."""
-SHORTEST = 0.03
-"""Stance or swing shorter than this [s] is chatter, not a step."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +44,7 @@ def foot_phases(take: Take, model: RobotModel) -> dict[str, FootPhases]:
     for foot, z in heights.items():
         resting = z[take.resting & np.isfinite(z)]
         ground = float(np.median(resting)) if len(resting) else float(np.nanmin(z, initial=np.inf))
-        out[foot] = _phases(take, z - ground < LIFT * rest_height, np.isfinite(z))
+        out[foot] = _phases(take, z - ground < COMPARE.lift * rest_height, np.isfinite(z))
     return out
 
 
@@ -110,7 +105,7 @@ def _without_chatter(stance: NDArray[np.bool_], time: Array) -> NDArray[np.bool_
         edges = np.concatenate([[0], np.flatnonzero(np.diff(stance.astype(int))) + 1, [len(stance)]])
         lengths = np.append(time, time[-1])[edges[1:]] - time[edges[:-1]]
         inner = lengths[1:-1]
-        if not len(inner) or inner.min() >= SHORTEST:
+        if not len(inner) or inner.min() >= COMPARE.shortest:
             return stance
         i = int(np.argmin(inner)) + 1
         stance[edges[i] : edges[i + 1]] ^= True

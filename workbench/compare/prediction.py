@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.compare.options import COMPARE
 from workbench.compare.session import PredictSpec, Session
 from workbench.compare.session_takes import LeftOut, Progress, capture_yaw, no_progress, read_takes
 from workbench.effects.apply import seen
@@ -16,9 +18,10 @@ from workbench.recording.formats.joint_log import write_joint_log
 from workbench.recording.formats.motive_write import write_motive
 from workbench.recording.formats.read import read_recording
 from workbench.recording.joint_names import named_by_model
+from workbench.recording.mocap.conventions import layout_yaw
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
-from workbench.recording.mocap.tracks import check_assets
+from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.recording import Recording
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
@@ -26,8 +29,6 @@ from workbench.simulation import Simulation, SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 
 Array = NDArray[np.float64]
-LEAD = 0.3
-"""Rest before the first command of each rollout [s]."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
     versions = {ending: session.with_model(m) for ending, m in models.items()}
     captured = [_Captured(spec, read_start(spec.start)) for spec in session.predict if spec.start is not None]
     left_out: LeftOut = ()
+    if captured and yaw is None and not session.takes:
+        yaw = session.yaw if session.yaw is not None else _yaw_of_starts(session, [c.start for c in captured])
     if captured and yaw is None:
         progress("finding the yaw", None)
         takes, left_out = read_takes(session)
@@ -71,6 +74,16 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
             progress(f"simulating {spec.name}", None)
             paths += [predict_log(s, spec, out_dir / f"{spec.name}{ending}.csv", config) for ending, s in versions.items()]
     return Predicted(tuple(paths), left_out)
+
+
+def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
+    """The yaw [rad] that where the bodies stand tells, of a session of predictions alone: good to some degrees, as pivots lie
+    anywhere on their links. InputError where they do not tell it."""
+    told = [layout_yaw(tracks_of(start), session.model) for start in starts]
+    known = [yaw for yaw in told if yaw is not None]
+    if not known:
+        raise InputError(session.path, "yaw: is missing, and neither takes nor where the bodies of the start files stand tell it")
+    return float(np.angle(np.mean(np.exp(1j * np.array(known)))))
 
 
 def read_start(path: Path) -> Recording:
@@ -105,7 +118,7 @@ class _Captured:
         commands = load_motion(self.spec.motion, model).commands(self.spec.cycles)
         check_assets(self.start, model)
         after = max(float(self.time[-1]) - self.starts_at, 0.0) + config.logged_every
-        return Job(model, replace(config, base=self.spec.base), commands, after, LEAD, name=self.spec.name)
+        return Job(model, replace(config, base=self.spec.base), commands, after, COMPARE.lead, name=self.spec.name)
 
     def write(self, take: Take, model: RobotModel, yaw: float, path: Path) -> Path:
         """Writes a rollout as the cameras of the start file would have seen it."""
@@ -134,7 +147,7 @@ def predict_log(session: Session, spec: PredictSpec, path: Path, config: Simulat
     start = Start(np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"]), logged=True) if known else None
     since = log.time - log.time[0]
     simulation = Simulation(model, replace(config, base=spec.base))
-    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, LEAD, start=start).as_logged()
+    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, COMPARE.lead, start=start).as_logged()
     commanded = [j for j in model.joints if f"goal.{j}" in log.channels]
     channels = {name: values for name, values in log.channels.items() if name.startswith(("goal.", "enabled."))}
     channels |= {f"position.{j}": np.interp(since, take.time, take.q[:, take.column(j)]) for j in commanded}

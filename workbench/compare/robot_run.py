@@ -25,9 +25,10 @@ CAMERAS = 120.0
 
 @dataclass(frozen=True)
 class RobotRun:
-    """session: its file. capture: of the cameras, None where there were none."""
+    """session: its file. takes: as they stand in it. capture: of the cameras, None where there were none."""
 
     session: Path
+    takes: tuple[dict[str, Any], ...]
     played: Played
     capture: Capture | None
     warnings: tuple[str, ...]
@@ -67,7 +68,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     warnings = [f"register {d}" for d in registers.departures(model)] + list(capture.problems if capture else ())
     if played.stopped:
         warnings.insert(0, f"stopped: {played.stopped}")
-    return RobotRun(session, played, capture, tuple(warnings))
+    return RobotRun(session, tuple(takes), played, capture, tuple(warnings))
 
 
 def _filmed(virtual: VirtualRobot, played: Played, take: Path, seed: int) -> Capture:

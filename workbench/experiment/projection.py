@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.channels import BODY, GAIN_SPAN, body_channels
+from workbench.compare.channels import BODY, body_channels
+from workbench.compare.options import COMPARE
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.rivals import Pair, Rival
 from workbench.identify.options import PROBLEM
@@ -125,7 +126,7 @@ def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
 def _counts(sight: ObservationModel, count: int) -> Array:
     """Of each channel (c,): the root of one over the number of frames that err alike; the body's are gains over a span."""
     counts = np.full(count, 1 / np.sqrt(max(1.0, EXPERIMENT.together * sight.rate)))
-    counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, GAIN_SPAN * sight.rate))
+    counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, COMPARE.gain_span * sight.rate))
     return counts
 
 

@@ -48,10 +48,10 @@ class Certificate:
 
     def as_text(self) -> str:
         """The file: JSON with the sha256 of all that stands before it."""
-        content = {"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"},
-                   "margins": [vars(m) for m in self.margins]}
+        content = plain({"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"},
+                         "margins": [vars(m) for m in self.margins]})
         content["sha256"] = _digest(content)
-        return json.dumps(content, indent=1, allow_nan=False, default=_plain) + "\n"
+        return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
     def summary(self) -> str:
@@ -121,13 +121,15 @@ def hashes(**tables: PoseTable) -> dict[str, str]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    said = json.dumps({k: v for k, v in content.items() if k != "sha256"}, sort_keys=True, default=_plain)
+    said = json.dumps(plain({k: v for k, v in content.items() if k != "sha256"}), sort_keys=True)
     return hashlib.sha256(said.encode()).hexdigest()
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Plain types, for JSON; what is not known, or without bound, is null."""
     if isinstance(value, Mapping):
-        return dict(value)
-    if hasattr(value, "item"):
-        return value.item()
-    raise TypeError(f"expected plain types, got {type(value).__name__}")
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    value = value.item() if hasattr(value, "item") else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value

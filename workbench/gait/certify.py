@@ -16,14 +16,14 @@ from workbench.gait.certificate import Certificate, hashes
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.limits import contact_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import GaitMeasure, base_jerk, measure
+from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.request import Request
+from workbench.gait.rollouts import rollouts
 from workbench.gait.table import GaitTable
 from workbench.motion import Commands
 from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-from workbench.simulation.batch import simulate_stream
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float | None], None]
@@ -37,7 +37,7 @@ QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 class CertifyOptions:
     """How a gait is examined. seconds: of walking on the nominal robot, six as in the thesis. draw_seconds: on each draw.
     draws: fresh ones. step: of the simulation, 1 ms [s]; draw_step for draws: 2 ms agree with it to a hundredth. checked: draws
-    that are simulated at `step` as well. floor_seconds: of each numerical variant. n_jobs: processes."""
+    that are simulated at `step` as well. floor_seconds: of each of the numerical `variants`. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -46,6 +46,7 @@ class CertifyOptions:
     draw_step: float = 2e-3
     checked: int = 8
     floor_seconds: float = 3.0
+    variants: tuple[str, ...] = ("2 ms", "1 ms", "0.5 ms", "sap", "similar", "hydroelastic")
     n_jobs: int = 2
 
 
@@ -121,19 +122,23 @@ class _Examiner:
         robots = [self.request.on_slope(d) for d in draws]
         config = SimulationConfig(time_step=self.options.draw_step, contact_period=0.0, log_period=0.01)
         jobs = [self._job(r, config, self.options.draw_seconds) for r in robots]
-        found = []
-        for k, take in enumerate(simulate_stream(jobs, self.options.n_jobs)):
+        measures, feet = [], []
+        for k, take in enumerate(rollouts(jobs, self.options.n_jobs)):
             self.progress(f"certifying: robot {k + 1} of {len(jobs)}", 0.2 + 0.6 * k / len(jobs))
-            found.append(self._measured(take, robots[k]))
-        measures = [m for m, _ in found]
+            if take is None:
+                measures.append(fallen(len(self.model.joints)))
+            else:
+                m, f = self._measured(take, robots[k])
+                measures.append(m)
+                feet.append(f)
         if not measures:
             return {"count": 0}, []
         r = self.request
         values = {
             f"speed {r.unit}": [r.progress(m) for m in measures],
             "heading deg/m": [math.degrees(r.drift(m)) for m in measures],
-            "slip m/s": [f.slip for _, f in found], "foot clearance mm": [1000 * f.clearance for _, f in found],
-            "tipping margin deg": [math.degrees(f.tipping) for _, f in found],
+            "slip m/s": [f.slip for f in feet], "foot clearance mm": [1000 * f.clearance for f in feet],
+            "tipping margin deg": [math.degrees(f.tipping) for f in feet],
             "electrical power W": [m.power for m in measures], "largest RMS torque N m": [max(m.rms) for m in measures]}
         told: dict[str, Any] = {k: _quantiles(np.array(v)) for k, v in values.items()}
         told["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
@@ -145,16 +150,17 @@ class _Examiner:
     def floor(self) -> dict[str, Any]:
         """Steps and contact models."""
         base = SimulationConfig(time_step=self.options.step, contact_period=0.0, log_period=0.01)
-        variants = {"2 ms": replace(base, time_step=2e-3), "1 ms": base, "0.5 ms": replace(base, time_step=5e-4),
-                    "sap": replace(base, approximation="sap"), "similar": replace(base, approximation="similar"),
-                    "hydroelastic": replace(base, contact="hydroelastic")}
+        known = {"2 ms": {"time_step": 2e-3}, "1 ms": {"time_step": 1e-3}, "0.5 ms": {"time_step": 5e-4},
+                 "sap": {"approximation": "sap"}, "similar": {"approximation": "similar"},
+                 "hydroelastic": {"contact": "hydroelastic"}}
+        variants = {name: replace(base, **known[name]) for name in self.options.variants}  # type: ignore[arg-type]
         self.progress(f"certifying: {len(variants)} ways to compute", 0.82)
         takes = simulate_batch([self._job(self.model, c, self.options.floor_seconds) for c in variants.values()],
                                self.options.n_jobs)
         measures = {k: self._measured(t, self.model)[0] for k, t in zip(variants, takes)}
         speeds = {k: self.request.progress(m) for k, m in measures.items()}
         drifts = {k: math.degrees(self.request.drift(m)) for k, m in measures.items()}
-        steps = [speeds[k] for k in ("2 ms", "1 ms", "0.5 ms")]
+        steps = [v for k, v in speeds.items() if k.endswith("ms")] or [0.0]
         return {"speed": speeds, "heading deg/m": drifts, "steps": float(np.ptp(steps)),
                 "all": float(np.std(list(speeds.values()))), "heading deg/m, all": float(np.std(list(drifts.values())))}
 
@@ -177,7 +183,8 @@ class _Examiner:
 
     def _measured(self, take: Take, model: RobotModel) -> tuple[GaitMeasure, FeetMeasure]:
         begin, period = self.table.start_seconds, self.table.period
-        return measure(take, model, begin, period), feet_measure(take, model, self.machine.legs, begin, period)
+        feet = feet_measure(take, model, self.machine.legs, begin, period)
+        return replace(measure(take, model, begin, period), clearance=feet.clearance), feet
 
     def _commands(self, seconds: float) -> tuple[Commands, float]:
         cycles = max(2, math.ceil(seconds / self.table.period))

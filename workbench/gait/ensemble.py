@@ -47,7 +47,8 @@ class Ensemble:
         """`count` robots, the same for the same seed. Robots whose links' masses differ are written into `folder` as SDF files of
         their own; what a diagnosed model's effects say is drawn from its posterior, the rest is added to it."""
         rng = np.random.default_rng([seed, 20])
-        return [self._draw(model, rng, folder) for _ in range(count)]
+        legs = sorted({j for leg in legs_of(model) for j in leg.joints}) if count else []
+        return [self._draw(model, legs, rng, folder) for _ in range(count)]
 
     @property
     def sha256(self) -> str:
@@ -58,9 +59,8 @@ class Ensemble:
                      np.asarray(self.posterior.covariance).tolist()]
         return hashlib.sha256(repr(said).encode()).hexdigest()
 
-    def _draw(self, model: RobotModel, rng: np.random.Generator, folder: Path) -> RobotModel:
+    def _draw(self, model: RobotModel, legs: list[str], rng: np.random.Generator, folder: Path) -> RobotModel:
         drawn = model if self.posterior is None else _from_posterior(model, self.posterior, rng)
-        legs = sorted({j for leg in legs_of(model) for j in leg.joints})
         effects: list[EffectSpec] = []
         for key, (low, high) in self.ranges.items():
             name, parameter = EFFECTS[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,10 @@ class Leg:
     def place(self, q: Array) -> Array:
         """Where the tip is in the base link's frame (N, 3) [m] for angles (N, k) [rad], other joints at zero."""
         return self._place(q)[0]
+
+    def jacobian(self, q: Array) -> Array:
+        """How the tip moves with the angles (N, 3, k) [m/rad]."""
+        return self._place(q)[1]
 
     def solve(self, targets: Array, bend: int) -> tuple[Array, Array]:
         """Angles (N, k) [rad] that put the tip at `targets` (N, 3) [m] in the base link's frame, other joints at zero, and how
@@ -83,9 +88,9 @@ class Leg:
         q = np.zeros((len(targets), k))
         if k < 2:
             return q
-        origins = [self._origin(j) for j in self.joints[-2:]]
-        upper, lower = float(np.linalg.norm(origins[1] - origins[0])), float(np.linalg.norm(tip[0] - origins[1]))
-        reach = np.clip(np.linalg.norm(targets - origins[0], axis=1), 0.3 * upper, upper + lower)
+        origins = self._origins
+        upper, lower = float(np.linalg.norm(origins[-1] - origins[-2])), float(np.linalg.norm(tip[0] - origins[-1]))
+        reach = np.clip(np.linalg.norm(targets - origins[-2], axis=1), 0.3 * upper, upper + lower)
         inside = np.arccos(np.clip((reach**2 - upper**2 - lower**2) / (2 * upper * lower), -1, 1))
         forward = 1.0 if J[0, 0, -1] >= 0 else -1.0  # the sense in which the last joint brings the foot forward
         q[:, -1] = forward * bend * np.maximum(inside, 0.05)
@@ -95,10 +100,12 @@ class Leg:
             q[:, column] += np.einsum("ni,ni->n", J[..., column], targets - p) / np.maximum(slope, 1e-6)
         return q
 
-    def _origin(self, joint: str) -> Array:
-        f = self.kinematics.frames[joint]
-        p, R = self.kinematics.forward(np.zeros((1, len(self.kinematics.joints))))[f.parent]
-        return np.asarray(p[0] + R[0] @ f.X_PF_p)
+    @cached_property
+    def _origins(self) -> list[Array]:
+        """Where the joints are in the base link's frame in neutral (3,) [m]."""
+        poses = self.kinematics.forward(np.zeros((1, len(self.kinematics.joints))))
+        frames = [self.kinematics.frames[j] for j in self.joints]
+        return [np.asarray(poses[f.parent][0][0] + poses[f.parent][1][0] @ f.X_PF_p) for f in frames]
 
 
 def legs_of(model: RobotModel) -> tuple[Leg, ...]:

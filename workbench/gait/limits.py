@@ -22,11 +22,14 @@ class GaitLimits:
     heat of a quarter of a stalled servo's, for minutes and not for hours. `advised` is the fifth.
     torque: share of the torque-speed line that may be asked for 10 ms or longer; the rest of it is where a servo stops following.
     fuse: supply current [A] (CM-530: 10 A). reach: feet off the path asked for [m]: a millimetre is within play and rounding.
-    clearance: between links [m]: 2 mm for cables and screw heads. capacity: poses in the controller's table: 512 poses of 15
-    servos take 32 kB, half of a CM-530's memory. bus: bit rate of the servo bus [1/s].
+    clearance: between links [m]: 2 mm for cables and screw heads. lift: that each foot comes off the ground in each cycle [m]: 3
+    mm, twice what a degree of play in a knee lets it hang; feet that drag go as the floor lets them.
+    capacity: poses in the controller's table: 512 poses of 15 servos take 32 kB, half of a CM-530's memory. bus: bit rate of the
+    servo bus [1/s].
     fall_draws: share of draws that may fall: none. tilt: of the base [rad], 30 deg, where the feet's track no longer
     holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the
-    same, RMS over draws [rad/m]: 12 deg, an eighth of the ROBOTIS walk's 98. aside: speed across over speed along.
+    same, RMS over draws [rad/m]: 30 deg, by which it ends a quarter of a metre beside a line of one. aside: speed across over
+    speed along.
     """
 
     rms: float | None = None
@@ -34,11 +37,12 @@ class GaitLimits:
     fuse: float = 10.0
     reach: float = 1e-3
     clearance: float = 2e-3
+    lift: float = 3e-3
     capacity: int = 512
     bus: float = 1e6
     tilt: float = float(np.radians(30))
     drift: float = float(np.radians(3))
-    spread: float = float(np.radians(12))
+    spread: float = float(np.radians(30))
     aside: float = 0.1
 
 
@@ -107,6 +111,10 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
         out.append(_of("RMS torque", joint, measure.rms[i], float(allowed[i]), "N m"))
         out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of what it has"))
         out.append(_of("RMS torque, ROBOTIS's fifth", joint, measure.rms[i], float(law.full_torque[i]) / 5, "N m", advice=True))
+    if np.isfinite(measure.clearance):
+        lifted = 1000 * max(measure.clearance, 1e-6)
+        use = max(2 - lifted / (1000 * limits.lift), 0.0)
+        out.append(_of("foot clearance", "robot", lifted, 1000 * limits.lift, "mm, at least", use))
     out.append(_of("supply current", "robot", measure.peak_current, limits.fuse, "A"))
     out.append(_of("tilt", "robot", float(np.degrees(measure.tilt)), float(np.degrees(limits.tilt)), "deg"))
     return out

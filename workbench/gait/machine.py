@@ -72,7 +72,7 @@ class GaitMachine:
         law = self.law
         return np.floor(np.maximum(law.full_torque - law.coulomb, 0) / law.damping / SPEED_UNIT).astype(np.int64)
 
-    def angles(self, shape: GaitShape, phases: Array, size: float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Joint angles (N, n) [rad] that put the feet on the shape's path at phases (N,), joints outside legs at zero; how far
         each foot stays from it (N, F) [m]; and which feet should stand (N, F)."""
         path = foot_path(shape, self.legs, phases, size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -37,7 +38,8 @@ class GaitMeasure:
     between the ends [m]; drift: change of heading on the way [rad], lateral: beside the first heading [m]. tilt: largest [rad].
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
-    electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3].
+    electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
+    cycles of how high a foot comes [m]; NaN where nobody looked.
     """
 
     fell: bool
@@ -55,6 +57,7 @@ class GaitMeasure:
     power: float
     mechanical: float
     jerk: float
+    clearance: float = math.nan
 
     @property
     def speed(self) -> float:
@@ -67,8 +70,16 @@ class GaitMeasure:
         return self.drift / max(self.gone, 0.01)
 
 
-def measure(take: Take, model: RobotModel, begin: float, period: float) -> GaitMeasure:
-    """Of a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s]."""
+def fallen(joints: int) -> GaitMeasure:
+    """Of a run that was given up because the robot lay on the floor, or its links met."""
+    nothing = (0.0,) * joints
+    return GaitMeasure(True, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, math.pi / 2, nothing, nothing, nothing, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True) -> GaitMeasure:
+    """Of a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s].
+
+    electrical: whether current and power are wanted, which take the commands that reached each servo; else they are NaN."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     assert take.torque is not None
@@ -89,9 +100,10 @@ def measure(take: Take, model: RobotModel, begin: float, period: float) -> GaitM
     forward = float((step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle)).sum() / seconds)
     left = float((step[:, 1] * np.cos(middle) - step[:, 0] * np.sin(middle)).sum() / seconds)
     whole = p[-1, :2] - p[0, :2]
-    law = physics_of(model).law
+    law = _law(model)
     torque, v = take.torque[inside], take.v[inside]
-    current, power = supply(take, model, law)
+    unknown = np.full(len(take), np.nan)
+    current, power = supply(take, model, law) if electrical else (unknown, unknown)
     every = float(np.median(np.diff(time)))
     smooth = uniform_filter1d(current, max(1, round(FUSE_WINDOW / every)))
     return GaitMeasure(
@@ -103,6 +115,16 @@ def measure(take: Take, model: RobotModel, begin: float, period: float) -> GaitM
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
         jerk=base_jerk(time, p))
+
+
+_laws: dict[str, ServoLaw] = {}
+
+
+def _law(model: RobotModel) -> ServoLaw:
+    """The servos' law with the model's effects, kept: effects on the build take a while to work in."""
+    if model.sha256 not in _laws:
+        _laws[model.sha256] = physics_of(model).law
+    return _laws[model.sha256]
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
@@ -147,10 +169,11 @@ def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
 
 def base_jerk(time: Array, p: Array) -> float:
     """RMS of the third derivative of the base's path, smoothed over 50 ms so that single impacts of feet do not decide."""
-    if len(time) < 12:
+    every = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    window = max(3, round(0.05 / every))
+    if len(time) < 3 * window + 4:
         return float("nan")
-    every = float(np.median(np.diff(time)))
-    smooth = uniform_filter1d(p, max(3, round(0.05 / every)), axis=0)
+    smooth = uniform_filter1d(p, window, axis=0)[window:-window]  # the filter makes up what lies beyond the ends
     jerk = np.diff(smooth, n=3, axis=0) / every**3
     return float(np.sqrt((jerk**2).sum(axis=1).mean()))
 

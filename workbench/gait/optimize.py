@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -34,6 +32,8 @@ from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""
+MEMORY = ".rollouts.jsonl"
+"""Where a folder remembers what its searches have simulated."""
 
 
 @dataclass(frozen=True)
@@ -130,13 +130,6 @@ def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:
 def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Path]:
     """Writes them, all or none."""
     return write_together(folder, gait_files(table, certified))
-
-
-def memory_key(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions) -> str:
-    """What a remembered search must be of to be gone on with."""
-    said = [machine.model.sha256, repr(request), ensemble.sha256, asdict(options.budget), options.seed,
-            [asdict(s) for s in options.given]]
-    return hashlib.sha256(json.dumps(said, default=str).encode()).hexdigest()[:16]
 
 
 def shape_from(content: dict[str, Any]) -> GaitShape:

@@ -78,13 +78,13 @@ class FootPath:
     stance: NDArray[np.bool_]
 
 
-def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: float = 1.0) -> FootPath:
-    """Of a shape at phases (N,), with strides and lifts times `size`.
+def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: Array | float = 1.0) -> FootPath:
+    """Of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
 
     On the ground a foot goes straight back at an even pace, by what the body advances and turns at its place; in the air it comes
     forward on half a cosine and up on half a sine. Which foot is which follows from where it is in neutral.
     """
-    neutral = np.array([leg.neutral for leg in legs])
+    neutral, size = np.array([leg.neutral for leg in legs]), np.broadcast_to(size, np.shape(phases))[:, None]
     middle = neutral[:, :2].mean(axis=0)
     front, left = neutral[:, 0] > middle[0], neutral[:, 1] > middle[1]
     offset = np.array(FAMILIES[shape.family])[np.where(front, 0, 2) + np.where(left, 0, 1)] + np.where(front, 0.0, shape.lag)
@@ -97,7 +97,7 @@ def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: float 
     step_x = shape.stride + np.where(front, 0.5, -0.5) * shape.difference - shape.turn * arm[:, 1]
     step_y = shape.side + shape.turn * arm[:, 0]
     up = size * np.where(stance, -shape.push * np.sin(np.pi * u), shape.lift * np.sin(np.pi * late.clip(0, 1)))
-    sway = size * shape.sway * np.sin(2 * np.pi * (np.asarray(phases) - shape.sway_phase))[:, None]
+    sway = size * shape.sway * np.sin(2 * np.pi * (np.asarray(phases)[:, None] - shape.sway_phase))
     p = np.empty((*s.shape, 3))
     p[..., 0] = neutral[:, 0] + np.where(front, shape.front, shape.hind) + along * step_x
     p[..., 1] = neutral[:, 1] + np.where(left, shape.spread, -shape.spread) + along * step_y - sway

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,13 +56,13 @@ class GaitTable:
 def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait", ways: tuple[int, int] = GENTLY) -> GaitTable:
     """The table of a shape, rounded to counts and milliseconds. ways: dwells [ms] from neutral to the gait's stance, and in it.
     InputError where a goal is beyond the registers."""
-    q, off, stance = machine.angles(shape, shape.phases)
+    P = shape.poses
+    sizes = np.repeat([1.0, HALF, 0.0], [P, P, 1])
+    every, off, stances = machine.angles(shape, np.concatenate([shape.phases, shape.phases, [0.0]]), sizes)
+    q, small, stand, off, stance = every[:P], every[P:2 * P], every[2 * P:], off[:P], stances[:P]
     goals = q + shape.lead * machine.droop(shape, q, stance) if shape.lead else q
     dwells = _dwells(shape)
     cycle = _table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
-    standing = replace(shape, stride=0.0, side=0.0, turn=0.0, difference=0.0)
-    stand = machine.angles(standing, np.zeros(1), 0.0)[0]
-    small = machine.angles(shape, shape.phases, HALF)[0]
     neutral = np.zeros_like(stand)
     there, back = np.array(ways), np.array(ways[::-1])
     start = [_table(machine, np.vstack([stand, stand]), np.vstack([neutral, stand]), there, 1.0, source),

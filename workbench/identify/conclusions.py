@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
-from workbench.identify.fitting.fits import Fit
+from workbench.identify.fitting.fit import Fit
 from workbench.identify.ledger import in_file_units
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate

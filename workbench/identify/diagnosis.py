@@ -28,7 +28,9 @@ from workbench.identify.evidence.leftover import left_over
 from workbench.identify.findings import Diagnosis, Finding, GapEntry, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
+from workbench.identify.judge import EnginesPartError, judged
 from workbench.identify.ledger import channel_gaps, ledger
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.parameters import Candidate
@@ -48,6 +50,8 @@ from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
 from workbench.robot import Posterior, RobotModel
 from workbench.simulation import SimulationConfig
+
+BESIDE_DRAKE = "{} model apart from Drake [sigma]"
 
 
 @dataclass(frozen=True)
@@ -76,10 +80,21 @@ class _Explained:
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
                      thorough: bool = False) -> DiagnosisResult:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
-    rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes."""
-    began = time.monotonic()
+    rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. Rollouts are the
+    compiled station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
+    began = time.monotonic()
+    try:
+        return _diagnosed(session, config, began, progress, n_jobs, memory, thorough, {"rollouts by": "the compiled station"})
+    except EnginesPartError as why:
+        progress(f"{why}: again by Drake", None)
+        by_drake = {"rollouts by": "Drake", "because": str(why)}
+        return _diagnosed(session, replace(config, engine="drake"), began, progress, n_jobs, memory, thorough, by_drake)
 
+
+def _diagnosed(session: Session, config: SimulationConfig, began: float, progress: Progress, n_jobs: int, memory: Path | None,
+               thorough: bool, engine: Mapping[str, str]) -> DiagnosisResult:
+    """By one engine; EnginesPartError where that is not Drake and Drake says otherwise. began: time.monotonic of the start."""
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
@@ -87,6 +102,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     check_duration(session, seen.evidence)
     evaluator = RolloutEvaluator(seen.evidence, config, n_jobs, memory)
     nominal = Search(evaluator, session.model).evaluated([])
+    progress("judging the engine", None)
+    apart = {BESIDE_DRAKE.format("nominal"): judged(evaluator, session.model, "nominal")}
 
     # 2. The gap: where, when and in which layer they leave the nominal model
     gap = ledger(seen.evidence, nominal.residuals)
@@ -116,6 +133,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     evaluator = evaluator.on(with_commands_of(evaluator.evidence, search.evaluator.evidence))
     fitted = fit.model(known.model)
     after, floors = _left_by(fitted, evaluator, looked_at, explained, progress)
+    progress("judging the engine", None)
+    apart[BESIDE_DRAKE.format("final")] = judged(evaluator, fitted, "final")
     findings = _findings(evidence, build.measured, explained, nominal.residuals, after)
     left = _left(evidence, after, floors, explained) if gap else ()
 
@@ -129,7 +148,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         gap=gap, findings=findings, rejected=rejected(looked_at, fit, chosen.rounds, explained.posteriors, nominal.residuals),
         unexplained=left, posterior=posterior(fit, (*build.measured, *chosen.missed)),
         provenance=provenance(session.model, config, time.monotonic() - began)
-        | {"seed": 0, "rollouts": search.evaluator.rollouts} | subset_used(looked_at),
+        | {"seed": 0, "rollouts": search.evaluator.rollouts, "engine": {**engine, **apart}}
+        | subset_used(looked_at),
         stopped=chosen.stopped, left_out=unreadable + seen.left_out)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return DiagnosisResult(diagnosis, reports, ties(session.model, fit, explained.posteriors), observation_models(evidence))

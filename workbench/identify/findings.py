@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.files import write_together
@@ -17,10 +18,6 @@ from workbench.robot.model_file import model_text
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]
-LIKELY = 0.5
-"""Probability from which on a name counts as an explanation."""
-TIED = 0.5
-"""An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
 FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 
@@ -129,7 +126,7 @@ class Finding:
     @property
     def tie(self) -> Alternative | None:
         """The other name of a tie of two."""
-        return next((a for a in self.alternatives if a.confidence >= TIED * self.confidence), None)
+        return next((a for a in self.alternatives if a.confidence >= CONCLUSIONS.tied * self.confidence), None)
 
     @property
     def together(self) -> float:
@@ -139,7 +136,7 @@ class Finding:
     @property
     def likely(self) -> bool:
         """Whether the effect, or another that could be meant, is there rather than not."""
-        return self.confidence + sum(a.confidence for a in self.alternatives) >= LIKELY
+        return self.confidence + sum(a.confidence for a in self.alternatives) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),

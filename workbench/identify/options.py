@@ -184,6 +184,8 @@ class FitOptions:
     contact_error: float = 0.06
     """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by
     that."""
+    slope_step: float = 1e-3
+    """Of a size, by which a slope of a known function is told."""
     drift: float = 0.25
     """Share of a number by which it must change within a take to be a drift: two engines, or a robot and a model, differ by
     less."""
@@ -208,6 +210,10 @@ class ConclusionOptions:
     """Correlation from which on a residual goes with a signal."""
     same_elsewhere: float = 0.1
     """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
+    likely: float = 0.5
+    """Probability from which on a name counts as an explanation."""
+    tied: float = 0.5
+    """An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
     surest: float = 0.98
     """What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
     aside: float = math.tan(math.radians(15.0))

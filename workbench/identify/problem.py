@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.channels import ACROSS, BODY, GAIN_SPAN, channel_names, channels_of, joint_of
+from workbench.compare.channels import ACROSS, BODY, channel_names, channels_of, joint_of
 from workbench.compare.compare_session import Rollouts
 from workbench.compare.comparison import noise_of
 from workbench.compare.metrics import rms
+from workbench.compare.options import COMPARE
 from workbench.compare.session_takes import RegisteredTake
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
@@ -183,7 +184,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
         body = [names.index(c) for c in BODY]
         sigma[body] = np.maximum(sigma[body], PROBLEM.least_body_sigma)
-        weight[body] = 1.0 / max(1.0, GAIN_SPAN / float(np.median(np.diff(t.recorded.time))))
+        weight[body] = 1.0 / max(1.0, COMPARE.gain_span / float(np.median(np.diff(t.recorded.time))))
     sigma = np.maximum(sigma, 1e-6)
     apart = [*(f - finest for f in (*finer[:-1], nominal)), *(o - nominal for o in others)]
     rough = _rough(sigma, noise, apart, t) if others else 1.0

@@ -1,6 +1,6 @@
 """`model.yaml`: a robot with the physics found missing in it, for this workbench and for any other Drake project.
 
-`MakePuppyStation(model=load_model("model.yaml"))` simulates it.
+`MakeStation(load_model("model.yaml"))` simulates it.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,6 +15,7 @@ from workbench.robot.resources import resource_dir
 from workbench.robot.servo_profile import LAW_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
 from workbench.robot.yaml_file import Fields, read_yaml
 
+ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
                  "reflected_inertia", *LAW_KEYS)
 _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
@@ -56,8 +58,10 @@ def load_profile(path: str | Path) -> ServoProfile:
 
 @cache
 def servo_profiles() -> Mapping[str, ServoProfile]:
-    """The families that ship with the workbench, by name."""
-    found = [load_profile(path) for path in sorted((resource_dir("data") / "servos").glob("*.yaml"))]
+    """The families that ship with the workbench, by name, and those of other packages: an entry point of the group
+    `workbench.servos` names the path of a profile."""
+    shipped = sorted((resource_dir("data") / "servos").glob("*.yaml"))
+    found = [load_profile(path) for path in (*shipped, *(entry.load() for entry in entry_points(group=ENTRY_POINT_GROUP)))]
     return MappingProxyType({p.name: p for p in found})
 
 

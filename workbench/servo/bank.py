@@ -89,7 +89,7 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     needs bristles or a discrete plant.
     """
     if model.effects and law is None:
-        raise InputError(None, f"effect '{model.effects[0].effect}' is for MakePuppyStation: it may change more than servos")
+        raise InputError(None, f"effect '{model.effects[0].effect}' is for MakeStation: it may change more than servos")
     if friction is None:
         friction = "implicit" if plant.time_step() > 0 else "bristle"
     if friction == "bristle" and plant.time_step() > 0:

@@ -64,11 +64,11 @@ class Simulation:
     """One robot in one configuration, built once; every run starts from the same settled neutral pose."""
 
     def __init__(self, model: RobotModel, config: SimulationConfig | None = None) -> None:
-        from workbench.simulation.station import MakePuppyStation
+        from workbench.simulation.station import MakeStation
 
         self.model = model
         self.config = config or SimulationConfig()
-        self.diagram = MakePuppyStation(self.config, model)
+        self.diagram = MakeStation(model, self.config)
         self.plant = self.diagram.plant()
         self.context: Context = self.diagram.CreateDefaultContext()
         self.simulator = Simulator(self.diagram, self.context)

@@ -21,7 +21,7 @@ from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 
 from workbench.effects.apply import Physics, physics_of
 from workbench.effects.sdf import SPRING_TIME
-from workbench.robot import ConfigureParser, InputError, RobotModel, puppy_model
+from workbench.robot import ConfigureParser, InputError, RobotModel
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
 from workbench.simulation.config import SimulationConfig
@@ -36,8 +36,8 @@ IDEAL_GAINS = PdControllerGains(p=1e5, d=1e3)
 """Of the ideal drive [N m/rad, N m s/rad]: 1.5 N m bends it by 15 microradians."""
 
 
-def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel | None = None) -> RobotDiagram:
-    """A robot (default: the puppy) in its world.
+def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> RobotDiagram:
+    """A robot in its world: plant, floor, servos, and a log of each port. InputError for a base or an effect that does not fit.
 
     Inputs: `goal_position` (n) rad and `moving_speed` (n) rad/s, `torque_enable` (n) (drive "servo"). Joints in
     `model.joints`' order. Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, and with drive
@@ -47,7 +47,6 @@ def MakePuppyStation(config: SimulationConfig | None = None, model: RobotModel |
     """
     config = config or SimulationConfig()
     config.check()
-    model = model or puppy_model()
     physics = physics_of(model)
     _check_ends(config, physics)
     model.check_base(floating=config.base == "free")

@@ -22,7 +22,7 @@ from workbench.device.virtual import (
     VirtualPort,
     VirtualServo,
 )
-from workbench.effects.apply import played, resolved, seen
+from workbench.effects.apply import physics_of, played, resolved, seen
 from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Take, observe
@@ -117,7 +117,8 @@ class VirtualRobot:
         self.model, self.base, self.profile = model, base, family
         self.clock = Clock()
         self.bus = ServoBus(self.clock)
-        self.bus.supply = model.servo(model.joints[0]).supply_voltage
+        law = physics_of(model).law
+        self.bus.supply = float(law.full_torque[0] / law.torque_per_volt[0])  # what is there, whatever the model says
         self.body = StationBody(model, base)
         self.servos = {joint: VirtualServo(self.bus, FAMILIES[family.name], i, self.body) for joint, i in bus_ids(model).items()}
         for joint, servo in self.servos.items():

@@ -38,7 +38,7 @@ class TorqueSaturation(Effect):
     places = ("joint",)
     family = "electrical"
     under_load = True
-    parameters = (Parameter("torque", "N m", 0.02, 100.0, 1.0),)
+    parameters = (Parameter("torque", "N m", 0.02, 1e8, 1.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The motor of {', '.join(spec.where)} saturates: of {scalar(spec, 'torque'):.2f} N m half arrives."

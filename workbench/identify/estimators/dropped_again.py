@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest

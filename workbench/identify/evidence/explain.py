@@ -14,7 +14,7 @@ from workbench.identify.conclusions import Residuals, change, estimates, value_s
 from workbench.identify.evidence.fit import Asks, Fitted, fitting
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
-from workbench.identify.evidence.nuisance import as_mapping, uncertain_numbers, what_changed
+from workbench.identify.evidence.nuisance import as_mapping, turned_horn, uncertain_numbers, what_changed
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
 from workbench.identify.evidence.region import Region, Rollouts, region_of
@@ -86,7 +86,8 @@ class Explanation:
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
             for k, number in enumerate(h.numbers):
                 degrees = np.degrees(number.sd)
-                blocks.setdefault(("zero_offset", (number.joint,)), np.array([[degrees**2 * covariance[k, k]]]))
+                zero = turned_horn(number.joint, number.sd)
+                blocks.setdefault((zero.effect, zero.where), np.array([[degrees**2 * covariance[k, k]]]))
             for (c, x), s in zip(h.sizes(), h.slices()):
                 slopes = value_slopes(c, x)
                 blocks[c.name, c.where] = slopes @ covariance[s, s] @ slopes.T

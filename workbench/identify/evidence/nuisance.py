@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from workbench.effects.registry import estimated_by
 from workbench.identify.findings import Recalibrated
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
@@ -52,10 +53,17 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     zeros: list[EffectSpec] = []
     for number, by in z.items():
         if number.name == ZERO:
-            zeros += [EffectSpec("zero_offset", (number.joint,), {"angle": math.degrees(number.sd * by)})] if by else []
+            zeros += [turned_horn(number.joint, number.sd * by)] if by else []
         else:
             servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
     return replace(model, servos=servos, effects=(*model.effects, *zeros))
+
+
+def turned_horn(joint: str, angle: float) -> EffectSpec:
+    """The effect that turns a joint's zero by `angle` [rad]."""
+    effect, *_ = estimated_by("turn about an axis")
+    (p,) = effect.parameters
+    return EffectSpec(effect.name, (joint,), {p.name: angle / p.si})
 
 
 def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:

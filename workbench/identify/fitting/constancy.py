@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import Fit, Search, Slopes
+from workbench.identify.fitting.fit import Fit, Slopes
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import in_file_units
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate

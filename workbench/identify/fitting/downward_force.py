@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import si_values
 from workbench.identify.findings import Unexplained
-from workbench.identify.fitting.fits import Fit
-from workbench.identify.options import CONCLUSIONS
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.reasons import DownwardPull
 from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
-STEP = 1e-3
-"""Of a size, by which a slope is told."""
 
 
 def pulls_down(c: Candidate, x: Array) -> bool:
@@ -31,7 +29,7 @@ def downward_pulls(fit: Fit) -> Iterator[Unexplained]:
     for (c, x), own in zip(fit.sizes(), fit.slices()):
         if pulls_down(c, x):
             down = -float(_pull(c, x)[2])
-            slopes = np.array([-_pull(c, x + step)[2] - down for step in STEP * np.eye(len(x))]) / STEP
+            slopes = np.array([-_pull(c, x + step)[2] - down for step in FIT.slope_step * np.eye(len(x))]) / FIT.slope_step
             deviation = float(np.sqrt(slopes @ np.nan_to_num(fit.covariance[own, own], posinf=1e9) @ slopes))
             yield Unexplained((), down, deviation, "N", DownwardPull(c.name, down / GRAVITY))
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate

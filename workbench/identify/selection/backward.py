@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.fitting.fits import Fit, Search, contradicted_by_fixed_base
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search, contradicted_by_fixed_base
 from workbench.identify.options import FIT
 from workbench.identify.selection.acceptance import ALL_CLOSED, LAST_CLOSED, explained_at_the_end
 from workbench.identify.selection.best_subsets import HALF, TOGETHER_STEPS

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import Fit, Search, Sizes
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.responses import Part
 from workbench.identify.options import FIT
 from workbench.identify.selection.record import SelectionStep

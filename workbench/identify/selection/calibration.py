@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.downward_force import pulls_down
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
 from workbench.identify.selection.model_comparison import LEAST, NamePosterior

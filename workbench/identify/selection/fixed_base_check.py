@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.fitting.fits import Fit, Search, contradicted_by_fixed_base, gained
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search, contradicted_by_fixed_base, gained
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.best_subsets import NEARLY_ALL
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
-from workbench.identify.fitting.fits import Fit, Report, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Report, Search
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate

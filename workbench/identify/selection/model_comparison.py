@@ -9,7 +9,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Report, Search, gained
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Report, Search, gained
 from workbench.identify.fitting.responses import Part
 from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.parameters import Candidate, Key

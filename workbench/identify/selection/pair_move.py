@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Report, Search, Sizes
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Report, Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects

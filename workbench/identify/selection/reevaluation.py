@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
 from workbench.identify.selection.best_subsets import MOST_STEPS, fitted_beside
 from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all

@@ -7,7 +7,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import heavy_links

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks, through
 from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM

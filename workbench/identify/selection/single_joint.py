@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fits import Fit, Search
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.best_subsets import (
     MOST_STEPS,

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from workbench.identify.fitting.fits import Fit, Search, Sizes
+from workbench.identify.fitting.fit import Fit, Sizes
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.fitting.responses import scan
 from workbench.identify.options import FIT

@@ -67,7 +67,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         rubbing = rubbing if t.rubbing is None else rubbing + t.rubbing
         backwards = backwards if t.rubbing_backwards is None else backwards + t.rubbing_backwards
         bend = bend if t.bend is None else bend + t.bend
-    still, lopsided = [t for t in numbers if t.rubbing_still is not None], [t.lopsided for t in numbers if t.lopsided is not None]
+    still = [t for t in numbers if t.rubbing_still is not None]
+    lopsided = [t.lopsided for t in numbers if t.lopsided is not None]
     sticking = [t for t in numbers if t.sticking is not None]
     most = most_friction(physics.terms, law)
     return Servos(

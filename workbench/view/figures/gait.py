@@ -35,7 +35,8 @@ def limit_bars(certificate: Certificate) -> Figure:
 @styled
 def draw_ranges(certificate: Certificate) -> Figure:
     """Of each quantity: lowest, 5 %, median, 95 % and highest over the ensemble, and the nominal robot's."""
-    rows = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k != "quantiles"]
+    told = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k != "quantiles"]
+    rows = [(k, v) for k, v in told if all(x is not None and math.isfinite(x) for x in v)]
     nominal = _nominal(certificate)
     figure = new_figure(10, 0.9 * len(rows) + 0.6)
     for axes, (name, (low, five, half, ninety_five, high)) in zip(figure.subplots(len(rows), 1, squeeze=False).flat, rows):
@@ -53,7 +54,7 @@ def draw_ranges(certificate: Certificate) -> Figure:
 def _nominal(certificate: Certificate) -> dict[str, float]:
     n = certificate.nominal
     names = ("heading deg/m", "slip m/s", "foot clearance mm", "tipping margin deg", "electrical power W")
-    out = {k: float(n[k]) for k in names}
+    out = {k: float(n[k]) for k in names if n[k] is not None and math.isfinite(n[k])}
     out[f"speed {n['unit']}"] = float(n["speed"])
     out["largest RMS torque N m"] = max(n["RMS torque N m"].values())
-    return {k: v for k, v in out.items() if math.isfinite(v)}
+    return out

@@ -17,6 +17,7 @@ from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
     capital,
     change,
@@ -27,7 +28,6 @@ from workbench.view.report.words import (
     layers_of,
     left_row,
     listed,
-    name_of,
     next_said,
     quantity,
     rival_of,
@@ -39,8 +39,6 @@ from workbench.view.report.words import (
 from workbench.view.scene.marks import Errors
 from workbench.view.scene.replay import write_replay
 
-SHOWN = 6
-"""Rows of a table that stand open; the rest is folded away."""
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
 Progress = Callable[[str, float | None], None]
@@ -100,9 +98,9 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     if takes:
         report.add(_unseen(takes))
     report.add(_left(diagnosis))
-    others = [r for r in diagnosis.rejected if not any(_rivals(r, f) for f in diagnosis.findings)]
+    others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
-        report.add(Section("What else was tried", _tried(others, "more that were tried")))
+        report.add(Section("What else was tried", tried(others, "more that were tried")))
     if diagnosis.next_experiment is not None:
         report.add(_next(diagnosis))
     return report
@@ -122,6 +120,8 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    if why := diagnosis.provenance.get("engine", {}).get("because"):
+        what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)
@@ -174,7 +174,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
                              "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
-        parts += _folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
+        parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
     maps = [Picture(gap_map(s), _map_caption(s)) for s in sorted(takes, key=_worst, reverse=True)]
     parts += maps[:1]
     if maps[1:]:
@@ -196,7 +196,7 @@ def _worst(take: TakeReport) -> float:
 
 def _gap_row(g: GapEntry) -> list[str]:
     when = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in g.when[:3]) + (" …" if len(g.when) > 3 else "")
-    return [g.layer, _place(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
+    return [g.layer, place_of(g.where), g.take, when, g.phase or "–", quantity(g.error, g.unit), quantity(g.floor, g.unit)]
 
 
 def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[TakeReport], drawn: set[tuple[int, str]],
@@ -224,10 +224,10 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         drawn.add(shown)
         parts.append(Picture(before_after(takes[i], joint), f"{joint} in {takes[i].name}: what the robot did, and what each "
                                                               "model says it does."))
-    rivals = [r for r in rejected if _rivals(r, finding)]
-    if rivals:
+    instead = [r for r in rejected if rivals(r, finding)]
+    if instead:
         parts.append(Text("Tried in its place, and rejected:"))
-        parts += _tried(rivals, "more rivals")
+        parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
 
 
@@ -236,7 +236,7 @@ def _recalibrated(numbers: Sequence[Recalibrated]) -> Section:
     rows = [[r.number.replace("_", " "), listed(r.where), f"{r.nominal:.4g}", f"{r.value:.4g}", unbroken(r.unit),
              f"{r.sigmas:+.1f}"] for r in numbers]
     said = "Numbers of the nominal law that were known only so well. Using them otherwise within that is no finding."
-    return Section("What was recalibrated", [Text(said), *_folded(
+    return Section("What was recalibrated", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
 
 
@@ -283,45 +283,13 @@ def _left(diagnosis: Diagnosis) -> Section:
     header = ["what is still off", "take", "by", "over noise", "and it goes"]
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
-                  "effect that was tried explains it."), *_folded(header, off, "more")] if off else []
+                  "effect that was tried explains it."), *folded(header, off, "more")] if off else []
     return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:
     assert diagnosis.next_experiment is not None
     return Section("What to record next", [Text(next_said(diagnosis.next_experiment))])
-
-
-def _tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
-    """A table; without a column of errors where none was measured."""
-    measured = any(r.validation is not None for r in rejected)
-    header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
-    rows = [[unbroken(name_of(r.effect)), _place(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
-            for r in rejected]
-    parts = _folded(header, rows, summary)
-    if any(r.reason.of_chi_squared for r in rejected):
-        parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
-    return parts
-
-
-def _left_by(r: Rejected) -> str:
-    return "–" if r.validation is None else unbroken(change(r.validation))
-
-
-def _place(where: Sequence[str]) -> str:
-    return unbroken(listed(where) or "whole robot")
-
-
-def _rivals(r: Rejected, finding: Finding) -> bool:
-    """Whether it was tried in this finding's place: at the same place, or the same effect elsewhere."""
-    return r.where == finding.where or r.effect == finding.effect
-
-
-def _folded(header: list[str], rows: list[list[str]], summary: str) -> list[Part]:
-    parts: list[Part] = [Table(header, rows[:SHOWN])]
-    if len(rows) > SHOWN:
-        parts.append(Details(f"{len(rows) - SHOWN} {summary}", [Table(header, rows[SHOWN:])]))
-    return parts
 
 
 def _finite(x: float) -> float:

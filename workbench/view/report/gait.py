@@ -22,6 +22,7 @@ from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import (
     body_attitude,
     body_path,
+    by_joint,
     film_strip,
     footfalls,
     joint_grid,
@@ -111,9 +112,10 @@ def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | Non
     return [
         Picture(body_path(take, others=others), "Path of the body, from above and over time."),
         Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in the last two seconds."),
-        Picture(phase_portrait(busiest, take), f"Speed over angle of {busiest}, the servo with most to do."),
+        Picture(phase_portrait(busiest, take.resampled(take.time[take.time > last - 2.0])),
+                f"Speed over angle of {busiest}, the servo with most to do, in the last two seconds."),
         Details("Angles asked and reached, torques, attitude", [
-            Picture(joint_grid(take, stance=stance, span=(max(last - 1.5, 0.0), last)),
+            Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
                     "Each joint, asked (ramp) and reached; the foot's stance is shaded."),
             Picture(joint_torques(take.since_start, take.joints, {"on the link": take.torque}, limit=limit),
                     "Torque of each joint, and the servo's at full duty."),

@@ -202,7 +202,7 @@ def _firmware_tables(folder: Path) -> Inspection:
 
 def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
     """A robot's description, built as `simulate` builds it."""
-    from workbench.simulation import MakePuppyStation, SimulationConfig
+    from workbench.simulation import MakeStation, SimulationConfig
 
     model = RobotModel(description=name, packages=packages or {})
     kinematics = model.kinematics
@@ -210,7 +210,7 @@ def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
     problems = list(model.problems)
     try:
         if kinematics.joints:
-            MakePuppyStation(SimulationConfig(base="fixed" if kinematics.fixed_to_world else "free"), model)
+            MakeStation(model, SimulationConfig(base="fixed" if kinematics.fixed_to_world else "free"))
         else:
             problems.append("no joint that turns: nothing for a servo to move")
     except (RuntimeError, ValueError) as e:

@@ -61,7 +61,7 @@ class Clocks(Peripheral):
 class Core(Peripheral):
     """SysTick and interrupt controller at 0xE000E000; VTOR."""
 
-    known = frozenset((0x10, 0x14, 0x18, 0x100, 0x104, 0xD08))
+    known = frozenset((0x10, 0x14, 0x18, 0x100, 0x104, 0x180, 0x184, 0x280, 0x284, 0xD08))
 
     def __init__(self, board: Board) -> None:
         super().__init__(board, None)
@@ -80,7 +80,10 @@ class Core(Peripheral):
         return bool(self.words.get(0x100 + 4 * (irq // 32), 0) >> irq % 32 & 1)
 
     def write(self, offset: int, value: int) -> None:
-        """Set-enable registers only set."""
+        """Set-enable registers only set, clear-enable ones only clear."""
+        if offset in (0x180, 0x184):
+            self.words[offset - 0x80] = self.read(offset - 0x80) & ~value
+            return
         if offset in (0x100, 0x104):
             value |= self.read(offset)
         super().write(offset, value)

@@ -1,0 +1,27 @@
+"""The whole loop: motion, bus or flashed image, servos with hidden physics, cameras and joint log, diagnosis."""
+
+import pytest
+
+from tests.device.whole_loop import HIDDEN, from_controller, from_host, named, of_an_arm
+from tests.firmware.image import needs_compiler
+from workbench.robot import EffectSpec
+
+
+def test_a_worn_gear_of_an_arm_is_named(tmp_path):
+    verdict, found = named(of_an_arm(tmp_path, (EffectSpec("coulomb_friction", ("two",), {"torque": 0.2}),)))
+    assert ("coulomb_friction", ("two",)) in found
+    assert verdict != "no_gap"
+
+
+def test_a_quiet_arm_is_quiet(tmp_path):
+    verdict, found = named(of_an_arm(tmp_path, ()))
+    assert (verdict, found) == ("no_gap", {})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", HIDDEN)
+@pytest.mark.parametrize("way", [from_host, pytest.param(from_controller, marks=needs_compiler)], ids=["host", "image"])
+def test_the_practice_effects(tmp_path, way, what):
+    verdict, found = named(way(tmp_path, HIDDEN[what]), jobs=2)
+    assert {(e.effect, e.where) for e in HIDDEN[what]} <= set(found)
+    assert verdict == "no_gap" or HIDDEN[what]

@@ -1,0 +1,225 @@
+"""The native core exactly at its thresholds, and at its largest sizes."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+
+from tests.firmware.native import LINK_PC, Sim, core, walk
+from tests.firmware.test_core_play import bridged, changed, upload
+from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame, upload_frames
+from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
+from workbench.device.virtual.protocol import packet
+from workbench.motion import PoseTable
+from workbench.robot import InputError
+
+TABLE = walk()
+LIMP, NEUTRAL, PLAY = 1, 4, 5
+
+
+def until(sim: Sim, wanted: set[int], most: int = 4000) -> int:
+    """Milliseconds until the state is one of these."""
+    for ms in range(most):
+        if sim.get("state") in wanted:
+            return ms
+        sim.run(1)
+    raise AssertionError(f"still {sim.get('state')} after {most} ms")
+
+
+@pytest.mark.parametrize(("held", "state"), [(19, NEUTRAL), (20, PLAY)])
+def test_a_button_counts_from_20_ms_on(held: int, state: int) -> None:
+    sim = Sim(TABLE)
+    sim.to_neutral()
+    sim.set("start", 1)
+    sim.run(held)
+    sim.set("start", 0)
+    sim.run(2)
+    assert sim.get("state") == state
+
+
+@pytest.mark.parametrize(("up", "state"), [(19, NEUTRAL), (20, PLAY)])
+def test_a_button_that_was_down_is_believed_once_it_was_up_for_20_ms(up: int, state: int) -> None:
+    sim = Sim(TABLE)
+    sim.set("start", 1)
+    sim.to_neutral()
+    sim.set("start", 0)
+    sim.run(up)
+    sim.run(1)
+    sim.set("start", 1)
+    sim.run(100)
+    sim.set("start", 0)
+    sim.run(5)
+    assert sim.get("state") == state
+
+
+def test_start_held_releases_after_1500_ms_and_once() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.set("start", 1)
+    assert until(sim, {LIMP}) == 1501
+    sim.set("start", 0)
+    sim.run(300)
+    assert sim.get("state") == LIMP
+
+
+def test_the_bridge_ends_after_1000_ms() -> None:
+    sim = bridged()
+    sim.send(packet(9, 1))
+    assert until(sim, {LIMP}) == 1000
+    sim = bridged()
+    sim.run(970)
+    sim.send(packet(9, 1))
+    sim.run(990)
+    assert sim.get("state") == 8
+
+
+def reason_with(what: str, value: int, ms: int = 1900) -> int:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(400)
+    for k in range(15 if what == "volts" else 1):
+        sim.set(what, value, k)
+    sim.run(ms)
+    return sim.get("reason")
+
+
+@pytest.mark.parametrize(("what", "value", "reason"), [
+    ("heat", 64, 7), ("heat", 65, 14), ("volts", 96, 7), ("volts", 95, 15), ("volts", 65, 15), ("volts", 64, 16)])
+def test_heat_and_voltage_at_their_thresholds(what: str, value: int, reason: int) -> None:
+    assert reason_with(what, value) == reason
+
+
+def test_a_dead_supply_that_still_answers_is_told_by_its_voltage_in_three_rounds() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(400)
+    sim.set("volts", 60)
+    assert 2 * 24 <= until(sim, {LIMP}) <= 4 * 24 + 5
+
+
+def test_a_servo_without_torque_limit_is_overloaded_even_without_the_alarm_bit() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.set("torque_limit", 0, 3)
+    sim.run(200)
+    assert (sim.get("reason"), sim.get("servo_named")) == (13, sim.get("id", 3))
+
+
+@pytest.mark.parametrize(("side", "by", "state"), [("cw", 2, NEUTRAL), ("cw", 3, LIMP), ("ccw", 2, NEUTRAL), ("ccw", 3, LIMP)])
+def test_angle_limits_may_be_narrower_by_the_rounding_of_degrees(side: str, by: int, state: int) -> None:
+    bounds = decode_table(TABLE).joints[4]
+    sim = Sim(TABLE)
+    sim.set(f"{side}_limit", bounds.low + by if side == "cw" else bounds.high - by, 4)
+    sim.run(1500)
+    assert sim.get("state") == state
+    assert sim.get("reason") == (20 if state == LIMP else 1)
+
+
+@pytest.mark.parametrize(("moved", "fine"), [(6, True), (60, False)])
+def test_no_torque_while_a_joint_moves(moved: int, fine: bool) -> None:
+    sim = Sim(TABLE)
+    for k in range(40):
+        sim.set("position", 512 + moved * (k % 2), 7)
+        sim.run(19)
+        if sim.get("state") != 2:
+            break
+    assert (sim.get("state") != LIMP) == fine
+    assert sim.get("reason") == (1 if fine else 24)
+
+
+def test_sequence_numbers_are_ahead_by_less_than_half_the_circle() -> None:
+    for ahead, taken in ((1, True), (127, True), (128, False), (255, False), (0, False)):
+        sim = Sim(TABLE)
+        sim.play()
+        assert upload(sim, changed(3), 200).well
+        assert upload(sim, changed(4), (200 + ahead) % 256).well == taken
+
+
+def test_an_upload_is_forgotten_after_two_seconds_of_silence() -> None:
+    for silence, result in ((1990, "bytes are missing"), (2010, "no upload is under way")):
+        sim = Sim(TABLE)
+        sim.to_neutral()
+        sim.send(upload_frames(changed(3), 1)[0])
+        sim.run(silence)
+        sim.messages()
+        sim.send(frame(FrameType.END))
+        sim.run(5)
+        assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == [result]
+
+
+@pytest.mark.parametrize(("dwell", "bus_id", "accepted"), [
+    (10, 253, True), (9, 253, False), (600_000, 0, True), (600_001, 0, False), (100, 254, False)])
+def test_the_table_at_its_bounds(dwell: int, bus_id: int, accepted: bool) -> None:
+    body = struct.pack("<4sBBHHHI", b"WBTB", 1, 1, 1, 0, 0, 40) + struct.pack("<BBHHHHH", bus_id, 0, 12, 512, 512, 5, 512)
+    body += struct.pack("<IHH", dwell, 512, 5)
+    data = body + struct.pack("<I", zlib.crc32(body))
+    assert (core().table_check(data, len(data)) == 0) == accepted
+    if accepted:
+        decode_table(data)
+    else:
+        with pytest.raises(InputError):
+            decode_table(data)
+
+
+def test_first_pose_at_the_edge_of_reach() -> None:
+    """At 140 ms and speed 159 a joint comes 50 counts far; a tenth and 8 counts more are granted."""
+    reach = 159 * 2271 // 1000 * 140 // 1000
+    for beyond, fault in ((0, 0), (1, 15)):
+        last = decode_table(TABLE).table.goals[3]
+        first = last.copy()
+        first[0] = last[0] + reach + reach // 10 + 8 + beyond
+        sim = Sim(TABLE)
+        sim.play()
+        assert upload(sim, changed(first=first), 1).well
+        sim.run(600)
+        assert (sim.get("state"), sim.get("table_fault")) == (PLAY, fault)
+
+
+def test_twenty_six_joints_walk_and_tell() -> None:
+    n = 26
+    goals = np.array([[500 + k for k in range(n)], [520 - k for k in range(n)]])
+    table = PoseTable(tuple(f"j{k}" for k in range(n)), goals, np.full((2, n), 100), np.array([150, 150]))
+    data = encode_table(TableFile(table, tuple(JointBounds(k + 1, low=400, high=600) for k in range(n))))
+    sim = Sim(data)
+    sim.play()
+    sim.run(500)
+    sim.received()
+    sim.run(60)
+    logs = [m for m in sim.messages() if isinstance(m, LogMessage)]
+    assert logs
+    assert all(len(m.positions) == n and None not in m.positions for m in logs)
+    assert sim.get("state") == PLAY
+
+
+def test_what_finds_no_room_on_the_link_is_told_later() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(500)
+    for _ in range(30):
+        sim.send(frame(FrameType.ASK))  # nobody reads: the link's buffer is full
+    sim.run(50)
+    sim.remote(16)
+    sim.remote(0)
+    sim.run(100)
+    assert sim.get("state") == 6
+    sim.received(LINK_PC)
+    sim.run(3)
+    assert next(m.state for m in sim.messages() if isinstance(m, StateMessage)) == 6
+
+
+def test_torque_off_is_told_again_to_a_servo_that_missed_it_but_not_all_the_time() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.send(frame(FrameType.RELEASE))
+    sim.run(50)
+    for k in range(15):
+        assert sim.get("torque", k) == 0
+    sim.set("torque", 1, 5)
+    sim.run(120)
+    assert sim.get("torque", 5) == 0
+    offs = [sim.get("event_us", k) for k in range(sim.get("events")) if sim.get("event_kind", k) == 2]
+    assert 2 <= len(offs) <= 6
+    assert min(np.diff(offs)) >= 5000

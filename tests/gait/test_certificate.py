@@ -1,0 +1,121 @@
+"""Certificates: bound to their table and robot, and asked for by export."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.command import refused, succeeds
+from workbench.gait.certificate import NAME, Certificate, check_certificate, has_mark, read_certificate
+from workbench.gait.certify import CertifyOptions, certify
+from workbench.gait.ensemble import load_ensemble
+from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import shape_from, write_gait
+from workbench.gait.request import Request
+from workbench.gait.shape import GaitShape
+from workbench.gait.table import gait_table
+from workbench.motion import load_motion
+from workbench.robot import InputError, puppy_model
+
+SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
+OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,
+                         variants=("2 ms", "1 ms"))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A gait with its certificate, in a folder."""
+    folder = tmp_path_factory.mktemp("gait")
+    machine = GaitMachine(puppy_model())
+    request = Request()
+    request = replace(request, limits=replace(request.limits, drift=10.0, spread=10.0, aside=5.0))  # any gait will do here
+    table = gait_table(machine, SHAPE)
+    draws = load_ensemble().draws(machine.model, 2, 7, folder)
+    provenance = {"seed": 7, "rollouts": 0, "searched in": 0.0, "ensemble_sha256": "x"}
+    same = ("itself", lambda model, commands, seconds: _again(model, commands, seconds))
+    certified = certify(machine, request, table, draws, OPTIONS, lambda what, done: None, provenance, same)
+    write_gait(folder, table, certified)
+    return folder, machine, table, certified
+
+
+def _again(model, commands, seconds):
+    from workbench.simulation import Job, SimulationConfig, simulate_batch
+
+    return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
+
+
+def test_says_what_there_is_to_say(made):
+    folder, machine, table, certified = made
+    c = read_certificate(folder / NAME)
+    assert c.draws["count"] == 2
+    assert {m.where for m in c.margins if m.name == "RMS torque"} == set(machine.model.joints)
+    assert {m.name for m in c.margins} >= {"range", "moving speed", "reach", "self-contact", "RMS torque", "torque-speed line",
+                                           "supply current", "tilt", "falls", "bus time", "poses"}
+    assert set(c.floor["speed"]) == {"2 ms", "1 ms"}
+    assert c.other_engine["speed kept"] == pytest.approx(1.0, abs=1e-9)  # the other engine is this one
+    assert c.ways["at rest"]["largest angle off neutral deg"] < 6
+    assert shape_from(json.loads((folder / NAME).read_text())["shape"]) == table.shape
+    assert "15.6" in json.loads((folder / NAME).read_text())["claim"]
+    assert c.as_text() == certified.certificate.as_text()
+
+
+def test_is_bound_to_its_tables_and_its_robot(made):
+    folder, machine, _, _ = made
+    for name in ("gait.csv", "start.csv", "stop.csv"):
+        assert has_mark(folder / name)
+        check_certificate(folder / name, load_motion(folder / name), machine.model)
+    other = replace(machine.model, ground=replace(machine.model.ground, friction=0.4))
+    with pytest.raises(InputError, match="another robot"):
+        check_certificate(folder / "gait.csv", load_motion(folder / "gait.csv"), other)
+
+
+def other_goal(path):
+    lines = path.read_text().splitlines()
+    cells = lines[3].split(",")
+    cells[1] = str(float(cells[1]) + 2.0)
+    path.write_text("\n".join([*lines[:3], ",".join(cells), *lines[4:]]) + "\n")
+
+
+def tampered(folder, to, change):
+    for name in ("gait.csv", NAME):
+        (to / name).write_text((folder / name).read_text())
+    change(to)
+    return to / "gait.csv"
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda f: (f / NAME).unlink(), "the certificate is missing"),
+    (lambda f: (f / NAME).write_text("{}"), "not a certificate"),
+    (lambda f: (f / NAME).write_text((f / NAME).read_text().replace('"seed": 7', '"seed": 8')),
+     "was changed after it was written"),
+    (lambda f: other_goal(f / "gait.csv"), "another table's"),
+])
+def test_export_refuses_what_has_no_valid_certificate_unless_forced(made, tmp_path, capsys, change, said):
+    path = tampered(made[0], tmp_path, change)
+    assert said in refused(capsys, "export", str(path), "--out", str(tmp_path / "out"), "--cycles", "1")
+    assert not (tmp_path / "out").exists()
+    succeeds(capsys, "export", str(path), "--out", str(tmp_path / "out"), "--cycles", "1", "--force")
+    assert (tmp_path / "out/pos.txt").is_file()
+
+
+def test_a_broken_limit_is_named(made, tmp_path):
+    folder, machine, _, certified = made
+    broken = replace(certified.certificate, kept=False, margins=tuple(
+        replace(m, use=1.5) if (m.name, m.where) == ("RMS torque", "flm") else m for m in certified.certificate.margins))
+    (tmp_path / NAME).write_text(broken.as_text())
+    (tmp_path / "gait.csv").write_text((folder / "gait.csv").read_text())
+    with pytest.raises(InputError, match="a limit is broken: RMS torque, flm"):
+        check_certificate(tmp_path / "gait.csv", load_motion(tmp_path / "gait.csv"), machine.model)
+
+
+def test_the_robotis_walk_needs_none(capsys, tmp_path):
+    from workbench.robot import data_file
+
+    said = succeeds(capsys, "export", str(data_file("robotis_walk.csv")), "--out", str(tmp_path / "walk"), "--cycles", "1")
+    assert "wrote" in said
+
+
+def test_nan_is_null():
+    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {})
+    assert json.loads(empty.as_text())["nominal"] == {"slip m/s": None, "rms": 0.5}

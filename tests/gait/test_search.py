@@ -1,0 +1,131 @@
+"""The search: deterministic, goes on after it was killed, keeps limits by rank, and says what binds."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.command import refused
+from workbench.gait.ensemble import Ensemble, load_ensemble
+from workbench.gait.evaluate import Evaluator
+from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import OptimizeOptions, optimize, options_of, out_of_reach
+from workbench.gait.request import Request
+from workbench.gait.search import Budget, search
+from workbench.gait.space import seeds, space_of
+from workbench.robot import EffectSpec, InputError, data_file, puppy_model
+from workbench.robot.model_file import Posterior
+
+SMALL = Budget(seeds=6, starts=1, population=4, generations=1, robust=1, draws=1)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return GaitMachine(puppy_model())
+
+
+def quiet(what, done):
+    pass
+
+
+def test_killed_and_started_again_it_ends_in_the_same_table(machine, tmp_path):
+    draws = load_ensemble().draws(machine.model, 1, 0, tmp_path)
+    memory = tmp_path / "search.jsonl"
+    whole = search(Evaluator(machine, Request(), draws, memory), SMALL, 3, quiet)
+    lines = memory.read_text().splitlines(keepends=True)
+    memory.write_text("".join(lines[:4]) + lines[4][:30])  # killed while it wrote the fifth
+    again = Evaluator(machine, Request(), draws, memory)
+    resumed = search(again, SMALL, 3, quiet)
+    assert resumed.best.shape == whole.best.shape
+    assert 0 < again.rollouts < whole.rollouts
+    np.testing.assert_array_equal(resumed.best.table.cycle.goals, whole.best.table.cycle.goals)
+
+
+def test_seeds_are_of_every_family_and_of_the_request(machine):
+    request = Request("backward")
+    found = seeds(machine, request, space_of(machine, request), 60, 0)
+    assert {s.family for s in found} == {"trot", "walk", "crawl", "bound", "pace"}
+    assert len({s.knees for s in found}) == 4
+    assert all(s.stride < 0 for s in found)
+    assert found == seeds(machine, request, space_of(machine, request), 60, 0)
+    assert {s.knees for s in seeds(machine, replace(request, built_knees=True), space_of(machine, request), 20, 0)} == {(1, 1)}
+    for s in found[:5]:
+        space = space_of(machine, request)
+        assert space.shape(space.point(s), s.family, s.knees) == pytest.approx(s)
+
+
+def test_a_gait_that_breaks_a_limit_comes_after_all_that_keep_them(machine):
+    evaluator = Evaluator(machine, Request(), [])
+    shapes = seeds(machine, Request(), space_of(machine, Request()), 8, 1)
+    judged = sorted(evaluator.judged(shapes, 0), key=lambda c: c.rank())
+    good = [c.good for c in judged]
+    assert good == sorted(good, reverse=True)
+    broken = [c.violation for c in judged if not c.good]
+    assert broken == sorted(broken)
+
+
+def test_what_no_gait_can_do_is_told_at_once_with_the_limit_that_binds(machine, capsys, tmp_path):
+    assert out_of_reach(machine, Request(speed=0.3)) is None
+    assert out_of_reach(machine, Request(speed=3.0)).name == "foot speed"
+    assert out_of_reach(machine, Request(slope=np.radians(30))).name == "slope"
+    result = optimize(machine, Request(slope=np.radians(30)), Ensemble(), OptimizeOptions(), quiet)
+    assert not result.met
+    assert "slope, friction 0.5: 30 of 26.6 deg" in result.problem
+    said = refused(capsys, "optimize", "--speed", "3", "--out", str(tmp_path / "out"))
+    assert "foot speed" in said
+
+
+def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
+    options = OptimizeOptions(replace(SMALL, robust=0, draws=0), replace(options_of(1).certify, draws=0, seconds=1.0,
+                                                                         floor_seconds=0.3, step=2e-3, variants=("2 ms",)))
+    request = Request(speed=1.5)
+    lax = replace(request.limits, drift=50.0, aside=50.0)
+    result = optimize(machine, replace(request, limits=lax), Ensemble(), options, quiet)
+    assert not result.met
+    assert "not met" in result.problem
+    assert "the nearest table that keeps every limit goes" in result.problem
+    assert result.table is not None
+    assert not result.certified.certificate.kept
+
+
+def test_the_bundled_ensemble_draws_what_it_says(machine, tmp_path):
+    ensemble = load_ensemble()
+    draws = ensemble.draws(machine.model, 6, 5, tmp_path)
+    assert [d.sha256 for d in draws] == [d.sha256 for d in ensemble.draws(machine.model, 6, 5, tmp_path)]
+    assert len({d.sha256 for d in draws}) == 6
+    values = {name: [e.parameters for d in draws for e in d.effects if e.effect == name] for name in (
+        "ground_friction", "supply_voltage", "command_delay", "backlash", "zero_offset", "payload", "supply_sag")}
+    assert all(0.3 <= p["friction"] <= 0.9 for p in values["ground_friction"])
+    assert all(0.017 <= p["delay"] <= 0.05 for p in values["command_delay"])
+    assert len(values["command_delay"]) == 6 * 15
+    assert len(values["backlash"]) == len(values["zero_offset"]) == 6 * 12
+    masses = np.array([[d.kinematics.masses[link] / m for link, m in machine.model.kinematics.masses.items()] for d in draws])
+    assert 0.85 <= masses.min() < 0.95 < 1.05 < masses.max() <= 1.15
+
+
+def test_a_diagnosed_models_posterior_is_drawn(machine, tmp_path):
+    model = machine.model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.0}))
+    posterior = Posterior(("backlash(flm).gap",), np.array([3.0]), np.array([[0.04]]))
+    draws = load_ensemble(posterior=posterior).draws(model, 30, 1, tmp_path)
+    gaps = [e.parameters["gap"] for d in draws for e in d.effects if e.effect == "backlash"]
+    assert len(gaps) == 30  # what the diagnosis found stands for the file's play
+    assert np.mean(gaps) == pytest.approx(3.0, abs=0.15)
+    assert 0.1 < np.std(gaps) < 0.3
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("format: 2", "format: expected 1"), ("format: 1\nfriction: {low: 0.5}", "friction.high: is missing"),
+    ("format: 1\nfriction: {low: 0.5, high: 0.1}", "friction.high: expected at least 0.5"),
+    ("format: 1\nwind: 3", "wind: unknown key"), ("format: 1\nlink_mass: {share: 2}", "link_mass.share: expected less than 1")])
+def test_a_bad_ensemble_file_is_one_line(tmp_path, text, said):
+    path = tmp_path / "e.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
+        load_ensemble(path)
+
+
+def test_the_bundled_file_is_the_default():
+    assert load_ensemble().sha256 == load_ensemble(data_file("gait_ensemble.yaml")).sha256
+    assert json.dumps(sorted(load_ensemble().ranges)) == json.dumps(
+        ["backlash", "command_delay", "friction", "supply_sag", "supply_voltage"])

@@ -1,0 +1,71 @@
+"""A gait on request, with its certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from workbench.api.sessions import Progress
+from workbench.compare.session_takes import no_progress
+from workbench.gait.engines import other_engine
+from workbench.gait.ensemble import Ensemble, load_ensemble
+from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import Optimized, OptimizeOptions, write_gait
+from workbench.gait.optimize import optimize as seek
+from workbench.gait.request import Request
+from workbench.motion import Motion
+from workbench.robot import InputError, RobotModel
+from workbench.view.report.gait import write_gait_page
+from workbench.view.report.notebook import gait_html
+
+
+@dataclass(frozen=True)
+class GaitResult:
+    """What came of a request for a gait. optimized: all of it, with table and certificate; model: the robot that was asked
+    for."""
+
+    optimized: Optimized
+    model: RobotModel
+
+    @property
+    def met(self) -> bool:
+        """Whether the gait keeps every limit and the speed asked for."""
+        return self.optimized.met
+
+    @property
+    def problem(self) -> str:
+        """Which limit binds, in a line; empty where the request is met."""
+        return self.optimized.problem
+
+    @property
+    def motion(self) -> Motion:
+        """The gait as poses, in rad by joint. InputError where there is none."""
+        return Motion.from_table(self._found()[0].cycle)
+
+    def save(self, folder: str | PathLike[str]) -> list[Path]:
+        """Writes gait.csv, start.csv, stop.csv, certificate.json and report.html; returns their paths. InputError where no gait
+        was found, or they cannot be written."""
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        written = write_gait(Path(folder), *self._found())
+        return [write_gait_page(Path(folder), self.model, self.optimized), *written]
+
+    def _found(self):  # type: ignore[no-untyped-def]
+        if self.optimized.table is None or self.optimized.certified is None:
+            raise InputError(None, f"no gait was found: {self.problem}")
+        return self.optimized.table, self.optimized.certified
+
+    def _repr_html_(self) -> str:
+        return gait_html(self.optimized)
+
+
+def optimize(model: RobotModel, request: Request | None = None, options: OptimizeOptions | None = None, *,
+             ensemble: Ensemble | None = None, progress: Progress = no_progress, memory: Path | None = None) -> GaitResult:
+    """Seeks a gait within the limits of joints, servos and supply, on an ensemble of robots such as this one may be.
+
+    request: None asks for the fastest walk forwards. ensemble: None is the one that ships. memory: a file that lets a run that
+    was killed go on. InputError for a robot without legs.
+    """
+    found = seek(GaitMachine(model), request or Request(), ensemble or load_ensemble(), options or OptimizeOptions(), progress,
+                 memory, other_engine())
+    return GaitResult(found, model)

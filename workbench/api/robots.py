@@ -1,0 +1,42 @@
+"""A robot by name or by file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike, fspath
+from pathlib import Path
+
+from workbench.compare.session import load_session
+from workbench.effects.apply import resolved
+from workbench.robot import ROBOTS, InputError, RobotModel, puppy_model, resource_dir
+from workbench.robot.model import PUPPY
+from workbench.robot.model_file import load_model as read_model_file
+from workbench.robot.yaml_file import read_yaml
+
+
+def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None = None) -> RobotModel:
+    """A robot, with its servos and the effects that were found in it.
+
+    source: "puppy" or another robot that ships, by name; a model.yaml, as `diagnose` writes it; a session.yaml (or the folder of
+    one), whose robot, servos and ground are taken; or an SDF, URDF or package:// URL, with AX-12A servos. packages: folder of
+    each ROS package that such a description names. InputError names the
+    file, the key and what was expected, for an effect that is not installed, too.
+    """
+    name = fspath(source)
+    if name in (PUPPY, "puppy"):
+        return puppy_model()
+    if name in ROBOTS:
+        name = str(resource_dir("data") / name / "model.yaml")
+    if Path(name).is_dir():
+        return load_session(name).model
+    if Path(name).suffix.lower() not in (".yaml", ".yml"):
+        return RobotModel(name, packages=packages or {})
+    content = read_yaml(name)
+    if isinstance(content, dict) and not {"takes", "predict"}.isdisjoint(content):
+        return load_session(name).model
+    model = read_model_file(name)
+    try:
+        list(resolved(model))
+    except InputError as e:
+        raise InputError(name, f"effects: {e.problem}") from None
+    return model

@@ -1,0 +1,141 @@
+"""Compare, diagnose and predict a session: each gives a result that saves itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from workbench.compare import compare_session as comparing
+from workbench.compare.prediction import Predicted, predict_session
+from workbench.compare.results import Comparison
+from workbench.compare.session import Session, load_session
+from workbench.compare.session_takes import no_progress
+from workbench.experiment.next_experiment import with_next_experiment
+from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.findings import Diagnosis
+from workbench.identify.take_report import TakeReport
+from workbench.motion import Motion, save_motion
+from workbench.robot import InputError, RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.view.report.comparison import headline as comparison_headline
+from workbench.view.report.comparison import write_comparison
+from workbench.view.report.diagnosis import write_diagnosis
+from workbench.view.report.notebook import comparison_html, diagnosis_html
+
+Progress = Callable[[str, float | None], None]
+"""Called with what is being done and the share done (0 to 1; None where it is not known)."""
+
+
+@dataclass(frozen=True)
+class ComparisonResult:
+    """A session's takes beside their simulation. comparison: the numbers; session: what they are of."""
+
+    comparison: Comparison
+    session: Session
+
+    @property
+    def headline(self) -> str:
+        """The finding in a sentence."""
+        return comparison_headline(self.comparison)
+
+    def save(self, folder: str | PathLike[str], progress: Progress = no_progress) -> list[Path]:
+        """Writes comparison.json, report.html and a 3D replay of each take into `folder`; returns their paths, the report first.
+        InputError where they cannot be written."""
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        title = f"Session {self.session.path}"
+        return write_comparison(self.comparison, self.session.model, Path(folder), title, progress)
+
+    def _repr_html_(self) -> str:
+        return comparison_html(self.comparison)
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions:
+    """How a session is diagnosed.
+
+    jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
+    folder that keeps every rollout, so that a run that was killed goes on where it was; None: nothing is kept.
+    """
+
+    jobs: int = 2
+    thorough: bool = False
+    resume: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise InputError(None, f"jobs: expected 1 or more processes, got {self.jobs}")
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """Which physics the model left out. diagnosis: verdict, findings, what stays unexplained; its `model` is the robot with
+    what was found. takes: those behind it. next_motion: to record next, where two explanations tie."""
+
+    diagnosis: Diagnosis
+    session: Session
+    takes: tuple[TakeReport, ...]
+    next_motion: Motion | None = None
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot with the effects that were found."""
+        return self.diagnosis.model
+
+    def save(self, folder: str | PathLike[str], progress: Progress = no_progress, jobs: int = 2) -> list[Path]:
+        """Writes findings.json, model.yaml, nominal.yaml, report.html, a 3D replay of each take, the next experiment's motion
+        and, in predict/, what the session asks to foretell; returns their paths, the report first. jobs: processes that
+        simulate the predictions. InputError where they cannot be written."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        paths = write_diagnosis(self.diagnosis, self.takes, folder, str(self.session.path), progress)
+        if self.next_motion is not None and self.diagnosis.next_experiment is not None:
+            paths.append(folder / self.diagnosis.next_experiment.motion)
+            save_motion(self.next_motion, paths[-1])
+        if self.session.predict:
+            (folder / "predict").mkdir(exist_ok=True)
+            paths += predict_session(self.session, self.model, folder / "predict", progress, nominal=self.session.model,
+                                     n_jobs=jobs).paths
+        return paths
+
+    def _repr_html_(self) -> str:
+        return diagnosis_html(self.diagnosis)
+
+
+def compare_session(session: Session | str | PathLike[str], config: SimulationConfig | None = None,
+                    model: RobotModel | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> ComparisonResult:
+    """Simulates, registers and compares every take of a session (or of a session.yaml).
+
+    config: of the rollouts, their base as each take says. model: another robot than the session's, such as a diagnosed one.
+    A damaged take is left out and named in `comparison.left_out`; InputError for bad input, or where no take remains.
+    """
+    session = _loaded(session)
+    session = session if model is None else session.with_model(model)
+    return ComparisonResult(comparing.compare_session(session, config, progress=progress, n_jobs=jobs), session)
+
+
+def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | None = None, *,
+             progress: Progress = no_progress) -> DiagnosisResult:
+    """Finds the physics that a session's model left out: minutes for a small arm, up to an hour for a quadruped that walks.
+
+    A damaged take is left out and named in `diagnosis.left_out`; InputError for bad input, or where no take remains.
+    """
+    options = options or DiagnoseOptions()
+    session = _loaded(session)
+    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough)
+    diagnosis, motion = with_next_experiment(found, options.jobs, progress)
+    return DiagnosisResult(diagnosis, session, found.takes, motion)
+
+
+def predict(session: Session | str | PathLike[str], folder: str | PathLike[str], model: RobotModel | None = None,
+            config: SimulationConfig | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> Predicted:
+    """Plays what a session asks to foretell on `model` (None: the session's own) and writes FOLDER/NAME.csv, as the cameras or
+    the servos' log would show it. Returns their paths. InputError for bad input, or where there is nothing to foretell."""
+    session = _loaded(session)
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    return predict_session(session, model or session.model, Path(folder), progress, config=config, n_jobs=jobs)
+
+
+def _loaded(session: Session | str | PathLike[str]) -> Session:
+    return session if isinstance(session, Session) else load_session(Path(session))

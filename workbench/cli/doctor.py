@@ -1,0 +1,27 @@
+"""`workbench doctor`: what this machine has and lacks."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Registers the verb."""
+    parser = subparsers.add_parser(
+        "doctor",
+        help="say what this machine has, lacks, and how to get it",
+        description="Looks at versions, cores, memory, disk, the cache of compiled rollouts, Meshcat, the second engine and "
+        "shell completion, and says how to get what is missing. Exits with 2 where something keeps the workbench from working.")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.set_defaults(run=run)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Looks and prints."""
+    from workbench.api.doctor import examine
+    from workbench.cli.defaults import defaults_file
+
+    health = examine(defaults_file())
+    print(json.dumps(health.as_dict(), indent=2) if args.json else health.as_text())
+    return 0 if health.works else 2

@@ -1,0 +1,79 @@
+"""Effects fitted together: sizes, covariance, what they cost and leave."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.parameters import Candidate, Key, with_effects
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+Sizes = list[tuple[Candidate, Array]]
+"""Effects, each with its sizes."""
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step. joint: whose
+    channels alone, None for all."""
+
+    numbers: NDArray[np.int_]
+    takes: tuple[int, ...]
+    J: Array
+    joint: str | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
+
+    cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
+    """
+
+    effects: tuple[Candidate, ...]
+    x: Array
+    covariance: Array
+    cost: dict[str, float]
+    residuals: dict[int, Array] = field(repr=False)
+    slopes: tuple[Slopes, ...] = field(default=(), repr=False)
+
+    def slices(self) -> list[slice]:
+        """Of x, for each effect."""
+        ends = np.cumsum([0, *(c.size for c in self.effects)]).tolist()
+        return [slice(a, b) for a, b in pairwise(ends)]
+
+    def numbers(self, effects: Iterable[int]) -> NDArray[np.int_]:
+        """Indices of x, of some effects."""
+        slices = self.slices()
+        return np.concatenate([np.empty(0, dtype=int), *(np.arange(slices[i].start, slices[i].stop) for i in effects)])
+
+    def sizes(self, x: Array | None = None) -> Sizes:
+        """Each effect with its own sizes; with those of another x."""
+        x = self.x if x is None else x
+        return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
+
+    def sizes_without(self, key: Key) -> Sizes:
+        """Those of all effects but one."""
+        return [s for s in self.sizes() if s[0].key != key]
+
+    def sizes_with(self, key: Key, x: Array) -> Sizes:
+        """Those of all effects, one at other sizes."""
+        return [(c, x if c.key == key else own) for c, own in self.sizes()]
+
+    def sizes_by_key(self) -> dict[Key, Array]:
+        """Of each effect, by what it is and where."""
+        return {c.key: x for c, x in self.sizes()}
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Of x."""
+        ends = [(np.empty(0), np.empty(0)), *(c.bounds() for c in self.effects)]
+        return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
+
+    def model(self, nominal: RobotModel) -> RobotModel:
+        """The nominal robot with these effects."""
+        return with_effects(nominal, self.sizes())
