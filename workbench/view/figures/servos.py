@@ -122,7 +122,7 @@ def base_wrench(
             for a, b in feet:
                 axes.axvspan(a, b, color=ERROR, alpha=0.04, linewidth=0, zorder=0.4)
     figure.legend(*rows[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
-    rows[1].set_xlabel("time since the first command [s]")
+    rows[1].set_xlabel("time [s]")
     return figure
 
 
