@@ -14,7 +14,7 @@ from tests.inputs.corpus import ROBOT, SDF
 from workbench.effects.apply import physics_of
 from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel
 from workbench.robot.model_source import model_problems, prepared
-from workbench.simulation import MakePuppyStation, SimulationConfig
+from workbench.simulation import MakeStation
 from workbench.view.report.inspection import inspect_file
 
 
@@ -80,7 +80,18 @@ def test_effects_that_change_the_build_act_on_a_urdf(tmp_path: Path, effect: str
     assert set(model.kinematics.links) <= set(changed.links)
     if effect == "payload":
         assert changed.masses["shank"] == pytest.approx(0.08)
-    MakePuppyStation(SimulationConfig(), model)
+    MakeStation(model)
+
+
+@pytest.mark.parametrize("name", ["robot.urdf", "robot.sdf"])
+def test_effects_act_on_a_robot_with_meshes(tmp_path: Path, name: str) -> None:
+    _box_mesh(tmp_path / "box.stl")
+    _box_mesh(tmp_path / "box.obj")
+    mesh = "<mesh><uri>box.obj</uri><scale>.001 .001 .001</scale></mesh>"
+    text = _meshed("box.stl") if name == "robot.urdf" else SDF.replace("<box><size>.02 .02 .05</size></box>", mesh)
+    model = RobotModel(str(_robot(tmp_path, text, name)))
+    joint = model.joints[-1]
+    MakeStation(model.with_effect(EffectSpec("backlash", (joint,), {"gap": 3.0})))
 
 
 @pytest.mark.parametrize("uri", ["mesh/trunk.stl", "mesh\\trunk.stl", "package://dog/mesh/trunk.stl", "package:///mesh/trunk.stl",
