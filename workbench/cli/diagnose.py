@@ -68,5 +68,6 @@ def _line(finding: Finding) -> str:
 
     tie, error = finding.tie, finding.validation
     other = f" {this_or(tie)}, which these recordings do not tell apart" if tie else ""
-    return f"{finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches " \
+    family = "" if finding.family is None else f", {finding.family.name} {finding.family.confidence:.2f}"
+    return f"{finding.evidence} (confidence {finding.together:.2f}{other}{family}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"
