@@ -82,7 +82,7 @@ class Take:
 
     def resampled(self, time: Array) -> Take:
         """The take at other times (M,) [s] on its own clock, linear between samples, NaN outside and in gaps."""
-        from workbench.recording.mocap import quaternions as quat
+        from workbench.recording import quaternions as quat
 
         time = np.asarray(time, dtype=float)
 
