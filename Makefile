@@ -27,7 +27,7 @@ test: lint
 
 # Types and the quick tests once more, with the newest Python here and the newest Drake, numpy and MuJoCo that pyproject.toml allows,
 # in an environment of its own. Left out are tests of the search alone: long, and of our own arithmetic.
-NEWEST_LEFT_OUT := tests/test_gap_*.py tests/identify tests/gait tests/test_concealed_effects*.py tests/test_stud*.py
+NEWEST_LEFT_OUT := tests/identify tests/compare tests/experiment tests/diagnose tests/gait tests/test_concealed_effects*.py tests/test_stud*.py
 
 test-newest: pyproject.toml
 ifeq ($(NEWEST),)
@@ -55,7 +55,7 @@ prove: $(STAMP)
 	$(BIN)/python -m studies.concealed_effects --workers $(WORKERS)
 
 # Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`.
-STUDIES := $(filter-out concealed_effects,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
+STUDIES := $(filter-out concealed_effects replay,$(patsubst studies/%/__main__.py,%,$(wildcard studies/*/__main__.py))) \
            $(patsubst studies/%.py,%,$(shell grep -l '__name__ == "__main__"' studies/*.py))
 
 studies: $(STAMP)

@@ -11,7 +11,7 @@ import pytest
 from studies.so101.__main__ import main
 from studies.so101.baseline import fit_baseline
 from studies.so101.evaluate import degrees, errors, simulate, together
-from studies.so101.programmes import DIAGNOSED, TRAINING, VALIDATION, Programme, clock, jaw_range, load_programmes
+from studies.so101.programmes import TRAINING, VALIDATION, Programme, clock, jaw_range, load_programmes
 from studies.so101.read_off import read_off
 from studies.so101.response import INERTIA, Value, response
 from studies.so101.rest import current, standing
@@ -53,7 +53,6 @@ def made_up(name: str, seed: int, lag: float = 0.08, friction: float = 0.006, co
 def test_the_split_is_whole_and_nothing_serves_for_both() -> None:
     assert len(TRAINING) == len(VALIDATION) == 14
     assert not set(TRAINING) & set(VALIDATION)
-    assert set(DIAGNOSED) <= set(TRAINING)
 
 
 def test_regression_finds_lag_friction_and_load() -> None:
@@ -121,7 +120,7 @@ def test_jaw_counts_in_shares_of_its_range_and_half_its_duty() -> None:
 
 def test_read_off_turns_measurements_into_effects(tmp_path: Path) -> None:
     urdf = shared(f"{DATA}/so101_inertias_only.urdf")
-    model = load_session(write_session(urdf.parent, tmp_path, DIAGNOSED[:1], 2.3)).model
+    model = load_session(write_session(urdf.parent, tmp_path, TRAINING[:1], 2.3)).model
     rows = [made_up(f"p{k}", k) for k in range(3)]
     moving = {j: response(j, rows) for j in JOINTS}
     k = 3.35036 * 2.656

@@ -3,7 +3,7 @@
     python -m studies.so101 [--data ../shared/data/so101] [--out runs/studies/so101] [--model model.yaml] [--read-off-only]
 
 Writes the arm as a session (robot.sdf, servos, session.yaml of training programmes, validation.yaml), measures it, has the
-workbench diagnose a few training programmes, and holds the nominal model, a plain baseline, a model read off the measurements
+workbench diagnose the training programmes, and holds the nominal model, a plain baseline, a model read off the measurements
 and the diagnosed one against the validation programmes. --model: one diagnosed before. --read-off-only: without a diagnosis.
 """
 
@@ -25,7 +25,7 @@ from studies.so101.baseline import fit_baseline
 from studies.so101.evaluate import degrees, errors, simulate, together
 from studies.so101.figures import draw_current, draw_errors, draw_loops, draw_overlay
 from studies.so101.measured import Measured, measure
-from studies.so101.programmes import DIAGNOSED, VALIDATION, jaw_range, load_programmes
+from studies.so101.programmes import TRAINING, VALIDATION, jaw_range, load_programmes
 from studies.so101.read_off import read_off
 from studies.so101.session import write_session
 from workbench.cli.memory import rollout_memory
@@ -50,7 +50,7 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
     programmes = load_programmes(data)
     session, held, slow = (
         load_session(write_session(data, out, names, jaw_range(programmes), file))
-        for names, file in ((DIAGNOSED, "session.yaml"), (VALIDATION, "validation.yaml"), ((SLOW,), "slow.yaml")))
+        for names, file in ((TRAINING, "session.yaml"), (VALIDATION, "validation.yaml"), ((SLOW,), "slow.yaml")))
     progress("measuring", None)
     m = measure(programmes, session.model.kinematics)
     nominal = session.model

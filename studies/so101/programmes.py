@@ -29,8 +29,6 @@ VALIDATION = (
     "actuator_bandwidth", "chirp_sweep", "dual_joint_elbow_wrist", "fast_transitions", "figure_eight", "lissajous_pattern",
     "oscillation_low_freq", "perturbation_test", "reach_and_return", "single_joint_rotation", "slow_precision",
     "symmetric_motion", "triangle_wave", "velocity_ramp")
-DIAGNOSED = ("random_waypoints", "hover_positions", "wave_motion", "square_pattern", "step_response")
-"""Of the training programmes those that the diagnosis gets: 282 s, of which its search looks at 40."""
 NOMINAL_RATE = 50.0
 
 

@@ -9,18 +9,15 @@ import numpy as np
 
 from tests.device.servos import arm
 from tests.firmware.image import image
-from workbench.compare.robot_run import run_on_robot
+from workbench.compare.robot_run import run_by_controller, run_on_robot
 from workbench.compare.session import load_session
 from workbench.compare.session_file import write_session
 from workbench.device.bus import Bus
-from workbench.device.capture import Recorder, VirtualLink, VirtualMotive, record_take
-from workbench.device.link import ControllerState, FrameReader, FrameType, LogMessage, StateMessage, frame, message, upload_frames
-from workbench.device.play.telemetry import write_telemetry
-from workbench.device.table_file import TableFile, bounds_of, encode_table
-from workbench.device.virtual import MILLISECOND, SECOND
+from workbench.device.virtual import SECOND
 from workbench.device.virtual.cm530 import Board
+from workbench.device.virtual.cm530.port import PcLinkPort
 from workbench.identify.diagnosis import diagnose_session
-from workbench.motion import Motion, load_motion, save_motion
+from workbench.motion import Motion, load_motion
 from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation.virtual_robot import VirtualRobot
 
@@ -77,73 +74,17 @@ def from_controller(folder: Path, effects, bases=("fixed", "free"), cycles=8, se
     takes = []
     for base in bases:
         robot = VirtualRobot(replace(model, effects=effects), base)
+        board = Board(image(), robot.clock, robot.bus)
+        board.power_on()
+        board.run(robot.clock.now + SECOND // 2)
         motion = stand(model) if base == "fixed" else walk(model)
         count = 1 if base == "fixed" else cycles
-        started, ended, log, zero = _played_by_the_image(robot, motion, count)
-        names, scene, begin, end = robot.scene(started, seed)
-        motive = VirtualMotive(names, scene, rate=120.0, started=begin, seed=seed)
-        capture = record_take(Recorder(VirtualLink(motive)), folder / f"{motion.name}.csv", lambda: False, end - begin - 0.01,
-                              until_time=lambda ended=ended: ended)
-        save_motion(motion, folder / f"{motion.name}_motion.csv")
-        table = {"motion": f"{motion.name}_motion.csv", "cycles": count, "base": base}
-        takes.append({"name": motion.name, "recording": f"{motion.name}.csv", **table,
-                      "starts_at": round(started - capture.first_host, 5)})
-        if log:
-            write_telemetry(folder / f"{motion.name}_joints.csv", log, motion.joints, robot.profile)
-            first = log[0].time + log[0].duration / 2 + zero
-            takes.append({"name": f"{motion.name}_joints", "recording": f"{motion.name}_joints.csv", **table,
-                          "starts_at": round(started - first, 5)})
+        done = run_by_controller(PcLinkPort(board), model, motion, count, folder, lambda: "", base=base, virtual=robot, seed=seed)
+        assert done.played.stopped == ""
+        assert not board.violations
+        takes += done.takes
     write_session(folder, model, takes)
     return folder
-
-
-def _played_by_the_image(robot, motion, cycles):
-    """Start and end on the virtual clock [s], the controller's rounds from a second before the start on, and its clock's zero."""
-    board = Board(image(), robot.clock, robot.bus)
-    goals = []
-    talk = robot.bus.talk
-
-    def heard(talker, values, rate, starts):
-        end = talk(talker, values, rate, starts)
-        if talker is board and len(values) > 5 and values[4] == 0x83:
-            goals.append(end)
-        return end
-
-    robot.bus.talk = heard
-    reader, messages, read = FrameReader(), [], 0
-
-    def run(ms):
-        nonlocal read
-        board.run(robot.clock.now + round(ms * MILLISECOND))
-        new = bytes(board.pc.received[read:])
-        read += len(new)
-        messages.extend(m for f in reader.feed(new) if (m := message(f)) is not None)
-
-    def until(state, seconds):
-        end = robot.clock.now + seconds * SECOND
-        while not any(isinstance(m, StateMessage) and m.state == state for m in messages[-40:]):
-            assert robot.clock.now < end, messages[-3:]
-            run(20)
-
-    table = motion.as_table()
-    data = encode_table(TableFile(table, bounds_of(table, robot.model), cycles, True))
-    board.power_on()
-    zero = robot.clock.now / SECOND
-    until(ControllerState.NEUTRAL, 12)
-    for part in upload_frames(data, 1, ramps=True):
-        board.send(board.pc, part)
-    run(1500)
-    goals.clear()
-    board.send(board.pc, frame(FrameType.PLAY))
-    while not goals:
-        run(5)
-        assert robot.clock.now < (zero + 30) * SECOND, messages[-3:]
-    began = goals[0] / SECOND
-    seconds = motion.commands(cycles).end
-    run(1000 * (began + seconds - robot.clock.now / SECOND) + 100)
-    rounds = [m for m in messages if isinstance(m, LogMessage) and m.time + zero > began - 0.9]
-    assert not board.violations
-    return began, began + seconds, rounds, zero
 
 
 ARM_MOTION = Motion("wave", np.array([0.0, 0.35, 0.6, 0.85, 1.2, 1.45, 1.8]), ("one", "three", "two"),
@@ -151,13 +92,13 @@ ARM_MOTION = Motion("wave", np.array([0.0, 0.35, 0.6, 0.85, 1.2, 1.45, 1.8]), ("
                                 [0, 0, 0]]))
 
 
-def of_an_arm(folder: Path, effects, cycles=4, seed=3):
+def of_an_arm(folder: Path, effects, cycles=2, seed=3):
     """By `run`, on a robot of three joints that a stand holds."""
     bodies = {"Trunk": "trunk", "Upper": "upper", "Middle": "middle", "Lower": "lower"}
     model = replace(arm(folder), rigid_bodies=bodies)
     robot = VirtualRobot(replace(model, effects=effects), "fixed")
-    done = run_on_robot(Bus(robot.port, robot.profile), model, ARM_MOTION, cycles, folder, lambda: "", base="fixed", virtual=robot,
-                        seed=seed)
+    bus = Bus(robot.port, robot.profile)
+    done = run_on_robot(bus, model, ARM_MOTION, cycles, folder, lambda: "", base="fixed", virtual=robot, seed=seed)
     assert done.played.stopped == ""
     return folder
 

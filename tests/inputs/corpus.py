@@ -119,8 +119,9 @@ def sage(names: tuple[str, ...] = ("",), compressed: bool = True) -> bytes:
     arrays = {}
     for name in names:
         prefix = f"{name}/" if name else ""
-        arrays |= {f"{prefix}t_cmd": time, f"{prefix}t_meas": time + 0.001,
-                   f"{prefix}q_cmd": np.deg2rad(np.tile(goal[:, None], 6)), f"{prefix}q_meas": np.deg2rad(np.tile(position[:, None], 6))}
+        arrays |= {f"{prefix}t_cmd": time, f"{prefix}t_meas": time + 0.001}
+        arrays[f"{prefix}q_cmd"] = np.deg2rad(np.tile(goal[:, None], 6))
+        arrays[f"{prefix}q_meas"] = np.deg2rad(np.tile(position[:, None], 6))
     out = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(out, **arrays)
     return out.getvalue()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 import re
 
-_TOKENS = [b"", b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"9" * 30, b"1_0", "\u0663".encode(), b"null", b"~", b'"',
-           b"'", b"[", b"{", b"<", b">", b"&", b"\0", b"\r", b"\n", b"\xff\xfe", b"\xf6", b"!!int x", b"*a", b"&a", b"#", b",,", b";",
-           b"1e25", b"4294967296", b"true", b"-0", b"\t", b"1,5", b"../../etc/passwd"]
+_TOKENS = [b"", b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"9" * 30, b"1_0", "\u0663".encode(), b"null", b"~",
+           b'"', b"'", b"[", b"{", b"<", b">", b"&", b"\0", b"\r", b"\n", b"\xff\xfe", b"\xf6", b"!!int x", b"*a", b"&a", b"#",
+           b",,", b";", b"1e25", b"4294967296", b"true", b"-0", b"\t", b"1,5", b"../../etc/passwd"]
 _NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
 
 

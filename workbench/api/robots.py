@@ -18,8 +18,8 @@ def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None =
     """A robot, with its servos and the effects that were found in it.
 
     source: "puppy" or another robot that ships, by name; a model.yaml, as `diagnose` writes it; a session.yaml (or the folder of
-    one), whose robot, servos and ground are taken; or an SDF, URDF or package:// URL, with AX-12A servos. packages: folder of each ROS package that such
-    a description names. InputError names the
+    one), whose robot, servos and ground are taken; or an SDF, URDF or package:// URL, with AX-12A servos. packages: folder of
+    each ROS package that such a description names. InputError names the
     file, the key and what was expected, for an effect that is not installed, too.
     """
     name = fspath(source)

@@ -75,7 +75,7 @@ def batch_on_two_processes(
     model: RobotModel, commands: Commands, duration: float, rollouts: int, repeats: int, seed: int
 ) -> Figure:
     """Rollouts of the walk, each at an amplitude of its own; wall time."""
-    config = SimulationConfig()
+    config = SimulationConfig(engine="drake")
     amplitudes = np.random.default_rng(seed).uniform(0.8, 1.0, rollouts)
     jobs = [Job(model, config, replace(commands, goals=a * commands.goals), duration, LEAD) for a in amplitudes]
     began = time.perf_counter()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from workbench.bench import drives, engine, reader
+from workbench.bench import compiled, drives, engine, reader
 from workbench.bench.diagnose_time import diagnose_time
 from workbench.bench.figure import Figure
 from workbench.bench.sysid import fit_against_mujoco_sysid
@@ -20,7 +20,7 @@ from workbench.robot import data_file, puppy_model
 STEP = 1e-3
 SEED = 0
 CYCLES = 4
-PACKAGES = ("drake", "mujoco", "numpy", "pandas", "pyarrow", "joblib")
+PACKAGES = ("drake", "mujoco", "numpy", "pandas", "pyarrow", "joblib", "numba")
 
 
 @dataclass(frozen=True)
@@ -63,17 +63,22 @@ def _measure(size: Size, progress: Callable[[str], None]) -> list[Figure]:
     walk = load_motion(data_file("robotis_walk.csv"), model).commands(CYCLES)
     progress("batch of rollouts on two processes against one")  # first, while no worker process is up
     batch = drives.batch_on_two_processes(model, walk, size.walk, size.rollouts, size.batches, SEED)
+    progress("compiled rollouts on two threads against one")
+    threads = compiled.batch_on_two_threads(model, walk, size.walk, size.rollouts, size.batches, SEED)
+    progress("compiled steps against Drake's")
+    steps = compiled.compiled_against_drake(model, walk, size.duration, STEP, size.turns)
     progress("station against bare plant")
     figures = drives.station_against_bare_plant(model, walk, size.duration, STEP, size.turns)
     for base, duration in (("fixed", size.duration), ("free", size.walk)):
         progress(f"station against MuJoCo, base {base}")
         exact = drives.converged(model, walk, duration, base, size.finest)
         figures.append(engine.station_against_mujoco(model, walk, duration, exact, size.finest, STEP, size.turns))
+        figures.append(compiled.compiled_against_mujoco(model, walk, duration, exact, size.finest, STEP, size.turns))
     progress("fast servo and larger steps")
     exact = drives.converged(model, walk, size.duration, "fixed", size.finest)
     figures.append(drives.fast_servo_and_larger_steps(model, walk, size.duration, exact, size.turns))
     progress("Motive reader against pandas")
-    return [*figures, reader.reader_against_pandas(size.frames, size.readings, SEED), batch]
+    return [*steps, *figures, threads, reader.reader_against_pandas(size.frames, size.readings, SEED), batch]
 
 
 def _fits(quick: bool, progress: Callable[[str], None]) -> list[Figure]:

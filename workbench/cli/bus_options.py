@@ -74,3 +74,35 @@ def _port_name(args: argparse.Namespace) -> str:
         raise BusError(f"{len(ports)} USB adapters with a serial port{': ' if ports else ''}{', '.join(ports)}; say which "
                        f"with --port, of {', '.join(serial_ports()) or 'none'}")
     return ports[0]
+
+
+@contextmanager
+def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iterator[object]:
+    """The CM-530's PC link: a serial port, or that of an emulated one that runs --image."""
+    from pathlib import Path
+
+    from workbench.device.bus import open_port
+    from workbench.device.bus.bridge import RATE
+    from workbench.device.bus.ports import GONE
+    from workbench.robot import InputError
+
+    if virtual is None:
+        port = open_port(_port_name(args), RATE)
+        try:
+            yield port
+        finally:
+            with suppress(*GONE):
+                port.closePort()
+        return
+    if args.image is None:
+        raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+    try:
+        image = Path(args.image).read_bytes()
+    except OSError as e:
+        raise InputError(args.image, f"cannot be read ({e.strerror})") from None
+    from workbench.device.virtual.cm530 import Board
+    from workbench.device.virtual.cm530.port import PcLinkPort
+
+    board = Board(image, virtual.clock, virtual.bus)
+    board.power_on()
+    yield PcLinkPort(board)

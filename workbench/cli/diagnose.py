@@ -30,6 +30,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--memory", metavar="DIR", help="keep every rollout there, for other diagnoses of the same recordings "
+                        "(default: beside --out, until this one ends)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.set_defaults(run=run)
@@ -46,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     session = load_session(args.session)
     check_session("diagnose", session, args.yes)
     with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
-          rollout_memory(args.out, session) as memory):
+          rollout_memory(args.out, session, args.memory) as memory):
         result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
         paths = result.save(folder, progress, args.jobs)
     diagnosis = result.diagnosis
@@ -66,5 +68,6 @@ def _line(finding: Finding) -> str:
 
     tie, error = finding.tie, finding.validation
     other = f" {this_or(tie)}, which these recordings do not tell apart" if tie else ""
-    return f"{finding.evidence} (confidence {finding.together:.2f}{other}; error on unseen stretches " \
+    family = "" if finding.family is None else f", {finding.family.name} {finding.family.confidence:.2f}"
+    return f"{finding.evidence} (confidence {finding.together:.2f}{other}{family}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"

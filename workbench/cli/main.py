@@ -77,7 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(args: argparse.Namespace, alone: bool) -> int:
     """Runs the verb. alone: whether this process is for nothing else, so that libraries' warnings may be silenced."""
-    logging.getLogger("drake").addFilter(_only_errors)  # what Drake warns of in a model is told by the workbench
+    logging.getLogger("drake").addFilter(_serious)  # what Drake warns of in a model is told by the workbench
     previous = signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))  # cleans up on its way
     forget_warnings()
     if alone and not sys.warnoptions:  # of the libraries, to those who develop with them
@@ -117,8 +117,8 @@ def _refused(name: str, error: OSError | ValueError) -> int:
     return 2
 
 
-def _only_errors(record: logging.LogRecord) -> bool:
-    return record.levelno >= logging.ERROR
+def _serious(record: logging.LogRecord) -> bool:
+    return record.levelno > logging.ERROR  # an error of its parser is raised as one
 
 
 def _readable(error: OSError | ValueError) -> str | None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from workbench.cli.output import runs
 from workbench.compare.session import Session
+from workbench.identify.rollout_key import rollout_code
 from workbench.robot import InputError
 from workbench.robot.numerals import whole_of
 
@@ -22,9 +23,17 @@ STAYS = 16
 
 
 @contextmanager
-def rollout_memory(out: Path, session: Session) -> Iterator[Path]:
+def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> Iterator[Path]:
     """A folder beside `out` for rollouts of this session, the same for the same files and versions; left where the block is
-    interrupted or fails, gone once it ends well, and with it what other versions left there."""
+    interrupted or fails, gone once it ends well, and with it what other versions left there. kept_in: a folder that stays,
+    in its place."""
+    if kept_in is not None:
+        try:
+            Path(kept_in).mkdir(parents=True, exist_ok=True)
+        except OSError as e:
+            raise InputError(kept_in, f"cannot be written ({e.strerror})") from None
+        yield Path(kept_in)
+        return
     beside = Path(os.path.abspath(out))
     kept = f".{beside.name}.resume-"
     folder = beside.parent / f"{kept}{_digest(session)}"
@@ -52,6 +61,5 @@ def _digest(session: Session) -> str:
     for path in (session.path, *(p for t in session.takes for p in (t.recording, t.motion) if p is not None)):
         if Path(str(path).partition("#")[0]).exists():
             digest.update(Path(str(path).partition("#")[0]).read_bytes())
-    for source in sorted(Path(__file__).parents[1].rglob("*.py")):  # another version of the code may simulate otherwise
-        digest.update(source.read_bytes())
+    digest.update(rollout_code().encode())  # another version of the code may simulate otherwise
     return digest.hexdigest()[:STAYS]

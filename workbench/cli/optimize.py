@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.gait.engines import other_engine
     from workbench.gait.ensemble import load_ensemble
     from workbench.gait.machine import GaitMachine
-    from workbench.gait.optimize import memory_key, optimize, options_of, write_gait
+    from workbench.gait.optimize import MEMORY, optimize, options_of, write_gait
     from workbench.robot.model_file import load_model_file
     from workbench.view.report.gait import write_gait_page
 
@@ -65,8 +65,7 @@ def run(args: argparse.Namespace) -> int:
     request = _request(args, model)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)
-        memory = args.out / f".search-{memory_key(machine, request, ensemble, options)}.jsonl"
-        result = optimize(machine, request, ensemble, options, progress, memory, other_engine())
+        result = optimize(machine, request, ensemble, options, progress, args.out / MEMORY, other_engine())
         if result.table is not None and result.certified is not None:
             progress("drawing")
             write_gait(folder, result.table, result.certified)

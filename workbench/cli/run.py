@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus
+from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_pc_link
 from workbench.cli.options import add_model, add_out, load_model, positive
 
 
@@ -20,6 +20,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("motion", metavar="MOTION")
     add_bus(parser, default=VIRTUAL)
     add_model(parser)
+    parser.add_argument("--upload", action="store_true", help="have the CM-530's own program play it: --port is its PC link")
+    parser.add_argument("--image", metavar="FILE", help="with --port virtual --upload: the program in the emulated CM-530")
     parser.add_argument("--motive", metavar="HOST",
                         help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
@@ -36,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Plays, records, compares and says what came of it."""
     from workbench.cli.progress import Progress
     from workbench.compare.compare_session import compare_session
-    from workbench.compare.robot_run import run_on_robot
+    from workbench.compare.robot_run import run_by_controller, run_on_robot
     from workbench.compare.session import load_session
     from workbench.device.capture import Recorder, UdpLink
     from workbench.device.limits import refuse_broken_limits
@@ -50,12 +52,17 @@ def run(args: argparse.Namespace) -> int:
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
     with Progress("run") as progress:
-        with open_bus(args, model, virtual) as bus, stop_on_signals() as stop:
-            done = run_on_robot(bus, model, motion, args.cycles, args.out, lambda: stop.reason, base=args.base, virtual=virtual,
-                                recorder=recorder, seed=args.seed, progress=progress)
+        options = {"base": args.base, "virtual": virtual, "recorder": recorder, "seed": args.seed, "progress": progress}
+        with stop_on_signals() as stop:
+            if args.upload:
+                with open_pc_link(args, virtual) as port:
+                    done = run_by_controller(port, model, motion, args.cycles, args.out, lambda: stop.reason, **options)
+            else:
+                with open_bus(args, model, virtual) as bus:
+                    done = run_on_robot(bus, model, motion, args.cycles, args.out, lambda: stop.reason, **options)
         for warning in done.warnings:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
-        print(f"wrote {done.session}: {done.played.poses} poses, the worst {1000 * done.played.worst_late:.1f} ms late")
+        print(f"wrote {done.session}")
         if done.played.stopped:
             return 130 if done.played.stopped == "Ctrl-C" else 2
         session = load_session(done.session)

@@ -33,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Simulates, writes the table, the figures and the replay, and says how far it went."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
+    from workbench.compare.went import how_it_went
     from workbench.motion import load_motion
     from workbench.recording.formats.rollout_table import save_rollout
     from workbench.simulation import Simulation, SimulationConfig
@@ -54,5 +55,6 @@ def run(args: argparse.Namespace) -> int:
         written = [save_rollout(take, folder / "rollout.csv")]
         written += [write_replay(folder / "replay.html", model, take, title=title).path]
         written += [save_figure(figure, folder / f"{name}.png") for name, figure in rollout_figures(take, model).items()]
+    print(how_it_went(take))
     print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
     return 0

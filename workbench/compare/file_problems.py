@@ -68,9 +68,9 @@ def session_check(session: Session) -> SessionCheck:
             except InputError as e:
                 found[name] = [str(e)]
                 damaged.add(name)
-    if session.predict and not session.takes and any(p.start is not None for p in session.predict):
-        found["predict"] = ["no take from which the yaw of the capture can be found; expected a captured one under `takes`, or "
-                            "the session's `yaw`"]
+    if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
+        found["predict"] = ["no take tells the yaw of the capture: it is taken from where the bodies stand at the start, good to "
+                            "some degrees; give the session's `yaw` [deg], or a captured take"]
     longest = max(seconds, key=lambda name: seconds[name])
     return SessionCheck({of: lines for of, lines in found.items() if lines}, seconds[longest], longest, frozenset(damaged))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,9 +18,10 @@ from workbench.recording.formats.joint_log import write_joint_log
 from workbench.recording.formats.motive_write import write_motive
 from workbench.recording.formats.read import read_recording
 from workbench.recording.joint_names import named_by_model
+from workbench.recording.mocap.conventions import layout_yaw
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
-from workbench.recording.mocap.tracks import check_assets
+from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.recording import Recording
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
@@ -55,6 +57,8 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
     versions = {ending: session.with_model(m) for ending, m in models.items()}
     captured = [_Captured(spec, read_start(spec.start)) for spec in session.predict if spec.start is not None]
     left_out: LeftOut = ()
+    if captured and yaw is None and not session.takes:
+        yaw = session.yaw if session.yaw is not None else _yaw_of_starts(session, [c.start for c in captured])
     if captured and yaw is None:
         progress("finding the yaw", None)
         takes, left_out = read_takes(session)
@@ -70,6 +74,16 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
             progress(f"simulating {spec.name}", None)
             paths += [predict_log(s, spec, out_dir / f"{spec.name}{ending}.csv", config) for ending, s in versions.items()]
     return Predicted(tuple(paths), left_out)
+
+
+def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
+    """The yaw [rad] that where the bodies stand tells, of a session of predictions alone: good to some degrees, as pivots lie
+    anywhere on their links. InputError where they do not tell it."""
+    told = [layout_yaw(tracks_of(start), session.model) for start in starts]
+    known = [yaw for yaw in told if yaw is not None]
+    if not known:
+        raise InputError(session.path, "yaw: is missing, and neither takes nor where the bodies of the start files stand tell it")
+    return float(np.angle(np.mean(np.exp(1j * np.array(known)))))
 
 
 def read_start(path: Path) -> Recording:

@@ -9,10 +9,12 @@ from typing import Any
 
 from workbench.compare.session_file import write_session
 from workbench.device.bus.bus import Bus
-from workbench.device.bus.survey import survey
+from workbench.device.bus.survey import family_of, survey
 from workbench.device.capture import Capture, Recorder, VirtualLink, VirtualMotive, record_take
 from workbench.device.capture.background import BackgroundRecording
+from workbench.device.controller import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
+from workbench.device.table_file import TableFile, bounds_of
 from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_registers import save_registers
@@ -29,7 +31,7 @@ class RobotRun:
 
     session: Path
     takes: tuple[dict[str, Any], ...]
-    played: Played
+    played: Played | ControllerRun
     capture: Capture | None
     warnings: tuple[str, ...]
 
@@ -71,7 +73,39 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     return RobotRun(session, tuple(takes), played, capture, tuple(warnings))
 
 
-def _filmed(virtual: VirtualRobot, played: Played, take: Path, seed: int) -> Capture:
+def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int, folder: Path, stop: Callable[[], str], *,
+                      base: str = "free", virtual: VirtualRobot | None = None, recorder: Recorder | None = None, seed: int = 0,
+                      progress: Progress | None = None) -> RobotRun:
+    """As `run_on_robot`, but the CM-530's own program plays: the table goes there over its PC link, its log comes back. The
+    program checks the servos itself; their registers are not read."""
+    tell = progress or (lambda what, done: None)
+    commands, name = motion.commands(cycles), motion.name
+    table = motion.as_table()
+    file = TableFile(table, bounds_of(table, model), cycles, True)
+    background = None if recorder is None else BackgroundRecording(recorder, folder / f"{name}.csv")
+    if background is not None:
+        background.start()
+    played = None
+    try:
+        played = play_by_controller(port, file, commands.end, folder / f"{name}_joints.csv", family_of(model), stop, tell)
+    finally:
+        capture = None if background is None else background.stop(played.ended if played else None)
+    if virtual is not None:
+        tell("what the cameras saw", None)
+        capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
+    save_motion(motion, folder / f"{name}_motion.csv")
+    table_said = {"motion": f"{name}_motion.csv", "cycles": cycles, "base": base}
+    takes = [{"name": name, "recording": f"{name}.csv", **table_said}] if capture is not None else []
+    takes.append({"name": f"{name}_joints", "recording": f"{name}_joints.csv", **table_said,
+                  "starts_at": round(played.start_in_log, 5)})
+    session = write_session(folder, model, takes)
+    warnings = list(capture.problems) if capture else []
+    if played.stopped:
+        warnings.insert(0, f"stopped: {played.stopped}")
+    return RobotRun(session, tuple(takes), played, capture, tuple(warnings))
+
+
+def _filmed(virtual: VirtualRobot, played: Played | ControllerRun, take: Path, seed: int) -> Capture:
     names, scene, begin, end = virtual.scene(played.started, seed)
     motive = VirtualMotive(names, scene, rate=CAMERAS, started=begin, seed=seed)
     seconds = end - begin - 1 / CAMERAS

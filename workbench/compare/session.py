@@ -10,12 +10,15 @@ from typing import Literal
 
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
+from workbench.motion.table import MOST_CYCLES
 from workbench.recording.formats.read import recording_of_take
 from workbench.robot import InputError, RobotModel
 from workbench.robot.robot_section import read_model
 from workbench.robot.servo_registers import ServoRegisters, load_registers
 from workbench.robot.yaml_file import Fields, read_yaml
 
+MOST_SECONDS, MOST_FRAMES = 86_400.0, 10_000_000
+"""Of a start and of a prediction: a day, and hours at any camera's rate."""
 Base = Literal["free", "fixed"]
 
 
@@ -60,13 +63,15 @@ class PredictSpec:
 @dataclass(frozen=True)
 class Session:
     """One robot, one day of recordings. model: the nominal robot. registers: what its servos' registers say, where they were
-    read. All files named exist; all names fit the model."""
+    read. yaw: of the robot's first heading in the capture's axes, positive to the left [rad]; None: found from the takes. All
+    files named exist; all names fit the model."""
 
     path: Path
     model: RobotModel
     takes: tuple[TakeSpec, ...] = ()
     predict: tuple[PredictSpec, ...] = ()
     registers: ServoRegisters | None = None
+    yaw: float | None = None
 
     def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
         """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
@@ -97,6 +102,7 @@ def load_session(path: str | Path) -> Session:
     takes = tuple(_take(f, model) for f in top.sequence("takes"))
     predict = tuple(_predict(f, model) for f in top.sequence("predict"))
     registers = top.file("registers")
+    yaw = top.number("yaw", least=-360, most=360)
     top.done()
     for key, entries in (("takes", takes), ("predict", predict)):
         names = [e.name for e in entries]
@@ -105,7 +111,8 @@ def load_session(path: str | Path) -> Session:
                 raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
     if not takes and not predict:
         raise top.error("takes", "expected at least one take")
-    return Session(path, model, takes, predict, None if registers is None else load_registers(registers, model))
+    return Session(path, model, takes, predict, registers=None if registers is None else load_registers(registers, model),
+                   yaw=None if yaw is None else math.radians(yaw))
 
 
 def _take(f: Fields, model: RobotModel) -> TakeSpec:
@@ -113,7 +120,8 @@ def _take(f: Fields, model: RobotModel) -> TakeSpec:
     use = f.text("use", choices=("fit", "validate"))
     take = TakeSpec(
         name=name, recording=_recording(f, name), motion=f.file("motion"),
-        cycles=f.whole("cycles", 1, least=1) or 1, base=_base(f, model), starts_at=f.number("starts_at", least=0),
+        cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1, base=_base(f, model),
+        starts_at=f.number("starts_at", least=0, most=MOST_SECONDS),
         servos=_changes(f, model), use=use,  # type: ignore[arg-type]
     )
     f.done()
@@ -131,9 +139,9 @@ def _recording(f: Fields, take: str) -> Path:
 
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:
     spec = PredictSpec(
-        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1) or 1,
-        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0),
-        frames=f.whole("frames", least=1),
+        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1,
+        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=MOST_SECONDS),
+        frames=f.whole("frames", least=1, most=MOST_FRAMES),
         base=_base(f, model), servos=_changes(f, model),
     )
     f.done()

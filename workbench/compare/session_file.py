@@ -18,7 +18,7 @@ def write_session(folder: Path, model: RobotModel, takes: Sequence[Mapping[str, 
     description = model.description if model.description.startswith("package://") else str(model.path)
     robot: dict[str, Any] = {"model": description, "base": model.base}
     if model.servos:
-        robot["servos"] = {j: {k: v for k, v in asdict(s).items() if v is not None} for j, s in model.servos.items()}
+        robot["servos"] = {j: s.written() for j, s in model.servos.items()}
     if model.rigid_bodies:
         robot["rigid_bodies"] = dict(model.rigid_bodies)
     if model.bus_ids:

@@ -133,12 +133,13 @@ def register_takes(session: Session, takes: Sequence[ReadTake], rollouts: Mappin
 def capture_yaw(session: Session, takes: Sequence[ReadTake]) -> float | None:
     """One yaw [rad] for all takes that cameras saw; None without any."""
     captured = [t for t in takes if t.recording.rigid_bodies]
-    if not captured:
-        return None
+    if not captured or session.yaw is not None:
+        return session.yaw
     try:
         return session_yaw([t.recording for t in captured], session.model, [t.commands for t in captured]).yaw
     except InputError as e:
-        raise InputError(e.source or session.path, e.problem) from None
+        names = ", ".join(t.spec.name for t in captured)
+        raise InputError(e.source or session.path, f"takes {names}: {e.problem}") from None
 
 
 def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:

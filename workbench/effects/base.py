@@ -68,6 +68,17 @@ class Parameter:
         return BEYOND * neutral if near else self.typical
 
 
+@dataclass(frozen=True)
+class Registers:
+    """What the servos' own registers said in one log, NaN where they said nothing. duty, nominal_duty: by joint, (N,), what a
+    servo's H-bridge did, and what the nominal law does at the logged error, before it is cut at 1. voltage (N,) [V], None where
+    it was not logged."""
+
+    duty: Mapping[str, Array]
+    nominal_duty: Mapping[str, Array]
+    voltage: Array | None = None
+
+
 class Effect:
     """Base of all effects; hooks do nothing unless overridden. `values` are in SI, by parameter name.
 
@@ -182,6 +193,18 @@ class Effect:
     def measurement(self, measurement: Measurement, spec: EffectSpec) -> Measurement:
         """How the robot is seen changed."""
         return measurement
+
+    def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
+        """Its first parameter, in the contract's unit, as the servos' own registers tell it, and the standard error; None where
+        they do not."""
+        return None
+
+
+def mean_of_logs(values: Sequence[float], least: float) -> tuple[float, float] | None:
+    """Of what each log says, and its standard error, at least `least`; None of fewer than two logs."""
+    if len(values) < 2:
+        return None
+    return float(np.mean(values)), max(float(np.std(values, ddof=1) / math.sqrt(len(values))), least)
 
 
 def scalar(spec: EffectSpec, name: str) -> float:

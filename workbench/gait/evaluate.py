@@ -78,6 +78,7 @@ class Evaluator:
         self.nominal = request.on_slope(machine.model)
         self.draws = tuple(request.on_slope(d) for d in draws)
         self._memory, self._known = memory, _read(memory)
+        self._config = hashlib.sha256(repr(config).encode()).hexdigest()[:8]
         self.rollouts = 0
 
     def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
@@ -134,7 +135,7 @@ class Evaluator:
         return replace(m, clearance=feet_measure(take, model, self.machine.legs, begin, period).clearance)
 
     def _measures(self, wanted: Sequence[tuple[GaitTable, RobotModel]]) -> list[GaitMeasure]:
-        keys = [f"{table_sha256(t.start, t.cycle)[:24]} {m.sha256[:24]}" for t, m in wanted]
+        keys = [f"{table_sha256(t.start, t.cycle)[:24]} {m.sha256[:24]} {self._config}" for t, m in wanted]
         missing = {k: w for k, w in zip(keys, wanted) if k not in self._known}
         jobs = []
         for table, model in missing.values():

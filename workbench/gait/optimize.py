@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,6 +20,7 @@ from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import measure
+from workbench.gait.planned import planned_seeds
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, search
 from workbench.gait.shape import GaitShape
@@ -34,18 +33,21 @@ from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""
+MEMORY = ".rollouts.jsonl"
+"""Where a folder remembers what its searches have simulated."""
 
 
 @dataclass(frozen=True)
 class OptimizeOptions:
-    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start
-    from."""
+    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start from;
+    planned: whether solved kino-centroidal programmes are, too."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
     seed: int = 0
     n_jobs: int = 2
     given: tuple[GaitShape, ...] = ()
+    planned: bool = True
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
         evaluator = Evaluator(machine, request, draws, memory, options.n_jobs)
-        found = search(evaluator, options.budget, options.seed, progress, options.given)
+        if options.planned:
+            progress("planning seeds", 0.0)
+        planned = planned_seeds(machine, request) if options.planned else ()
+        found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
         chosen = found.best if found.best.good else found.nearest
         if chosen is None:
             return Optimized(request, False, _unmet(request, found, None), None, None, found)
@@ -130,13 +135,6 @@ def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:
 def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Path]:
     """Writes them, all or none."""
     return write_together(folder, gait_files(table, certified))
-
-
-def memory_key(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions) -> str:
-    """What a remembered search must be of to be gone on with."""
-    said = [machine.model.sha256, repr(request), ensemble.sha256, asdict(options.budget), options.seed,
-            [asdict(s) for s in options.given]]
-    return hashlib.sha256(json.dumps(said, default=str).encode()).hexdigest()[:16]
 
 
 def shape_from(content: dict[str, Any]) -> GaitShape:

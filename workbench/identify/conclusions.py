@@ -1,4 +1,4 @@
-"""From a fit to findings: numbers with intervals, rivals, what is left over, and the verdict."""
+"""From a fit to findings: parameters with intervals, rivals, residuals that remain, and the verdict."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     values = np.array(c.values(x))
     unknown = np.ones(len(values), dtype=bool)
     if isinstance(c, PointMass):  # where it is says a moment over a mass: both err, together
-        slopes, known = _slopes(c, x), np.isfinite(half)
+        slopes, known = value_slopes(c, x), np.isfinite(half)
         spread = CONCLUSIONS.z90 * np.sqrt(np.diag(slopes[:, known] @ covariance[np.ix_(known, known)] @ slopes[:, known].T))
         ends = np.array([values - spread, values + spread])
         unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
@@ -202,7 +202,7 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     mean = np.concatenate([np.empty(0), *(c.values(x) for c, x in fit.sizes())])
     slopes = np.zeros((len(mean), len(fit.x)))
     for c, s, row in zip(fit.effects, fit.slices(), np.cumsum([0, *(len(c.neutral) for c in fit.effects)])):
-        slopes[row:row + len(c.neutral), s] = _slopes(c, fit.x[s])
+        slopes[row:row + len(c.neutral), s] = value_slopes(c, fit.x[s])
     known = np.isfinite(np.diag(fit.covariance)) if len(fit.x) else np.zeros(0, dtype=bool)
     inner = CONCLUSIONS.wider**2 * np.where(np.outer(known, known), np.nan_to_num(fit.covariance, posinf=0.0), 0.0)
     covariance = slopes @ inner @ slopes.T
@@ -218,7 +218,7 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     return Posterior(tuple(names), mean, covariance)
 
 
-def _slopes(c: Candidate, x: Array) -> Array:
+def value_slopes(c: Candidate, x: Array) -> Array:
     """Of a candidate's values with respect to its sizes."""
     steps = 1e-4 * np.eye(c.size)
     columns = [(np.array(c.values(x + h)) - np.array(c.values(x - h))) / 2e-4 for h in steps]

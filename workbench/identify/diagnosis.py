@@ -15,21 +15,26 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
+from workbench.compare.metrics import rms
 from workbench.compare.session import Base, Session
-from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
+from workbench.compare.session_takes import LeftOut, Progress, ReadTake, no_progress, read_takes
 from workbench.identify.conclusions import Residuals, change, finding, posterior, rejected, ties, unexplained, verdict_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, with_commands_of
-from workbench.identify.estimators.dropped_commands import with_dropped_commands
+from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
 from workbench.identify.estimators.geometry import Geometry, Measured, geometry_of
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
-from workbench.identify.findings import Diagnosis, Finding, Unexplained
+from workbench.identify.evidence.explain import explain, is_by_logs
+from workbench.identify.evidence.leftover import left_over
+from workbench.identify.findings import Diagnosis, Finding, GapEntry, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
+from workbench.identify.judge import EnginesPartError, judged
 from workbench.identify.ledger import channel_gaps, ledger
 from workbench.identify.options import PROBLEM, READ_OFF
-from workbench.identify.preparation import check_duration, prepared
+from workbench.identify.parameters import Candidate
+from workbench.identify.preparation import Prepared, check_duration, prepared
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
 from workbench.identify.registers import read_off_registers
@@ -43,8 +48,10 @@ from workbench.identify.subset import data_subset, floors_everywhere, rebalanced
 from workbench.identify.take_report import TakeReport
 from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
+from workbench.robot import Posterior, RobotModel
 from workbench.simulation import SimulationConfig
+
+BESIDE_DRAKE = "{} model apart from Drake [sigma]"
 
 
 @dataclass(frozen=True)
@@ -73,10 +80,21 @@ class _Explained:
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
                      thorough: bool = False) -> DiagnosisResult:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
-    rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes."""
-    began = time.monotonic()
+    rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. Rollouts are the
+    compiled station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
+    began = time.monotonic()
+    try:
+        return _diagnosed(session, config, began, progress, n_jobs, memory, thorough, {"rollouts by": "the compiled station"})
+    except EnginesPartError as why:
+        progress(f"{why}: again by Drake", None)
+        by_drake = {"rollouts by": "Drake", "because": str(why)}
+        return _diagnosed(session, replace(config, engine="drake"), began, progress, n_jobs, memory, thorough, by_drake)
 
+
+def _diagnosed(session: Session, config: SimulationConfig, began: float, progress: Progress, n_jobs: int, memory: Path | None,
+               thorough: bool, engine: Mapping[str, str]) -> DiagnosisResult:
+    """By one engine; EnginesPartError where that is not Drake and Drake says otherwise. began: time.monotonic of the start."""
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
@@ -84,6 +102,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     check_duration(session, seen.evidence)
     evaluator = RolloutEvaluator(seen.evidence, config, n_jobs, memory)
     nominal = Search(evaluator, session.model).evaluated([])
+    progress("judging the engine", None)
+    apart = {BESIDE_DRAKE.format("nominal"): judged(evaluator, session.model, "nominal")}
 
     # 2. The gap: where, when and in which layer they leave the nominal model
     gap = ledger(seen.evidence, nominal.residuals)
@@ -99,6 +119,10 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     evaluator, missed = with_dropped_commands(sent, known.model, begun.residuals)
     pool = build.asked(candidates(known.model, evidence)) + read_off_candidates(known.model, evidence, begun.residuals)
 
+    if gap and is_by_logs(evidence):
+        return _by_evidence(session, known.model, seen, evaluator, pool, nominal, build, missed, gap, unreadable, progress,
+                            began)
+
     # 4. Which effects explain it: searched for on a part of long sessions, compared with their rivals, numbers refined
     looked_at = data_subset(rebalanced(evaluator.evidence, begun.residuals), begun.residuals)
     chosen = select(Search(evaluator.on(looked_at), known.model), pool, progress, thorough, TakesAsPlayed(sent, missed))
@@ -109,6 +133,8 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     evaluator = evaluator.on(with_commands_of(evaluator.evidence, search.evaluator.evidence))
     fitted = fit.model(known.model)
     after, floors = _left_by(fitted, evaluator, looked_at, explained, progress)
+    progress("judging the engine", None)
+    apart[BESIDE_DRAKE.format("final")] = judged(evaluator, fitted, "final")
     findings = _findings(evidence, build.measured, explained, nominal.residuals, after)
     left = _left(evidence, after, floors, explained) if gap else ()
 
@@ -122,10 +148,36 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
         gap=gap, findings=findings, rejected=rejected(looked_at, fit, chosen.rounds, explained.posteriors, nominal.residuals),
         unexplained=left, posterior=posterior(fit, (*build.measured, *chosen.missed)),
         provenance=provenance(session.model, config, time.monotonic() - began)
-        | {"seed": 0, "rollouts": search.evaluator.rollouts} | subset_used(looked_at),
+        | {"seed": 0, "rollouts": search.evaluator.rollouts, "engine": {**engine, **apart}}
+        | subset_used(looked_at),
         stopped=chosen.stopped, left_out=unreadable + seen.left_out)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings else None)
     return DiagnosisResult(diagnosis, reports, ties(session.model, fit, explained.posteriors), observation_models(evidence))
+
+
+def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator: RolloutEvaluator, pool: Sequence[Candidate],
+                 nominal: Fit, build: Geometry, missed: Sequence[DroppedCommands], gap: tuple[GapEntry, ...],
+                 unreadable: LeftOut, progress: Progress, began: float) -> DiagnosisResult:
+    """Steps 4 to 6 of servo logs, by evidence."""
+    evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
+    told = explain(evaluator, known, pool, progress)
+    fitted = told.model
+    progress("rolling out the fitted model", None)
+    steps = (2 * PROBLEM.fine, PROBLEM.fine)
+    longer, after = evaluator.residuals([RolloutRequest(fitted, everywhere, step) for step in steps])
+    floors = {i: np.nan_to_num(rms((longer[i] - after[i])[evidence[i].moving])) for i in everywhere}
+    findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
+                  for m in build.measured), *(m.finding() for m in missed), *told.findings(evidence, nominal.residuals, after))
+    left = left_over(evidence, after, floors)
+    diagnosis = Diagnosis(
+        verdict=verdict_of(bool(findings or left), findings, left),
+        model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
+        findings=findings, rejected=told.losers(), unexplained=left, posterior=Posterior() if missed else told.posterior(),
+        provenance=provenance(session.model, evaluator.config, time.monotonic() - began)
+        | {"seed": 0, "rollouts": evaluator.rollouts},
+        left_out=unreadable + seen.left_out, recalibrated=told.recalibrated)
+    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
+    return DiagnosisResult(diagnosis, reports, told.ties(), observation_models(evidence))
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:

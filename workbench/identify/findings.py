@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
-from workbench.effects.base import Layer
+from workbench.effects.base import Family, Layer
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
@@ -70,6 +70,40 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class FamilyBelief:
+    """Probability that any effect of a family, which do nearly the same, is there."""
+
+    name: Family
+    confidence: float
+
+    def __post_init__(self) -> None:
+        _check_confidence(self.confidence)
+
+    def to_json(self) -> dict[str, Any]:
+        return {"name": self.name, "confidence": _number(self.confidence)}
+
+
+@dataclass(frozen=True)
+class Recalibrated:
+    """A number of the nominal law that was known to `sd` and is used otherwise: no finding. sigmas: of sd that it went."""
+
+    number: str
+    where: tuple[str, ...]
+    nominal: float
+    value: float
+    sd: float
+    unit: str
+
+    @property
+    def sigmas(self) -> float:
+        return (self.value - self.nominal) / self.sd
+
+    def to_json(self) -> dict[str, Any]:
+        return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
+                "unit": self.unit}
+
+
+@dataclass(frozen=True)
 class Finding:
     """A piece of physics that the model lacked. confidence: probability that it is there by this name, at that place. fit: error
     on the stretches that were fitted; validation: on those that no choice and no parameter saw. evidence: for a person."""
@@ -82,6 +116,7 @@ class Finding:
     validation: Change
     alternatives: tuple[Alternative, ...] = ()
     evidence: str = ""
+    family: FamilyBelief | None = None
 
     def __post_init__(self) -> None:
         _check_confidence(self.confidence)
@@ -105,6 +140,7 @@ class Finding:
 
     def to_json(self) -> dict[str, Any]:
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
+                **({} if self.family is None else {"family": self.family.to_json()}),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()},
                 "alternatives": [a.to_json() for a in self.alternatives],
                 "fit": self.fit.to_json(), "validation": self.validation.to_json(), **_said("evidence", self.evidence)}
@@ -195,6 +231,7 @@ class Diagnosis:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
+    recalibrated: tuple[Recalibrated, ...] = ()
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -209,6 +246,8 @@ class Diagnosis:
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_json(),
             "provenance": dict(self.provenance),
         }
+        if self.recalibrated:
+            out["recalibrated"] = [r.to_json() for r in self.recalibrated]
         if self.stopped:
             out["stopped"] = True
         if self.left_out:

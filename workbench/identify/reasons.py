@@ -83,24 +83,60 @@ class Outdone(Reason):
                 f"{self.gain:.0f}")
 
 
+@dataclass(frozen=True)
+class LessLikely(Reason):
+    """The likeliest model that has it is `behind` [nats] in log posterior."""
+
+    behind: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return f"the likeliest model with it is behind by {self.behind:.1f} nats (a factor of e each)"
+
+
+@dataclass(frozen=True)
+class SpokenAgainst(Reason):
+    """Takes that were kept back are less likely with it, by so many nats."""
+
+    by: float
+
+    def said(self, naming: Naming = effect_at) -> str:
+        return f"takes that were kept back are less likely with it, by {self.by:.0f} nats"
+
+
+@dataclass(frozen=True)
+class RefutedByRegister(Reason):
+    """What a servo's own register says of its parameter, and the standard error, in `unit`."""
+
+    parameter: str
+    value: float
+    error: float
+    unit: str
+
+    def said(self, naming: Naming = effect_at) -> str:
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{unit}"
+
+
 class Description(Statement):
     """What something that stays unexplained looks like."""
 
 
 @dataclass(frozen=True)
 class Dependence(Description):
-    """A channel's residual in a take, and what it goes with; None: with nothing that was looked at."""
+    """A channel's residual in a take, and what it goes with; None: with nothing that was looked at. worst: the event where it is
+    largest, in words."""
 
     take: str
     channel: str
     signal: Signal | None = None
     correlation: float = 0.0
+    worst: str = ""
 
     def said(self, naming: Naming = effect_at) -> str:
         what = (f"{self.channel}, " if self.channel in BODY else
                 f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
         goes = "nothing tried" if self.signal is None else f"{self.signal} (correlation {self.correlation:.2f})"
-        return f"{self.take}: {what}goes with {goes}"
+        return f"{self.take}: {self.worst}{'; ' if self.worst else ''}{what}goes with {goes}"
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
-"""Rolls models out on every take, over both cores, and weighs what they leave."""
+"""Rollouts of models on every take, in batches and remembered, and the chi squared of their residuals."""
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +15,7 @@ from workbench.effects.registry import known_effects
 from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
+from workbench.identify.rollout_key import take_key
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
@@ -38,8 +38,9 @@ class RolloutRequest:
 
 
 class RolloutEvaluator:
-    """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
-    answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
+    """Rolls models out on the session's takes and evaluates the residuals. memory: folder in which every result is kept, so that
+    a killed run resumes; results are the same with and without. work: seconds of a puppy's rollouts requested so far, at the
+    search's step."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | None = None) -> None:
@@ -50,6 +51,7 @@ class RolloutEvaluator:
         self.rollouts = 0
         self.work = 0.0
         self._known: dict[str, NDArray[np.float32]] = {}
+        self._take_keys: dict[int, str] = {}
 
     def residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
@@ -200,10 +202,11 @@ class RolloutEvaluator:
         return model if len(felt) == len(model.effects) else replace(model, effects=felt)
 
     def _key(self, felt: RobotModel, take: int, q: RolloutRequest) -> str:
-        played = self.evidence[take].take.commands
-        goals = "" if played is None else hashlib.sha256(played.goals.tobytes()).hexdigest()[:8]
+        if take not in self._take_keys:
+            self._take_keys[take] = take_key(self.evidence[take], replace(self.config, base=self.evidence[take].take.spec.base))
         until = self._until(take, q)
-        return f"{felt.sha256[:20]}-{take}-{goals}-{q.step:g}" + ("" if np.isinf(until) else f"-until{until:.6g}")
+        late = "" if np.isinf(until) else f"-until{until:.6g}"
+        return f"{felt.sha256[:20]}-{self._take_keys[take][:20]}-{q.step:g}{late}"
 
     def _until(self, take: int, q: RolloutRequest) -> float:
         """How long a question looks at a take [s]."""

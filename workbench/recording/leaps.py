@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.log_state import resolution
+from workbench.recording.log_state import count_of, resolution
 
 Array = NDArray[np.float64]
 TURN = 2 * np.pi
@@ -34,7 +34,8 @@ def without_leaps(time: Array, position: Array) -> tuple[Array, list[str]]:
     part = np.concatenate([[0], np.cumsum(leaps)])  # (seen,) which stretch between leaps
     offset = np.concatenate([[0.0], np.cumsum(steps[leaps])])  # of each stretch against the first
     offset -= offset[_main(position[seen], part, offset)]
-    wrap = 65536 * resolution(position[seen])
+    count = count_of(position[seen][np.isin(part, np.flatnonzero(np.abs(offset) < _OFF + _JITTER))])
+    wrap = 65536 * (count if np.isfinite(count) else resolution(position[seen]))
     out, said = position.copy(), _Said(time, position)
     short = max(_ASTRAY, len(seen) // 50)
     for k, jump in enumerate(offset):

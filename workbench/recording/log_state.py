@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from workbench.recording.recording import Recording
 
 Array = NDArray[np.float64]
+_FEW_STEPS = 10  # that tell no count
 _SPAN = 0.03
 """Of positions from which a velocity is told where a log tells none [s]."""
 
@@ -24,6 +25,20 @@ def resolution(values: Array) -> float:
     steps = np.abs(np.diff(values[np.isfinite(values)]))
     steps = steps[steps > 1e-9]
     return float(steps.min()) if len(steps) else 0.0
+
+
+def count_of(values: Array, off: float = 0.02) -> float:
+    """The number of which all steps between values (N,) are whole multiples, to `off` of it in the median: one count of a sensor,
+    finer than `resolution` tells of values that were rounded when written. NaN where there is none that is certain."""
+    steps = np.diff(np.unique(values[np.isfinite(values)]))
+    steps = steps[steps > 1e-3 * np.max(steps, initial=0.0)]
+    if len(steps) < _FEW_STEPS:
+        return float("nan")
+    count = float(steps.min())
+    for _ in range(3):  # as the multiples say, the larger the better
+        count = float(np.sum(steps) / np.sum(np.round(steps / count)))
+    away = np.abs(steps / count - np.round(steps / count))
+    return count if np.all(away < 5 * off) and np.median(away) < off else float("nan")
 
 
 def state_at(recording: Recording, joints: Sequence[str], time: float) -> tuple[Array, Array] | None:

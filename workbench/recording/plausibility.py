@@ -137,9 +137,9 @@ def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
 
 
 def _comes_to(goal: float, position: Array) -> bool:
-    """Whether a joint moves to a goal that stands, as in a step."""
-    way = np.abs(position - goal)
-    return bool(way[-1] < 0.3 * way.max() or way[-1] < np.deg2rad(5))
+    """Whether a joint moves to a goal that stands, as in a step, and does not go to and fro."""
+    way, travelled = np.abs(position - goal), float(np.abs(np.diff(position)).sum())
+    return bool((way[-1] < 0.3 * way.max() or way[-1] < np.deg2rad(5)) and travelled < 3 * np.ptp(position))
 
 
 def _standing(r: Recording, c: LogChecks) -> Iterator[str]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from os import PathLike
 
+_LONGEST = 1000
+"""Letters of a problem; what a library says of a damaged file may go on for pages."""
+
 
 class InputError(ValueError):
     """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with
@@ -12,6 +15,8 @@ class InputError(ValueError):
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
         self.source = None if source is None else "".join(c if c.isprintable() else repr(c)[1:-1] for c in str(source))
         self.problem = " ".join("".join(c if c.isprintable() or c.isspace() else repr(c)[1:-1] for c in str(problem)).split())
+        if len(self.problem) > _LONGEST:
+            self.problem = f"{self.problem[:_LONGEST]}..."
         super().__init__(f"{self.source}: {self.problem}" if self.source else self.problem)
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str | None, str]]:

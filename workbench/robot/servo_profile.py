@@ -145,6 +145,7 @@ class ServoProfile:
         return min(max(round(rate / self.speed_unit), 1), self.largest_speed)
 
     def constants(self) -> ServoConstants:
-        """The nominal law of a servo nobody measured."""
+        """The nominal law of a servo nobody measured, and how well it is known."""
         keys: dict[str, Any] = dict.fromkeys(LAW_KEYS)
-        return ServoConstants(model=self.name, **keys | {k: u.value for k, u in self.nominal.items()})
+        return ServoConstants(model=self.name, **keys | {k: u.value for k, u in self.nominal.items()},
+                              sd=tuple((k, u.sd) for k, u in self.nominal.items()))

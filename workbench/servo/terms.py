@@ -29,11 +29,11 @@ class Instant:
 
 @dataclass(frozen=True)
 class TermNumbers:
-    """A term in numbers, by which it can be computed elsewhere than here. ceiling (n,) [N m]; sag [V] lost for each servo at full
-    duty; fade [1/s]; sticking (n,) [N m] more friction at rest, fading as exp(-(w / speed)^2), speed [rad/s]; rubbing (n,):
-    friction by load, rubbing_still (n,) more at rest, fading likewise by rubbing_speed [rad/s], rubbing_backwards (n,) more where
-    the load drives the motor; bend (n,) [1/(N m)]: one over the torque at which the motor saturates; lopsided (n,): share by which
-    friction is more forwards and less backwards."""
+    """A term in numbers, by which it can be computed elsewhere than here. ceiling (n,) [N m]; sag [V] lost for each servo at
+    full duty; fade [1/s]; sticking (n,) [N m] more friction at rest, fading as exp(-(w / speed)^2), speed [rad/s]; rubbing
+    (n,): friction by load, rubbing_still (n,) more at rest, fading likewise by rubbing_speed [rad/s], rubbing_backwards (n,)
+    more where the load drives the motor; bend (n,) [1/(N m)]: one over the torque at which the motor saturates; lopsided (n,):
+    share by which friction is more forwards and less backwards."""
 
     ceiling: Array | None = None
     sag: float = 0.0

@@ -22,6 +22,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
+from workbench.view.demo_gait import gait_section
 from workbench.view.figures import body_attitude, body_path, by_joint, film_strip, footfalls, joint_grid, joint_torques, stance_of
 from workbench.view.report.comparison import headline, take_section
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
@@ -43,7 +44,7 @@ THESIS: tuple[Row, ...] = (
 _HEADER = ["six seconds of the ROBOTIS walk", "x [cm]", "y, up [cm]", "z, right [cm]"]
 _SUMMARY = (
     "The ROBOTIS walk, played by the servo law from the firmware's own table and followed exactly by ideal joints, in point "
-    "and in hydroelastic contact; then against a bundled recording, and turned into the robot's firmware tables.")
+    "and in hydroelastic contact; then against a bundled recording, and turned into the robot's firmware tables; and a new gait.")
 _SYNTHETIC = (
     "The recording is **synthetic**: the same robot in another engine (MuJoCo), filmed as a motion capture system would. Nothing "
     "is hidden in it, so what differs is the engine, the capture's noise, and what walking makes of both.")
@@ -85,6 +86,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     for compared in comparison.takes:
         report.add(take_section(compared, session.model, folder / f"replay-{compared.name}-recorded.html"))
     report.add(_firmware_section(motion, folder / "firmware", violations))
+    report.add(gait_section(folder / "gait", model, progress))
     return Demo(_as_text(rows), headline(comparison), report.write(folder / "report.html"), comparison)
 
 

@@ -6,10 +6,10 @@ import math
 from pathlib import Path
 
 import numpy as np
-from workbench.recording.formats.registry import RecordingFormat
 
 from workbench.recording import Recording
 from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.registry import RecordingFormat
 from workbench.robot import InputError
 
 FIRST = b"ticks of "

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, Parameter
+from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
+
+LEAST_DUTY, MOST_DUTY = 0.05, 0.9
+"""Between them a law's steepness shows: less drowns in the counts of position, more may be cut."""
+COUNTS = 0.01
+"""Standard error that no register of duty goes below: it is read some milliseconds from the position."""
 
 
 class ServoGain(Effect):
@@ -27,6 +32,19 @@ class ServoGain(Effect):
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (1.0,)
+
+    def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
+        """The register of duty over what the nominal law does at the logged error."""
+        ratios = []
+        for log in logs:
+            for joint in where:
+                if joint not in log.duty or joint not in log.nominal_duty:
+                    continue
+                duty, nominal = log.duty[joint], log.nominal_duty[joint]
+                good = np.isfinite(duty) & np.isfinite(nominal) & (np.abs(nominal) > LEAST_DUTY) & (np.abs(nominal) < MOST_DUTY)
+                if good.sum() > 50:
+                    ratios.append(float(duty[good] @ nominal[good] / (nominal[good] @ nominal[good])))
+        return mean_of_logs(ratios, COUNTS)
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         gain = law.gain.copy()

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, Parameter, scalar
+from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
 
 Array = NDArray[np.float64]
+LEAST_DRAWN = 0.3
+"""By which the sum of duties has to change for a log's voltage to tell a sag."""
+COUNT = 0.05
+"""Standard error [V] that no register of voltage goes below: half of its steps of 0.1 V."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,18 @@ class SupplySag(Effect):
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The supply drops by {scalar(spec, 'drop'):.2f} V for each servo at full duty."
+
+    def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
+        """How the register of voltage falls with what all servos' duties sum up to."""
+        drops = []
+        for log in logs:
+            if log.voltage is None or not log.duty:
+                continue
+            drawn = np.abs(np.column_stack(list(log.duty.values()))).sum(axis=1)
+            good = np.isfinite(drawn) & np.isfinite(log.voltage)
+            if good.any() and np.ptp(drawn[good]) > LEAST_DRAWN:
+                drops.append(-float(np.polyfit(drawn[good], log.voltage[good], 1)[0]))
+        return mean_of_logs(drops, COUNT)
 
     def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
         return _Sagging(values["drop"])

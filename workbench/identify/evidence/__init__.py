@@ -1,1 +1,2 @@
-"""Which physics is missing, by one likelihood: evidence of models whose discrepancy is estimated, one search, a posterior over names."""
+"""Which physics is missing, by one likelihood: evidence of models whose discrepancy is estimated, one search, a posterior over
+names."""

@@ -1,4 +1,5 @@
-"""A hypothesis about one region: its numbers that may be recalibrated, the effects there, and what is believed before any data."""
+"""A hypothesis about one region: its numbers that may be recalibrated, the effects there, and what is believed before any
+data."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ from workbench.identify.parameters import Candidate
 from workbench.robot import EffectSpec
 
 Array = NDArray[np.float64]
-FAR = 6.0
-"""Standard deviations that a recalibrated number may go: beyond, the nominal model is of another servo."""
+FAR = 2.0
+"""Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 
@@ -28,8 +29,8 @@ def term_of(c: Candidate) -> Term:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the effects'
-    sizes (`Candidate`)."""
+    """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the
+    effects' sizes (`Candidate`)."""
 
     numbers: tuple[Uncertain, ...]
     effects: tuple[Candidate, ...]
@@ -81,8 +82,8 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Prior:
-    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Cauchy of sizes, half of it where they have one sign.
-    center (k,), scale (k,); normal, one_sided (k,)."""
+    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Cauchy of sizes, half of it where they have one
+    sign. center (k,), scale (k,); normal, one_sided (k,)."""
 
     center: Array
     scale: Array

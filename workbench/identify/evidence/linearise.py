@@ -17,8 +17,8 @@ from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
 AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
-"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows nothing
-until it is met."""
+"""Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
+nothing until it is met."""
 SHAPES = (0.0, 2.0, -2.0)
 """Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
@@ -38,7 +38,8 @@ class Move:
 
 @dataclass(frozen=True)
 class _Probe:
-    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that leaves."""
+    """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that
+    leaves."""
 
     candidate: Candidate
     x: Array
@@ -65,9 +66,7 @@ def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list
     for (c, x, k), r in zip(asked, left):
         shape = tuple(np.delete(x, k).round(6)) if k >= 0 else ()
         ways.setdefault((c.name, c.where, c.options, k, shape), []).append(_Probe(c, x, k, r))
-    moves = [_foretold(region, options, f, probe.candidate, probe.moved, x, r)
-             for along in ways.values() for probe in along[:1] for x, r in _on_lines(f, along)]
-    return best_of_each(moves)
+    return best_of_each([_best_along(region, options, f, along) for along in ways.values()])
 
 
 def best_of_each(moves: Sequence[Move]) -> list[Move]:
@@ -87,10 +86,11 @@ def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequenc
         (two,) = b.added
         h = a.hypothesis.with_effect(two, b.hypothesis.theta[len(b.hypothesis.theta) - two.size:])
         J = np.column_stack([a.J, b.J[:, b.J.shape[1] - two.size:]])
-        led = np.arange(len(h.theta)) < len(f.hypothesis.theta)
-        back = a.J[:, :len(f.hypothesis.theta)] @ (b.hypothesis.theta - a.hypothesis.theta)[:len(f.hypothesis.theta)]
+        n = len(f.hypothesis.theta)
+        led = np.arange(len(h.theta)) < n
+        back = a.J[:, :n] @ (b.hypothesis.theta[:n] - f.hypothesis.theta)
         r = a.r + (b.r - f.r) - back  # b as it is with the other numbers where a has them
-        out.append(_led(region, options, f, h, r, J, led, (*a.added, two)))
+        out.append(_judged(region, options, f, *_led(region, options, f, h, r, J, led), (*a.added, two)))
     return out
 
 
@@ -155,8 +155,17 @@ def _on_lines(f: Fitted, along: Sequence[_Probe]) -> list[tuple[Array, Array]]:
     return out
 
 
-def _foretold(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> Move:
-    """A candidate at sizes x that leave r."""
+def _best_along(region: Region, options: EvidenceOptions, f: Fitted, along: Sequence[_Probe]) -> Move:
+    """The best move along one way of a candidate."""
+    c, k, s = along[0].candidate, along[0].moved, f.discrepancy
+    led = [_led(region, options, f, *_at(f, c, k, x, r)) for x, r in _on_lines(f, along)]
+    prior = Prior.of(led[0][0], options)
+    best = max(led, key=lambda m: region.likelihood.log(m[1], s) + prior.log(m[0].theta))
+    return _judged(region, options, f, *best, (c,))
+
+
+def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis, Array, Array, NDArray[np.bool_]]:
+    """A candidate at sizes x that leave r: with that, slopes, and which numbers may be led after it."""
     h = f.hypothesis.with_effect(c, x)
     J, led = slopes_for(f, h)
     if c.size:
@@ -164,12 +173,12 @@ def _foretold(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate,
         moved = k if k >= 0 else 0
         J[:, own.start + moved] = (r - f.r) / (x[moved] if abs(x[moved]) > 1e-6 else 1.0)
         led[own] = False
-    return _led(region, options, f, h, r, J, led, (c,))
+    return h, r, J, led
 
 
-def _led(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_],
-         added: tuple[Candidate, ...]) -> Move:
-    """A move with the numbers that the fit had led after it on lines."""
+def _led(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
+         ) -> tuple[Hypothesis, Array, Array]:
+    """A hypothesis with the numbers that the fit had led after it on lines, what that leaves, and slopes."""
     prior = Prior.of(h, options)
     precision = region.likelihood.precision(r, f.discrepancy)
     theta, left = h.theta.copy(), r
@@ -180,5 +189,9 @@ def _led(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: 
         low, high = h.bounds()
         theta[led] = np.clip(theta[led] + step, low[led], high[led])
         left = r + G @ (theta - h.theta)[led]
-    then = judged(region, options, h.at(theta), left, J)
-    return Move(then.hypothesis, left, J, then.log_posterior - f.log_posterior, added)
+    return h.at(theta), left, J
+
+
+def _judged(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, added: tuple[Candidate, ...]
+            ) -> Move:
+    return Move(h, r, J, judged(region, options, h, r, J).log_posterior - f.log_posterior, added)

@@ -7,18 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.effects.registry import estimated_by
+from workbench.identify.findings import Recalibrated
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)
-"""Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on it by
-eye."""
+"""Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
+it by eye."""
 
 
 @dataclass(frozen=True)
 class Uncertain:
-    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations make
-    it nominal · exp(sd z), and a zero of sd z."""
+    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
+    make it nominal · exp(sd z), and a zero of sd z."""
 
     joint: str
     name: str
@@ -28,29 +29,15 @@ class Uncertain:
         return f"{self.name}({self.joint})"
 
 
-@dataclass(frozen=True)
-class Recalibrated:
-    """What a number became: nominal and fitted values, in `unit`; sigmas: standard deviations of what was known that it went."""
-
-    number: Uncertain
-    nominal: float
-    value: float
-    sigmas: float
-    unit: str
-
-    def to_json(self) -> dict[str, object]:
-        return {"number": self.number.name, "where": [self.number.joint], "nominal": self.nominal, "value": self.value,
-                "sd": self.number.sd * (self.nominal or 1.0), "sigmas": self.sigmas, "unit": self.unit}
-
-
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
          "reflected_inertia": "kg m^2", ZERO: "rad"}
-"""The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells apart."""
+"""The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
+apart."""
 
 
 def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncertain]:
-    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log tells
-    a zero."""
+    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
+    tells a zero."""
     servo = model.servo(joint)
     shares = {
         "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),
@@ -66,13 +53,13 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     zeros: list[EffectSpec] = []
     for number, by in z.items():
         if number.name == ZERO:
-            zeros += [_turned_horn(number.joint, number.sd * by)] if by else []
+            zeros += [turned_horn(number.joint, number.sd * by)] if by else []
         else:
             servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
     return replace(model, servos=servos, effects=(*model.effects, *zeros))
 
 
-def _turned_horn(joint: str, angle: float) -> EffectSpec:
+def turned_horn(joint: str, angle: float) -> EffectSpec:
     """The effect that turns a joint's zero by `angle` [rad]."""
     effect, *_ = estimated_by("turn about an axis")
     (p,) = effect.parameters
@@ -85,7 +72,7 @@ def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recal
     for number, by in z.items():
         nominal = 0.0 if number.name == ZERO else _nominal(model.servo(number.joint), number.name)
         value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number, nominal, value, float(by), UNITS[number.name]))
+        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
     return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
 
 

@@ -10,23 +10,25 @@ class EvidenceOptions:
     """Defaults hold for all robots; none was set on a session.
 
     The likelihood. tails: degrees of freedom of Student's t, so that a few events (an arm that sticks) do not decide; 4 is the
-    usual choice for robust regression (K. Lange et al., JASA 84, 1989). least_discrepancy, most_discrepancy [rad]: between them its
-    size is looked for, from a tenth of a servo's count to a lost arm. window: of the autocorrelation, in correlation times (A. Sokal,
-    1997, section 3: 5).
+    usual choice for robust regression (K. Lange et al., JASA 84, 1989). least_discrepancy, most_discrepancy [rad]: between them
+    its size is looked for, from a tenth of a servo's count to a lost arm. window: of the autocorrelation, in correlation times
+    (A. Sokal, 1997, section 3: 5).
 
-    The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak prior
-    with heavy tails); doublings: standard deviation of a number that only shapes an effect, a factor of four either way. expected:
-    effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having searched many.
+    The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
+    prior with heavy tails); doublings: standard deviation of a number that only shapes an effect, a factor of four either way.
+    expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having
+    searched many.
 
-    The search. stride, fine_stride: of differences, in standard deviations of the prior or typical sizes: stick and slip answers
-    smaller ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that are extended;
-    refined: moves that are fitted in each; paired: of the best moves, those that are also tried two at a time. most: effects of one
-    joint. stop [nats]: gain in log posterior below which the search ends, a third more likely.
+    The search. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip answers smaller
+    ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that
+    are extended; refined: moves that are fitted in each; paired: of the best moves, those that are also tried two at a time.
+    most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit sees
+    all. stop [nats]: gain in log posterior below which the search ends, a third more likely.
 
-    The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a factor of
-    twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an effect to take
-    it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name. told: probability from which on
-    an effect is named.
+    The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
+    factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
+    effect to take it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name, and
+    refuted: the share of an effect's typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -37,15 +39,15 @@ class EvidenceOptions:
     doublings: float = 2.0
     expected: float = 2.0
     stride: float = 0.15
-    fine_stride: float = 0.04
     iterations: int = 5
     polish: int = 4
     beam: int = 3
     refined: int = 5
     paired: int = 4
     most: int = 6
+    seconds: float = 100.0
     stop: float = 0.3
     occam: float = 7.0
     veto: float = 3.0
     sure: float = 3.0
-    told: float = 0.2
+    refuted: float = 0.3

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.likelihood import Likelihood, correlation_time
+from workbench.identify.evidence.logs import residuals_of
 from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
@@ -29,8 +30,8 @@ LOST = 1.0
 
 @dataclass(frozen=True)
 class Part:
-    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording; scale
-    (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
+    """Of one take (index): rows (N,): frames that count; columns: of its channels; seen (rows, c): where there is a recording;
+    scale (c,) or (rows, c): of the take's residuals [rad]; every: one frame in so many; span: time that each stands for [s]."""
 
     take: int
     rows: Mask
@@ -53,7 +54,7 @@ class Part:
         """By channel at even times, NaN where unseen; r (n,)."""
         values = np.full(self.seen.shape, np.nan)
         values[self.seen] = r
-        whole = np.full((len(self.rows), values.shape[1]), np.nan)
+        whole = np.full((len(self.rows), len(self.columns)), np.nan)
         whole[self.rows] = values
         return list(whole[::self.every].T)
 
@@ -78,6 +79,10 @@ class Region:
         """Of which take each residual of `vector` is (n,)."""
         return np.concatenate([np.full(p.size, p.take) for p in self.parts])
 
+    def of(self, takes: Sequence[int]) -> Mask:
+        """Which residuals are of some takes (n,)."""
+        return np.asarray(np.isin(self.takes, takes))
+
     def measured(self, r: Array, options: EvidenceOptions) -> Region:
         """The region with the correlation time that residuals (n,) show; the largest are cut, as an event is none of it."""
         series, at = [], 0
@@ -89,7 +94,7 @@ class Region:
 
     def of_takes(self, takes: Sequence[int]) -> Region:
         """The same judged by some takes alone."""
-        mine = np.isin(self.takes, takes)
+        mine = self.of(takes)
         likelihood = replace(self.likelihood, known=self.likelihood.known[mine], span=self.likelihood.span[mine])
         return replace(self, parts=tuple(p for p in self.parts if p.take in takes), likelihood=likelihood)
 
@@ -101,7 +106,7 @@ def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: 
     for i, e in enumerate(evidence):
         columns = np.array([k for k, c in enumerate(e.channels) if c in joints], dtype=int)
         every = max(1, round(SPAN / e.frame_time))
-        rows = (e.uses["fit"] | e.uses["choose"]) & (np.arange(len(e.since)) % every == 0)
+        rows = (e.uses["fit"] | e.uses["choose"]) & (np.arange(len(e.since)) % every == 0) & (e.since <= e.until)
         if not len(columns) or not rows.any():
             continue
         seen = np.isfinite(e.recorded[rows][:, columns])
@@ -117,12 +122,14 @@ def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: 
 
 @dataclass(frozen=True)
 class Rollouts:
-    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at."""
+    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
+    step: in steps of the search."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
     regions: tuple[Region, ...]
     standing: tuple[Hypothesis, ...]
+    step: float = 1.0
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""
@@ -142,10 +149,10 @@ class Rollouts:
             here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
             hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
             takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
-            questions.append(RolloutRequest(self.model(hypotheses), takes))
+            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
             shared.append(here)
         out: list[Array] = [np.empty(0)] * len(wants)
-        for here, residuals in zip(shared, self.evaluator.residuals(questions)):
+        for here, residuals in zip(shared, residuals_of(self.evaluator, questions)):
             for region, k in here.items():
                 out[k] = self.regions[region].vector(residuals)
         return out

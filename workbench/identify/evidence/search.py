@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, without
-from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
+from workbench.identify.evidence.hypothesis import Term, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, slopes_for
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region, Rollouts
 from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
 Key = frozenset[Term]
@@ -23,8 +24,7 @@ Report = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class Found:
-    """What the search of one region fitted, by which effects there are, and which of these are as good as any more could make them
-    (extended)."""
+    """What the search of one region fitted, by which effects there are, and which of these were extended by all others."""
 
     region: Region
     fits: Mapping[Key, Fitted]
@@ -35,6 +35,11 @@ class Found:
         """The likeliest fit."""
         return max(self.fits.values(), key=lambda f: f.log_posterior)
 
+    def goes_on(self, options: EvidenceOptions) -> bool:
+        """Whether the likeliest fit may have a better one beyond it: it was not extended yet."""
+        best = self.best.hypothesis
+        return best.key not in self.extended and len(best.effects) < options.most
+
     def beam(self, options: EvidenceOptions) -> list[Fitted]:
         """The likeliest fits, few enough to go on with."""
         return sorted(self.fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
@@ -44,27 +49,26 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
     """Searches all regions side by side, level by level; returns them with what stands in each."""
     regions = rollouts.regions
     report("the nominal law recalibrated", None)
-    first = _side_by_side(rollouts, [_begun(r, options) for r in regions])
+    first = _all_of(rollouts, [_begun(r, options) for r in regions])
     found = [Found(r, {f.hypothesis.key: f}) for r, f in first]
-    rollouts = _standing(rollouts, found)
+    rollouts = standing(rollouts, found)
     open_ = set(range(len(regions)))
     for level in range(options.most + 1):
         report(f"effects, level {level + 1}", level / (options.most + 1))
-        before = [f.best.log_posterior for f in found]
         levels = {i: _level(found[i], options) for i in sorted(open_)}
-        found = _replaced(found, _lockstep(rollouts, levels))
-        rollouts = _standing(rollouts, found)
+        found = _replaced(found, lockstep(rollouts, levels))
+        rollouts = standing(rollouts, found)
         again = {i: _renewed(found[i], options) for i in range(len(found))}  # other joints moved, and what is left is shorter
-        found = _replaced(found, _lockstep(rollouts, again))
-        open_ = {i for i in open_ if found[i].best.log_posterior > before[i] + options.stop or not _all_extended(found[i], options)}
-        open_ = {i for i in open_ if len(found[i].best.hypothesis.effects) < options.most}
+        found = _replaced(found, lockstep(rollouts, again))
+        rollouts = standing(rollouts, found)
+        open_ = {i for i in open_ if found[i].goes_on(options)}
         if not open_:
             break
     report("taking effects out, and others in their place", None)
-    found = _replaced(found, _lockstep(rollouts, {i: _exchanged(found[i], options) for i in range(len(found))}))
-    rollouts = _standing(rollouts, found)
-    found = _replaced(found, _lockstep(rollouts, {i: _renewed(found[i], options) for i in range(len(found))}))
-    return _standing(rollouts, found), tuple(found)
+    found = _replaced(found, lockstep(rollouts, {i: _exchanged(found[i], options) for i in range(len(found))}))
+    rollouts = standing(rollouts, found)
+    found = _replaced(found, lockstep(rollouts, {i: _renewed(found[i], options) for i in range(len(found))}))
+    return standing(rollouts, found), tuple(found)
 
 
 def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitted]]:
@@ -91,10 +95,10 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from _each([_moved(region, options, f, m) for f, m in wanted.values()])
+    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
-    better = yield from _each([polished(region, options, f, options.polish) for f in ahead])
+    better = yield from side_by_side([polished(region, options, f, options.polish) for f in ahead])
     fits |= {f.hypothesis.key: max(f, fits[f.hypothesis.key], key=lambda g: g.log_posterior) for f in better}
     return Found(region, fits, frozenset(extended))
 
@@ -106,11 +110,11 @@ def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks
 
 
 def _renewed(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """All fits within reach of the best judged anew, as other regions stand now, by the correlation time that the best leaves."""
+    """All fits within reach of the best judged anew, as other regions stand now, by the correlation time that the closest of them
+    leaves: what a poorer model leaves is correlated because it lacks something."""
     near = [f for f in found.fits.values() if f.log_posterior > found.best.log_posterior - 3 * options.occam]
     left = yield [f.hypothesis for f in near]
-    best = found.best.hypothesis.key
-    r = next(x for f, x in zip(near, left) if f.hypothesis.key == best)
+    r = min(left, key=found.region.likelihood.discrepancy)
     region = found.region.measured(r, options)
     fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)
@@ -127,7 +131,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
         alone = yield from linearised(region, options, best)
         fewer = [_dropped(region, options, best, c.name) for c in best.hypothesis.effects
                  if best.hypothesis.without(lambda o, c=c: o.name == c.name).key not in fits]
-        made = yield from _each(fewer)
+        made = yield from side_by_side(fewer)
         fits |= {f.hypothesis.key: f for f in made}
         swaps: list[tuple[Fitted, Move]] = []
         for c in best.hypothesis.effects:
@@ -148,7 +152,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
                 there = judged(region, options, h, r, J)
                 swaps.append((rest, Move(h, r, J, there.log_posterior - best.log_posterior, (new,))))
         swaps.sort(key=lambda fm: -fm[1].gain)
-        made = yield from _each([_moved(region, options, f, m) for f, m in swaps[:options.refined]])
+        made = yield from side_by_side([_moved(region, options, f, m) for f, m in swaps[:options.refined]])
         fits |= {f.hypothesis.key: f for f in made}
         ahead = max(fits.values(), key=lambda f: f.log_posterior)
         if ahead.log_posterior <= before + options.stop:
@@ -161,42 +165,26 @@ def _dropped(region: Region, options: EvidenceOptions, f: Fitted, name: str) -> 
     return (yield from fitting(region, options, h, f.discrepancy, options.iterations, None, J))
 
 
-def _all_extended(found: Found, options: EvidenceOptions) -> bool:
-    return all(f.hypothesis.key in found.extended for f in found.beam(options)[:1])
-
-
-def _each(parts: Sequence[Asks[Any]]) -> Asks[list[Any]]:
-    """Several fits of a region side by side, as one."""
-    done: dict[int, Any] = {}
-    wants: dict[int, list[Hypothesis]] = {}
-
-    def advance(k: int, sent: list[Array] | None) -> None:
-        try:
-            wants[k] = next(parts[k]) if sent is None else parts[k].send(sent)
-        except StopIteration as end:
-            wants.pop(k, None)
-            done[k] = end.value
-
-    for k in range(len(parts)):
-        advance(k, None)
-    while wants:
-        answers = iter((yield [h for wanted in wants.values() for h in wanted]))
-        for k, wanted in list(wants.items()):
-            advance(k, [next(answers) for _ in wanted])
-    return [done[k] for k in range(len(parts))]
-
-
-def _lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
+def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
     """What generators of several regions return; their rollouts are shared."""
     return together(dict(parts), lambda wanted: rollouts.answers([(i, h) for i, h in wanted]))
 
 
-def _side_by_side(rollouts: Rollouts, parts: Sequence[Generator[Any, Any, Any]]) -> list[Any]:
-    done = _lockstep(rollouts, dict(enumerate(parts)))
+def _all_of(rollouts: Rollouts, parts: Sequence[Generator[Any, Any, Any]]) -> list[Any]:
+    done = lockstep(rollouts, dict(enumerate(parts)))
     return [done[i] for i in range(len(parts))]
 
 
-def _standing(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
+def without_names(found: Found, gone: Collection[Candidate]) -> Found:
+    """Without all fits that have one of these effects, which are not to be looked at again."""
+    names = {(c.name, c.where) for c in gone}
+    fits = {key: f for key, f in found.fits.items() if not any((c.name, c.where) in names for c in f.hypothesis.effects)}
+    region = replace(found.region, candidates=tuple(c for c in found.region.candidates if (c.name, c.where) not in names))
+    return replace(found, region=region, fits=fits)
+
+
+def standing(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
+    """With the best of what was found standing in each region."""
     return replace(rollouts, regions=tuple(f.region for f in found), standing=tuple(f.best.hypothesis for f in found))
 
 

@@ -39,7 +39,7 @@ def refusal(path: Path, head: bytes) -> InputError:
     more = f" and {len(cells) - _SHOWN} more" if len(cells) > _SHOWN else ""
     text = f"line 1: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected time [s], " \
            f"goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
-    renames = [f"{c} to {new}" for c in cells if (new := _renamed(c)) and new != c]
+    renames = [f"{c[:40]} to {new[:50]}" for c in cells if (new := _renamed(c)) and new != c]
     if renames:
         rest = f" and so on ({len(renames) - 3} more)" if len(renames) > 3 else ""
         text += f"; rename {', '.join(renames[:3])}{rest}, in seconds and degrees"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
+from workbench.recording.log_state import count_of
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
 from workbench.robot.files import read_json, regular_file
@@ -29,8 +30,7 @@ MOST = 512 << 20
 """Largest file [bytes]."""
 _ACTION, _STATE, _TIME, _EPISODE = "action", "observation.state", "timestamp", "episode_index"
 _CLEAN = 0.02
-"""Of a count: how far steps may be from whole counts, for the count to be certain."""
-_FEW = 10  # steps that tell no count
+"""Of a count: how far it may be from 360/4096 deg for angles in degrees."""
 
 
 def read_lerobot(path: Path, episode: str | None = None) -> Recording:
@@ -137,7 +137,7 @@ def _names(path: Path, count: int) -> tuple[str, ...]:
 
 def _scales(joints: tuple[str, ...], positions: Array) -> tuple[Array, list[str]]:
     """Degrees for each unit (n,), by each joint's count, and what there is to say of them."""
-    counts = np.array([_count(p) for p in positions.T])
+    counts = np.array([count_of(np.round(p, 5)) for p in positions.T])
     known = np.isfinite(counts)
     if not known.any():
         return np.ones(len(joints)), ["the file does not say the unit of angles, and shows no sensor's count; taken as degrees"]
@@ -150,19 +150,6 @@ def _scales(joints: tuple[str, ...], positions: Array) -> tuple[Array, list[str]
         lost = ", ".join(j for j, k in zip(joints, known) if not k)
         out.append(f"{lost}: no sensor's count is seen; taken as degrees")
     return np.where(known, COUNT / np.where(known, counts, 1.0), 1.0), out
-
-
-def _count(position: Array) -> float:
-    """The number of which all steps of a position (N,) are whole multiples; NaN where there is none that is certain."""
-    steps = np.abs(np.diff(np.unique(np.round(position, 5))))
-    steps = steps[steps > 1e-3]
-    if len(steps) < _FEW:
-        return float("nan")
-    count = float(steps.min())
-    for _ in range(3):  # as the multiples say, the larger the better
-        count = float(np.sum(steps) / np.sum(np.round(steps / count)))
-    off = np.abs(steps / count - np.round(steps / count))
-    return count if np.all(off < 5 * _CLEAN) and np.median(off) < _CLEAN else float("nan")
 
 
 def matches(head: bytes) -> bool:

@@ -60,7 +60,7 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
     except InputError:
         raise
     except _DAMAGED as e:
-        raise InputError(source, f"damaged, or not an npz of number arrays: {e}") from None
+        raise InputError(source, f"damaged, or not an npz of number arrays: {str(e)[:200]}") from None
     if programme is not None and programme not in names:
         raise InputError(source, f"no programme '{programme}'; expected one of {', '.join(names)}")
     parts = [_npz_programme(source, fields, n) for n in ([programme] if programme is not None else names)]

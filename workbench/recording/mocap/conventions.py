@@ -22,18 +22,10 @@ _SHARE = 0.25
 
 def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
     """Tracks in metres with z up in the model's axes, as the robot's links say where the file's header is wrong; told."""
-    at = _first_places(tracks)
-    if len(at) < _LEAST or any(tracks.assets[i] not in model.rigid_bodies for i in at):
+    found = _laid_out(tracks, model)
+    if found is None:
         return tracks
-    poses = model.kinematics.forward(np.zeros((1, len(model.joints))))
-    nominal = []
-    for i in at:
-        link = model.rigid_bodies[tracks.assets[i]]
-        if link not in poses:
-            return tracks
-        p, R = poses[link]
-        nominal.append(p[0] + R[0] @ model.kinematics.centers.get(link, np.zeros(3)))
-    places, links = np.array(list(at.values())), np.array(nominal)
+    places, links = found
     problems = list(tracks.problems)
     factor = _power_of_ten(places, links)
     if factor != 1:
@@ -47,6 +39,39 @@ def conventional(tracks: Tracks, model: RobotModel) -> Tracks:
         problems.append("heights and links say that z is up in this export, not y; turned")
         p, q = _z_up(p), np.concatenate([q[..., :1], _z_up(q[..., 1:])], axis=-1)
     return replace(tracks, p=p, q=q, problems=tuple(problems)) if problems != list(tracks.problems) else tracks
+
+
+def layout_yaw(tracks: Tracks, model: RobotModel) -> float | None:
+    """The yaw [rad] of the robot's first heading in the capture's axes that its bodies' first places tell, to some degrees; None
+    where they are too few or lie in a line above each other."""
+    found = _laid_out(tracks, model)
+    if found is None:
+        return None
+    places, links = (p - p.mean(axis=0) for p in found)
+    spread = float(np.sqrt(np.mean(np.sum(links[:, :2] ** 2, axis=1))))
+    return -_turn(places, links) if spread > 0.02 else None
+
+
+def _laid_out(tracks: Tracks, model: RobotModel) -> tuple[Array, Array] | None:
+    """Where bodies were at first, and their links' centres of mass in the neutral pose, (A, 3) each; None where too few tell."""
+    at = _first_places(tracks)
+    if len(at) < _LEAST or any(tracks.assets[i] not in model.rigid_bodies for i in at):
+        return None
+    poses = model.kinematics.forward(np.zeros((1, len(model.joints))))
+    nominal = []
+    for i in at:
+        link = model.rigid_bodies[tracks.assets[i]]
+        if link not in poses:
+            return None
+        p, R = poses[link]
+        nominal.append(p[0] + R[0] @ model.kinematics.centers.get(link, np.zeros(3)))
+    return np.array(list(at.values())), np.array(nominal)
+
+
+def _turn(a: Array, b: Array) -> float:
+    """Angle about z [rad] that lays centred places a (A, 3) over b best."""
+    cosine, sine = float(np.sum(a[:, :2] * b[:, :2])), float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
+    return float(np.arctan2(sine, cosine))
 
 
 def _first_places(tracks: Tracks) -> dict[int, Array]:
@@ -78,8 +103,7 @@ def _power_of_ten(places: Array, links: Array) -> float:
 def _misfit(places: Array, links: Array) -> float:
     """RMS distance [m] of places from links (A, 3), laid over each other by a shift and a turn about z."""
     a, b = places - places.mean(axis=0), links - links.mean(axis=0)
-    cosine, sine = float(np.sum(a[:, :2] * b[:, :2])), float(np.sum(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
-    yaw = np.arctan2(sine, cosine)
+    yaw = _turn(a, b)
     c, s = np.cos(yaw), np.sin(yaw)
     turned = np.column_stack([c * a[:, 0] - s * a[:, 1], s * a[:, 0] + c * a[:, 1], a[:, 2]])
     return float(np.sqrt(np.mean(np.sum((turned - b) ** 2, axis=1))))

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.recording.mocap import quaternions as quat
+from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, relative_rotation, seen_joints, tracks_of, turned
+from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import InputError, RobotModel
 
@@ -54,7 +56,7 @@ def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Se
 
 def _prepared(recording: Recording, model: RobotModel) -> Tracks:
     check_assets(recording, model)
-    return tracks_of(recording)
+    return conventional(without_unseen(tracks_of(recording)), model)
 
 
 def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Commands | None], base: str = "free") -> YawEstimate:
@@ -64,7 +66,8 @@ def yaw_of(takes: Sequence[Tracks], model: RobotModel, commands: Sequence[Comman
         for joint in seen_joints(tracks, model, base)[0]:
             evidence += _axis_evidence(tracks, joint)
     if not evidence:
-        raise InputError(None, "yaw: no tracked joint turns by more than 2 degrees about a level axis; give the yaw")
+        raise InputError(None, "yaw: no tracked joint turns by more than 2 degrees about a level axis: the robot hardly "
+                               "moves in them, or was not seen; give the session's `yaw` [deg]")
     angle = np.array([e.angle for e in evidence])
     weight = 1 / np.array([e.variance for e in evidence])
     doubled = np.sum(weight * np.exp(2j * angle))  # directions, not vectors: mod pi

@@ -40,16 +40,32 @@ def drake_error(error: Exception) -> str:
     return " ".join(text.split())[:600]
 
 
+class _Errors(logging.Handler):
+    """Keeps what Drake logs as errors: values that its parser leaves out, without any exception."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.found: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.found.append(re.sub(r"^.*?Msg: ", "", record.getMessage()))
+
+
 @contextmanager
 def quiet_drake() -> Iterator[None]:
-    """Drake's warnings about a description are told as problems; its own lines would stand on stderr beside them."""
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.ERROR)
+    """Drake's warnings about a description are told as problems; its own lines would stand on stderr beside them. RuntimeError
+    where it logs an error and goes on."""
+    log, errors = logging.getLogger("drake"), _Errors()
+    passes = log.propagate
+    log.addHandler(errors)
+    log.propagate = False
     try:
         yield
     finally:
-        log.setLevel(level)
+        log.removeHandler(errors)
+        log.propagate = passes
+    if errors.found:
+        raise RuntimeError(errors.found[0])
 
 
 @cached_by_content(maxsize=32)

@@ -59,15 +59,16 @@ def _inertia_problems(path: Path, link: Element, moved: bool) -> list[str]:
     moments = np.zeros((3, 3))
     for i, k, tag in ((0, 0, "ixx"), (1, 1, "iyy"), (2, 2, "izz"), (0, 1, "ixy"), (0, 2, "ixz"), (1, 2, "iyz")):
         moments[i, k] = moments[k, i] = float(inertial.findtext(f"inertia/{tag}") or ("1" if i == k else "0"))
-    if mass == 0:
-        return []  # told of what it is fixed to, where that weighs nothing either
+    if mass == 0:  # that nothing weighs anything is told of all that is fixed together
+        odd = f"{name} has moments of inertia but no mass: Drake takes a ball of water of 1 kg instead"
+        return [odd] if moments.any() else []
     if not moments.any():
         return [f"{name} weighs {mass:g} kg and has no rotational inertia, as if it were a point"] if moved else []
     principal = np.sort(np.linalg.eigvalsh(moments))
     if principal[0] < 0 or principal[0] + principal[1] < principal[2] * (1 - 1e-7):
         listed = ", ".join(f"{p:.3g}" for p in principal)
         return [f"{name}: no body has principal moments of inertia of {listed} kg m^2 (each is at most the sum of the others); "
-                f"Drake takes a ball of water of {mass:g} kg about the link's origin instead"]
+                f"Drake takes a ball of water of {mass:g} kg about its centre of mass instead"]
     return []
 
 

@@ -76,8 +76,9 @@ def _inertial(out: Element, inertial: Element | None) -> None:
     _value(to, "pose", _pose(None if inertial is None else inertial.find("origin")))
     _value(to, "mass", "0" if mass is None else mass.get("value", "0"))
     inertia = SubElement(to, "inertia")
+    weightless = float(to.findtext("mass") or "0") == 0  # Drake would take 1 kg
     for key in _MOMENTS:
-        _value(inertia, key, "0" if moments is None else moments.get(key, "0"))
+        _value(inertia, key, "0" if moments is None or weightless else moments.get(key, "0"))
 
 
 def _shape(out: Element, shape: Element, name: str, colours: dict[str | None, Element], place: str, path: Path) -> None:

@@ -16,14 +16,17 @@ MOST_XML = 32 << 20
 MOST_DEPTH = 200
 DRAKE = "http://drake.mit.edu"
 
-_NUMBERS = {"mass", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "lower", "upper", "effort", "velocity", "damping", "friction",
-            "spring_stiffness", "spring_reference", "pose", "xyz", "size", "radius", "length", "scale", "mu", "mu2"}
-"""SDF's elements whose text is numbers."""
+_NUMBERS = {**dict.fromkeys(("mass", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "lower", "upper", "effort", "velocity", "damping",
+                             "spring_stiffness", "spring_reference", "radius", "length", "mu", "mu2"), (1,)),
+            "pose": (6, 7), "xyz": (3,), "size": (2, 3), "scale": (3,)}
+"""SDF's elements whose text is numbers, and how many (a pose with a quaternion has seven, a plane's size two)."""
 _ATTRIBUTES = {"mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "origin": ("xyz", "rpy"),
                "axis": ("xyz",), "limit": ("lower", "upper", "effort", "velocity"), "dynamics": ("damping", "friction"),
                "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "capsule": ("radius", "length"),
                "mesh": ("scale",), "color": ("rgba",)}
 """URDF's attributes that are numbers."""
+_COUNTS = {"rpy": (3,), "rgba": (4,), "friction": (1,)}
+_LARGEST, _SMALLEST = 1e12, 1e-300
 _ENDLESS = {"lower", "upper", "effort", "velocity"}
 """Which may be infinite."""
 
@@ -82,15 +85,21 @@ def check_numbers(path: Path, root: Element) -> None:
         if owner.tag not in ("link", "joint"):
             continue
         for element in owner.iter():
-            if element.tag in _NUMBERS and element.text and element.text.strip():
-                _check(path, owner, element.tag, element.text)
-            for key in _ATTRIBUTES.get(str(element.tag), ()):
+            if root.tag == "sdf" and element.tag in _NUMBERS and len(element) == 0:
+                _check(path, owner, str(element.tag), element.text or "")
+            for key in _ATTRIBUTES.get(str(element.tag), ()) if root.tag == "robot" else ():
                 if key in element.attrib:
                     _check(path, owner, key if key != "value" else element.tag, element.attrib[key])
 
 
 def _check(path: Path, owner: Element, what: str, text: str) -> None:
-    for word in text.split():
+    place = f"{owner.tag} '{owner.get('name', '')}': {what}"
+    words, counts = text.split(), _NUMBERS.get(what) or _COUNTS.get(what, (1,))
+    if len(words) not in counts:
+        raise InputError(path, f"{place}: expected {' or '.join(map(str, counts))} number(s), found {len(words)}")
+    for word in words:
         endless = what in _ENDLESS and word.lower().lstrip("+-") in ("inf", "infinity")
-        if number_of(word) is None and not endless:
-            raise InputError(path, f"{owner.tag} '{owner.get('name', '')}': {what}: expected finite numbers, found '{word[:40]}'")
+        value = number_of(word)
+        bad = value is None or abs(value) > _LARGEST or 0 < abs(value) < _SMALLEST
+        if bad and not endless and not (what in _ENDLESS and value is not None):
+            raise InputError(path, f"{place}: expected finite numbers of a usual size, found '{word[:40]}'")

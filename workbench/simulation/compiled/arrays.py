@@ -51,9 +51,9 @@ class Servos(NamedTuple):
 
     terms: whether there is anything beyond. varies: whether friction does. most (m,): the most friction. ceiling (m,).
     sag (a,): volts lost for each servo at full duty, by term; supply (m,) [V]. fade [1/s]. sticking (b, m), speed (b,):
-    friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it at
-    rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates. lopsided
-    (d, m): shares by which friction is more forwards, by term."""
+    friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it
+    at rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates.
+    lopsided (d, m): shares by which friction is more forwards, by term."""
 
     joint: Ints
     zero: Array

@@ -67,7 +67,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         rubbing = rubbing if t.rubbing is None else rubbing + t.rubbing
         backwards = backwards if t.rubbing_backwards is None else backwards + t.rubbing_backwards
         bend = bend if t.bend is None else bend + t.bend
-    still, lopsided = [t for t in numbers if t.rubbing_still is not None], [t.lopsided for t in numbers if t.lopsided is not None]
+    still = [t for t in numbers if t.rubbing_still is not None]
+    lopsided = [t.lopsided for t in numbers if t.lopsided is not None]
     sticking = [t for t in numbers if t.sticking is not None]
     most = most_friction(physics.terms, law)
     return Servos(
@@ -77,7 +78,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         ceiling=ceiling, sag=np.array([t.sag for t in numbers if t.sag]), supply=_array(law.full_torque / law.torque_per_volt),
         fade=float(sum(t.fade for t in numbers)), sticking=_array([t.sticking for t in sticking]).reshape(len(sticking), n),
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,
-        still=_array([t.rubbing_still for t in still]).reshape(len(still), n), still_speed=_array([t.rubbing_speed for t in still]),
+        still=_array([t.rubbing_still for t in still]).reshape(len(still), n),
+        still_speed=_array([t.rubbing_speed for t in still]),
         backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +30,7 @@ ENDED = {TOUCHED: "shapes touch that are no foot on the floor"}
 def covers(job: Job) -> str | None:
     """Why the compiled station cannot play this job; None where it can."""
     try:
-        _CompiledJob(job)
+        CompiledJob(job)
     except NotCoveredError as e:
         return str(e)
     return None
@@ -37,7 +38,7 @@ def covers(job: Job) -> str | None:
 
 def run_compiled(job: Job) -> Take:
     """The take of a job; NotCoveredError says why it has to be Drake's."""
-    compiled = _CompiledJob(job)
+    compiled = CompiledJob(job)
     if not is_compiled():
         logging.getLogger(__name__).warning("compiling the station, once for this version and machine (half a minute) ...")
     return compiled.take()
@@ -65,12 +66,15 @@ def _check(job: Job) -> None:
 
 @dataclass
 class _Plan:
+    """commands: as the servos hear them; heard_as_sent: whether that is as they were sent."""
+
     commands: Commands | None
     lead: float
     duration: float
+    heard_as_sent: bool
 
 
-class _CompiledJob:
+class CompiledJob:
     """A job with its arrays; made, it is covered, but for what only the run can tell."""
 
     def __init__(self, job: Job) -> None:
@@ -85,7 +89,8 @@ class _CompiledJob:
 
     def _plan(self) -> _Plan:
         job = self.job
-        commands = None if job.commands is None else played(job.commands.reordered(self.model.joints), self.model)
+        sent = None if job.commands is None else job.commands.reordered(self.model.joints)
+        commands = None if sent is None else played(sent, self.model)
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")
@@ -94,22 +99,36 @@ class _CompiledJob:
             raise NotCoveredError("a command before the run begins")
         if job.steadied is not None and not self.free:
             raise NotCoveredError("a held base that is put somewhere")
-        return _Plan(commands, lead, duration)
+        return _Plan(commands, lead, duration, commands is sent)
+
+    def of(self, job: Job) -> CompiledJob:
+        """Another job of the same model in the same configuration."""
+        _check(job)
+        other = copy(self)
+        other.job = job
+        other.plan = other._plan()
+        return other
 
     def take(self) -> Take:
         """Settles, plays, and reads the log; NotCoveredError where something touches that is no foot on the floor."""
+        plan = self.plan
+        schedule = schedule_of(self.config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
+        log = self.log(schedule)
+        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - plan.lead)
+
+    def log(self, schedule: Schedule) -> Log:
+        """Settles and plays; NotCoveredError as in `take`."""
         config, plan = self.config, self.plan
         state, work = self._rest(), work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
         stand(*self.machine, state, work)
         self._play(settling(config, len(self.model.joints)), state, self._log(0), work)
         if self.free:
             _centre(state)
-        schedule = schedule_of(config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
         if self.job.start is not None:
             self._put(Start(*self.job.start), state)
         log = self._log(rows_of(config, plan.lead + plan.duration))
         self._play(schedule, state, log, work)
-        return self._read(log, np.arange(len(log.q)) * config.logged_every - plan.lead)
+        return log
 
     def _play(self, schedule: Schedule, state: State, log: Log, work: Work) -> None:
         how = run(*self.machine, schedule, state, log, work)

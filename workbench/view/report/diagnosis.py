@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
+from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Recalibrated, Rejected
 from workbench.identify.options import PROBLEM
 from workbench.identify.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
@@ -93,6 +93,8 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
         report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
+    if diagnosis.recalibrated:
+        report.add(_recalibrated(diagnosis.recalibrated))
     if takes:
         report.add(_unseen(takes))
     report.add(_left(diagnosis))
@@ -118,6 +120,8 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
     what += [f"Take {name} was left out: {reason}" for name, reason in diagnosis.left_out]
+    if why := diagnosis.provenance.get("engine", {}).get("because"):
+        what.append(f"All rollouts are Drake's, as {why}.")
     if diagnosis.stopped:
         what.append("The search stopped at its limit of work, so not all that is left was looked into.")
     return " ".join(what)
@@ -209,7 +213,9 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         sure += f", or {title_of(a.effect, a.where)} {100 * a.confidence:.0f} %"
     if finding.tie:
         sure += f": {100 * finding.together:.0f} % for one of the two"
-    rows = [["how sure", sure], *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
+    f = finding.family
+    family = [] if f is None else [["of its family", f"{f.name}: {100 * f.confidence:.0f} %"]]
+    rows = [["how sure", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
     shown = _best_view(finding, takes, drawn, others)
@@ -223,6 +229,15 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         parts.append(Text("Tried in its place, and rejected:"))
         parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
+
+
+def _recalibrated(numbers: Sequence[Recalibrated]) -> Section:
+    """Of the nominal law, within what was known of it."""
+    rows = [[r.number.replace("_", " "), listed(r.where), f"{r.nominal:.4g}", f"{r.value:.4g}", unbroken(r.unit),
+             f"{r.sigmas:+.1f}"] for r in numbers]
+    said = "Numbers of the nominal law that were known only so well. Using them otherwise within that is no finding."
+    return Section("What was recalibrated", [Text(said), *folded(
+        ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
 
 
 def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]

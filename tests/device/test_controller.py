@@ -1,0 +1,69 @@
+"""A table to the CM-530's own program and its log back: the flashed image, virtual servos, a simulated robot."""
+
+import numpy as np
+import pytest
+
+from tests.device.whole_loop import stand
+from tests.firmware.image import IDS, Robot, image, needs_compiler
+from workbench.compare.robot_run import run_by_controller
+from workbench.compare.session import load_session
+from workbench.device.bus import BusError
+from workbench.device.controller import Controller
+from workbench.device.table_file import JointBounds, TableFile
+from workbench.device.virtual import SECOND
+from workbench.device.virtual.cm530 import Board
+from workbench.device.virtual.cm530.port import PcLinkPort
+from workbench.motion import load_motion
+from workbench.recording.formats.read import read_recording
+from workbench.robot import data_file, puppy_model
+from workbench.simulation.virtual_robot import VirtualRobot
+
+pytestmark = needs_compiler
+
+
+def test_the_flashed_image_plays_an_uploaded_motion(tmp_path):
+    """Uploaded, played and released; the log's positions are the robot's at its own times, and the start is the first pose's."""
+    model = puppy_model()
+    robot = VirtualRobot(model, "fixed")
+    board = Board(image(), robot.clock, robot.bus)
+    board.power_on()
+    board.run(robot.clock.now + SECOND // 2)
+    motion = stand(model, poses=4)
+    done = run_by_controller(PcLinkPort(board), model, motion, 1, tmp_path, lambda: "", base="fixed", virtual=robot)
+    assert done.played.stopped == ""
+    assert not board.violations
+    truth = robot.body.take(done.played.started - robot.body.let_go / SECOND)
+    log = read_recording(tmp_path / "stand_joints.csv")
+    for joint in ("flm", "blb", "tail"):
+        there = np.interp(log.time - done.played.start_in_log, truth.time, truth.q[:, truth.column(joint)])
+        error = np.degrees(np.abs(log.channels[f"position.{joint}"] - there))
+        assert np.nanmedian(error) < 0.3, joint
+    assert log.time[-1] > motion.duration
+    session = load_session(tmp_path)
+    assert [take.name for take in session.takes] == ["stand", "stand_joints"]
+    assert not any(servo["torque_enable"] for servo in robot.servos.values())
+
+
+def test_a_servo_that_is_missing_is_the_controllers_to_tell():
+    r = Robot()
+    r.servos[9].power(False)
+    r.run(300)
+    with pytest.raises(BusError, match=r"its torque stays off: a servo is silent \(servo 9\)"):
+        Controller(PcLinkPort(r.board)).to_neutral()
+
+
+def test_a_table_of_another_robot_is_refused():
+    r = Robot()
+    r.run(300)
+    controller = Controller(PcLinkPort(r.board))
+    controller.to_neutral()
+    table = load_motion(data_file("robotis_walk.csv")).as_table()
+    with pytest.raises(BusError, match="the table is refused: "):
+        controller.upload(TableFile(table, tuple(JointBounds(i + 50) for i in IDS), 1, True))
+
+
+def test_nobody_there():
+    r = Robot()
+    r.board.power_off()
+    with pytest.raises(BusError, match="no CM-530 with the workbench's program answers"):
+        Controller(PcLinkPort(r.board)).state()

@@ -1,0 +1,103 @@
+"""The nominal law as nuisance: how well its numbers are known, what they become, and what the servos' registers allow."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.servo_rig import rig_model
+from workbench.effects.base import Registers
+from workbench.effects.registry import effect_named
+from workbench.identify.evidence.nuisance import Uncertain, recalibrated, uncertain_numbers, what_changed
+from workbench.robot import InputError, ServoConstants
+from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
+
+SERVO = {"stall_torque": 0.7, "no_load_speed": 19.0, "rated_voltage": 7.4, "supply_voltage": 7.4, "coulomb_friction": 0.013,
+         "viscous_friction": 0.004, "reflected_inertia": 0.0018, "proportional_gain": 1.15}
+
+
+def written(tmp_path, **changes):
+    path = tmp_path / "servo.yaml"
+    path.write_text(yaml.safe_dump(SERVO | changes))
+    return path
+
+
+def test_a_number_may_say_how_well_it_is_known(tmp_path):
+    servo = load_servo_constants(written(tmp_path, supply_voltage={"value": 7.2, "sd": 0.36}))
+    assert servo.supply_voltage == 7.2
+    assert servo.share_known("supply_voltage") == pytest.approx(0.05)
+    assert servo.share_known("coulomb_friction") == SHARES_KNOWN["coulomb_friction"]
+    path = tmp_path / "again.yaml"
+    path.write_text(yaml.safe_dump(servo.written()))
+    assert load_servo_constants(path) == servo
+
+
+@pytest.mark.parametrize(("value", "said"), [
+    ({"value": 7.4}, "supply_voltage: expected a number, or {value: number, sd: number}"),
+    ({"value": 7.4, "sd": -1.0}, "supply_voltage: sd: expected a non-negative number, got -1.0"),
+    ({"value": "full", "sd": 1.0}, "supply_voltage: expected a number, got 'full'")])
+def test_what_is_no_number_is_refused_by_its_key(tmp_path, value, said):
+    with pytest.raises(InputError) as e:
+        load_servo_constants(written(tmp_path, supply_voltage=value))
+    assert said in str(e.value)
+
+
+def test_numbers_that_are_exact_are_no_nuisance(tmp_path):
+    model = rig_model(tmp_path, ServoConstants(sd=tuple((key, 0.0) for key in SHARES_KNOWN)))
+    assert uncertain_numbers(model, "j", zeroed=True) == []
+    assert [n.name for n in uncertain_numbers(model, "j", zeroed=False)] == ["zero"]
+
+
+def test_recalibration_changes_one_number_of_the_law_and_says_so(tmp_path):
+    model = rig_model(tmp_path, ServoConstants())
+    servo = model.servo("j")
+    numbers = {n.name: n for n in uncertain_numbers(model, "j", zeroed=False)}
+    assert set(numbers) == {"torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia",
+                            "zero"}
+    for name, number in numbers.items():
+        if name == "zero":
+            continue
+        changed = recalibrated(model, {number: 2.0}).servo("j")
+        for other in numbers:
+            if other != "zero":
+                factor = np.exp(2.0 * number.sd) if other == name else 1.0
+                assert getattr(changed, other) == pytest.approx(factor * getattr(servo, other)), (name, other)
+    turned = recalibrated(model, {numbers["zero"]: -1.0})
+    assert turned.effects[0].effect == "zero_offset"
+    assert turned.effects[0].parameters["angle"] == pytest.approx(-np.degrees(numbers["zero"].sd))
+    (said, other) = what_changed(model, {numbers["coulomb_friction"]: 1.0, numbers["back_emf"]: -3.0})
+    assert (said.number, other.number) == ("back_emf", "coulomb_friction")
+    assert other.value == pytest.approx(servo.coulomb_friction * np.exp(0.5))
+
+
+def test_a_number_is_known_by_its_joint_and_name():
+    assert Uncertain("j", "back_emf", 0.1) != Uncertain("k", "back_emf", 0.1)
+
+
+def registers(drop: float, ratio: float, seed: int) -> Registers:
+    rng = np.random.default_rng(seed)
+    nominal = rng.uniform(-1.5, 1.5, 400)
+    duty = np.clip(ratio * nominal, -1.0, 1.0)
+    voltage = np.round(7.4 - drop * np.abs(duty) + rng.normal(size=400) * 0.03, 1)
+    return Registers({"j": duty}, {"j": nominal}, voltage)
+
+
+@pytest.mark.parametrize("drop", [0.0, 1.2])
+def test_the_register_of_voltage_tells_a_sag(drop):
+    value, error = effect_named("supply_sag").in_registers([registers(drop, 1.0, k) for k in range(4)], ())
+    assert value == pytest.approx(drop, abs=2 * error)
+    assert error < 0.1
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.7])
+def test_the_register_of_duty_tells_a_gain(ratio):
+    value, error = effect_named("servo_gain").in_registers([registers(0.0, ratio, k) for k in range(4)], ("j",))
+    assert value == pytest.approx(ratio, abs=2 * error)
+    assert error < 0.03
+
+
+def test_registers_that_are_not_there_say_nothing():
+    bare = [replace(registers(0.0, 1.0, k), voltage=None, duty={}) for k in range(4)]
+    assert effect_named("supply_sag").in_registers(bare, ()) is None
+    assert effect_named("servo_gain").in_registers(bare, ("j",)) is None

@@ -1,0 +1,96 @@
+"""The search on a robot that is linear in all its numbers: names, their probabilities, takes kept back, and quiet recordings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.evidence.linear import FRAME, candidate, linear, region
+from workbench.identify.evidence.holdout import vetoed
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.posterior import posterior_of
+from workbench.identify.evidence.search import lockstep, search
+
+NAMES = ("coulomb_friction", "viscous_friction", "load_friction", "backlash", "torque_saturation", "parallel_spring")
+NUMBER = "number 0"
+OPTIONS = EvidenceOptions()
+
+
+def waves(seed: int, n: int, count: int) -> list[np.ndarray]:
+    """Signals that have nothing to do with each other, smooth over some frames."""
+    rng = np.random.default_rng(seed)
+    kernel = np.exp(-0.5 * np.square(np.arange(-12, 13) / 4.0))
+    return [np.convolve(rng.normal(size=n + 24), kernel, mode="valid") * 0.01 for _ in range(count)]
+
+
+def robot(true: dict[str, float], noise: float = 2e-3, seed: int = 0, number: float = 0.0):
+    of = region([candidate(n) for n in NAMES], noise=noise)
+    n = len(of.likelihood.known)
+    signals = waves(seed, n, len(NAMES) + 1)
+    does = {NUMBER: 0.3 * signals[-1]}
+    for name, signal in zip(NAMES, signals):
+        for p in candidate(name).parameters:
+            does[f"{name}.{p.name}"] = signal
+    truth = number * does[NUMBER] + np.random.default_rng(seed + 1).normal(size=n) * noise
+    for name, size in true.items():
+        truth = truth + size * does[f"{name}.{candidate(name).parameters[0].name}"]
+    return linear(of, truth, does)
+
+
+def searched(rollouts, options: EvidenceOptions = OPTIONS):
+    after, (found,) = search(rollouts, options, lambda what, share=None: None)
+    return after, found, posterior_of(list(found.fits.values()), options)
+
+
+def test_two_effects_are_named_with_their_sizes():
+    _, found, p = searched(robot({"load_friction": 2.0, "backlash": 1.5}))
+    sizes = {c.name: x[0] for c, x in p.best.hypothesis.sizes()}
+    assert sizes == pytest.approx({"load_friction": 2.0, "backlash": 1.5}, rel=0.05)
+    assert {name: prob > 0.9 for (name, _), prob in p.named.items()} == {n: n in sizes for n, _ in p.named}
+    assert p.families["friction"] > 0.9
+    assert np.sqrt(np.diag(p.best.covariance(found.region, OPTIONS)))[-1] < 0.1
+
+
+def test_what_recalibration_explains_is_no_effect():
+    _, _, p = searched(robot({}, number=1.5))
+    assert not p.best.hypothesis.effects
+    assert p.best.hypothesis.z == pytest.approx([1.5], abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_quiet_recordings_name_nothing(seed):
+    _, _, p = searched(robot({}, seed=10 * seed))
+    assert max(p.named.values(), default=0.0) < 0.5
+
+
+def test_effects_that_do_the_same_share_the_probability():
+    rollouts = robot({"backlash": 1.5})
+    does = dict(rollouts.does)
+    does["parallel_spring.stiffness"] = does["backlash.gap"]
+    _, _, p = searched(replace(rollouts, does=does))
+    both = [p.named.get((name, ("j",)), 0.0) for name in ("backlash", "parallel_spring")]
+    assert sum(both) == pytest.approx(1.0, abs=0.1)
+    assert max(both) < 0.8
+    assert p.rival((p.best.hypothesis.effects[0].name, ("j",)))[1] == pytest.approx(min(both))
+
+
+def test_takes_kept_back_speak_against_what_only_some_show():
+    """An effect that one take asks for, and that the others would be worse with, is none."""
+    rollouts = robot({"load_friction": 2.0})
+    (of,) = rollouts.regions
+    odd = rollouts.does["backlash.gap"] * np.where(of.takes == 0, 2.0, -0.4)
+    rollouts = replace(rollouts, truth=rollouts.truth + odd)
+    after, found, _ = searched(rollouts, replace(OPTIONS, stop=-50.0, most=2))
+    with_both = next(f for f in found.fits.values() if {c.name for c in f.hypothesis.effects} == {"load_friction", "backlash"})
+    said = lockstep(after, {0: vetoed(found.region, OPTIONS, with_both, [(0,), (1,), (2,), (3,)])})[0]
+    assert {c.name for c in said} == {"backlash"}
+
+
+def test_correlation_that_is_left_makes_frames_count_less():
+    """What a model lacks may be slow; then a minute tells little."""
+    rollouts = robot({"backlash": 1.5})
+    slow = np.convolve(np.random.default_rng(5).normal(size=len(rollouts.truth) + 199), np.ones(200) / 40, mode="valid") * 0.01
+    _, quick, _ = searched(rollouts)
+    _, found, _ = searched(replace(rollouts, truth=rollouts.truth + slow))
+    assert quick.region.likelihood.tau < 2 * FRAME
+    assert found.region.likelihood.tau > 20 * FRAME

@@ -1,0 +1,60 @@
+"""Drake judges the compiled station in every diagnosis; rollouts are remembered by what they depend on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+import workbench.simulation.compiled
+from tests.gap_sessions import record_arm
+from workbench.compare.session import load_session
+from workbench.identify import rollout_key
+from workbench.identify.diagnosis import diagnose_session
+from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation.compiled import run_compiled
+from workbench.view.report.diagnosis import diagnosis_report
+
+
+@pytest.fixture
+def session(tmp_path):
+    record_arm(tmp_path)
+    return load_session(tmp_path / "session.yaml")
+
+
+def test_a_diagnosis_says_which_engine_it_stands_on(session, tmp_path, monkeypatch):
+    told = diagnose_session(session, n_jobs=1, memory=tmp_path).diagnosis
+    engine = told.provenance["engine"]
+    assert engine["rollouts by"] == "the compiled station"
+    assert engine["nominal model apart from Drake [sigma]"] < 1e-3
+    assert engine["final model apart from Drake [sigma]"] < 1e-3
+
+    def no_more(jobs, n_jobs):
+        if jobs:
+            raise AssertionError("a rollout that was remembered")
+        return []
+
+    monkeypatch.setattr("workbench.identify.rollouts.simulate_stream", no_more)
+    again = diagnose_session(session, n_jobs=1, memory=tmp_path).diagnosis
+    assert again.verdict == told.verdict
+    monkeypatch.setattr(rollout_key, "rollout_code", lambda: "another version")
+    with pytest.raises(AssertionError, match="remembered"):
+        diagnose_session(session, n_jobs=1, memory=tmp_path)
+
+
+def test_where_engines_part_a_diagnosis_is_drakes(session, monkeypatch):
+    def wrong(job):
+        take = run_compiled(job)
+        return replace(take, q=take.q * 1.01)
+
+    monkeypatch.setattr(workbench.simulation.compiled, "run_compiled", wrong)
+    result = diagnose_session(session, n_jobs=1)
+    engine = result.diagnosis.provenance["engine"]
+    assert engine["rollouts by"] == "Drake"
+    assert "nominal model" in engine["because"]
+    assert "compiled station and Drake part" in diagnosis_report(result.diagnosis, result.takes, "arm").summary
+
+
+def test_a_simulation_is_drakes(monkeypatch, session):
+    monkeypatch.setattr(workbench.simulation.compiled, "run_compiled", None)
+    assert Simulation(session.model, SimulationConfig(base="fixed")).run(None, 0.01) is not None

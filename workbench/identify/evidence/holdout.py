@@ -1,0 +1,77 @@
+"""Takes kept back as a veto: an effect that makes unseen takes less likely is none, however much it explains of those seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, side_by_side, without
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.region import Region
+from workbench.identify.parameters import Candidate
+from workbench.identify.problem import TakeEvidence
+
+Array = NDArray[np.float64]
+MOST_FOLDS = 4
+"""Takes that differ in nothing are kept back in so many groups: each costs a fit of every effect."""
+EXCITED = 0.1
+"""Share of what all takes tell of an effect that the others have to tell, to judge it by those kept back: who never saw full duty
+cannot know where it ends."""
+
+
+def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tuple[int, ...]]:
+    """Groups of takes to be kept back in turn: by what differs in the servos' constants (the gain) where anything does, else
+    take by take. Empty where there is one take alone."""
+    groups: dict[str, list[int]] = {}
+    for i in takes:
+        groups.setdefault(repr(sorted(evidence[i].take.spec.servos.items())), []).append(i)
+    if len(groups) > 1:
+        return [tuple(g) for g in groups.values()]
+    if len(takes) < 2:
+        return []
+    n = min(MOST_FOLDS, len(takes))
+    return [tuple(takes[k::n]) for k in range(n)]
+
+
+def vetoed(region: Region, options: EvidenceOptions, best: Fitted, folds: Sequence[tuple[int, ...]]
+           ) -> Asks[dict[Candidate, float]]:
+    """The effects of a fit that unseen takes speak against, with by how much [nats]: log likelihood of takes kept back, of the
+    fit with them and without, each fitted to the other takes; summed over the folds that can tell."""
+    effects = best.hypothesis.effects
+    said = dict.fromkeys(range(len(effects)), 0.0)
+    for fold in folds:
+        seen = region.of_takes([i for i in {p.take for p in region.parts} if i not in fold])
+        unseen = region.of_takes(fold)
+        telling = [k for k in range(len(effects)) if _excited(region, seen, best, k)]
+        if not telling:
+            continue
+        states = [(best.hypothesis, best.J)] + [without(best, lambda c, k=k: c is effects[k]) for k in telling]
+        fits = yield from side_by_side([_fold(region, seen, options, h, best.discrepancy, J) for h, J in states])
+        left = yield [f.hypothesis for f in fits]
+        logs = [unseen.likelihood.log(r[region.of(fold)], f.discrepancy) for f, r in zip(fits, left)]
+        for k, log in zip(telling, logs[1:]):
+            said[k] += logs[0] - log
+    return {effects[k]: gain for k, gain in said.items() if gain < -options.veto}
+
+
+def _fold(region: Region, seen: Region, options: EvidenceOptions, h: object, s: float, J: Array) -> Asks[Fitted]:
+    """A fit to the takes that are seen; what it asks is rolled out on all of them."""
+    mine = region.of([p.take for p in seen.parts])
+    part = fitting(seen, options, h, s, options.iterations, None, J[mine])  # type: ignore[arg-type]
+    try:
+        wants = next(part)
+        while True:
+            answers = yield wants
+            wants = part.send([r[mine] for r in answers])
+    except StopIteration as end:
+        return end.value  # type: ignore[no-any-return]
+
+
+def _excited(region: Region, seen: Region, best: Fitted, k: int) -> bool:
+    """Whether the takes that are seen tell enough of an effect."""
+    own = best.hypothesis.slices()[k]
+    told = np.sum(np.square(best.J[:, own]) * region.likelihood.precision(best.r, best.discrepancy)[:, None], axis=1)
+    return bool(told[region.of([p.take for p in seen.parts])].sum() >= EXCITED * told.sum())
+

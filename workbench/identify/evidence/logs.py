@@ -1,0 +1,66 @@
+"""Residuals of servo logs of a held robot, straight from the compiled station where it covers them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.simulation.compiled import NotCoveredError
+from workbench.simulation.compiled.angles import servo_angles
+from workbench.simulation.job import Job
+
+Array = NDArray[np.float64]
+SETTLE = 0.02
+"""Rest of a robot whose log begins elsewhere [s]: it is put there."""
+
+
+def residuals_of(evaluator: RolloutEvaluator, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
+    """As `RolloutEvaluator.residuals`; of logs without shifting their start, which is known."""
+    if not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
+        return evaluator.residuals(questions)
+    with ThreadPoolExecutor(evaluator.n_jobs) as pool:  # kernels hold no lock
+        return list(pool.map(lambda q: _answer(evaluator, q), questions))
+
+
+def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
+    held = replace(evaluator.config, base="fixed", settle=SETTLE, time_step=q.step * evaluator.config.time_step)
+    models: dict[str, RobotModel] = {}
+    jobs = []
+    for i in q.takes:
+        spec = evaluator.evidence[i].take.spec
+        key = repr(sorted(spec.servos.items()))
+        models.setdefault(key, q.model.with_servos(spec.servos))
+        jobs.append(_job(evaluator, i, models[key], held))
+    try:
+        angles = servo_angles(jobs)
+    except NotCoveredError:
+        return evaluator.residuals([q])[0]
+    evaluator.rollouts += len(jobs)
+    out = {}
+    for i, q_servo in zip(q.takes, angles):
+        e = evaluator.evidence[i]
+        columns = [q.model.joints.index(j) for j in e.joints]
+        simulated = np.full(e.recorded.shape, np.nan)
+        simulated[(e.since >= 0) & (e.since <= e.until)] = q_servo[:, columns]
+        out[i] = (e.recorded - simulated - (e.offset if q.step >= 1 else 0.0)) / (e.sigma * e.rough)
+    return out
+
+
+def _job(evaluator: RolloutEvaluator, i: int, model: RobotModel, held: SimulationConfig) -> Job:
+    take = evaluator.evidence[i].take
+    times = evaluator.evidence[i].since
+    times = times[(times >= 0) & (times <= evaluator.evidence[i].until)]
+    return Job(model, held, take.commands, float(times[-1]) + 2e-3, 0.1, name=take.spec.name,
+               times=times, start=take.start_state())
+
+
+def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
+    e = evaluator.evidence[i]
+    return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints

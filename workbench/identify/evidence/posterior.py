@@ -1,0 +1,70 @@
+"""Probabilities of names, places and families over all models within Occam's window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.effects.base import Family
+from workbench.effects.registry import known_effects
+from workbench.identify.evidence.fit import Fitted
+from workbench.identify.evidence.options import EvidenceOptions
+
+Named = tuple[str, tuple[str, ...]]
+"""An effect's name, and where it acts."""
+
+
+@dataclass(frozen=True)
+class RegionPosterior:
+    """Of one region. weights: of models within the window, the likeliest first; named: probability that an effect is there;
+    families: that any effect of a family is."""
+
+    weights: tuple[tuple[Fitted, float], ...]
+    named: Mapping[Named, float]
+    families: Mapping[Family, float]
+
+    @property
+    def best(self) -> Fitted:
+        """The likeliest model."""
+        return self.weights[0][0]
+
+    def rival(self, of: Named) -> tuple[Named, float] | None:
+        """What is likeliest where `of` is not: an effect that the best model does not have."""
+        kept = {(c.name, c.where) for c in self.best.hypothesis.effects}
+        family = known_effects()[of[0]].family
+        instead: dict[Named, float] = {}
+        for f, w in self.weights:
+            names = {(c.name, c.where) for c in f.hypothesis.effects}
+            if of in names:
+                continue
+            for other in names - kept:
+                alike = known_effects()[other[0]].family == family
+                instead[other] = instead.get(other, 0.0) + (w if alike else 0.5 * w)
+        if not instead:
+            return None
+        best = max(instead, key=lambda k: instead[k])
+        return best, sum(w for f, w in self.weights if of not in _names(f) and best in _names(f))
+
+
+def posterior_of(fits: Sequence[Fitted], options: EvidenceOptions) -> RegionPosterior:
+    """A softmax of log posteriors within the window (D. Madigan and A. Raftery, JASA 89, 1994)."""
+    ordered = sorted(fits, key=lambda f: -f.log_posterior)
+    near = [f for f in ordered if f.log_posterior > ordered[0].log_posterior - options.occam]
+    weights = np.exp([f.log_posterior - near[0].log_posterior for f in near])
+    weights /= weights.sum()
+    named: dict[Named, float] = {}
+    families: dict[Family, float] = {}
+    for f, w in zip(near, weights.tolist()):
+        for name in _names(f):
+            named[name] = named.get(name, 0.0) + w
+        for family in {known_effects()[name].family for name, _ in _names(f)}:
+            if family is not None:
+                families[family] = families.get(family, 0.0) + w
+    sums = [{k: min(1.0, v) for k, v in each.items()} for each in (named, families)]  # of rounded weights
+    return RegionPosterior(tuple(zip(near, weights.tolist())), *sums)  # type: ignore[arg-type]
+
+
+def _names(f: Fitted) -> set[Named]:
+    return {(c.name, c.where) for c in f.hypothesis.effects}

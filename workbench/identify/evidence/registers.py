@@ -1,0 +1,54 @@
+"""Names checked against what the servos measured themselves: a register of voltage that never sags refutes a sag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.compare.session_takes import ReadTake
+from workbench.effects.base import Registers
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.findings import Rejected
+from workbench.identify.parameters import Candidate
+from workbench.identify.reasons import RefutedByRegister
+
+
+def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:
+    """What the servos' registers said, log by log."""
+    out = []
+    for t in takes:
+        channels, duty, nominal = t.recording.channels, {}, {}
+        for joint in t.model.joints:
+            if (register := channels.get(f"duty.{joint}")) is None:
+                continue
+            on = channels.get(f"enabled.{joint}", np.ones_like(register)) > 0.5
+            duty[joint] = np.where(on, register, np.nan)
+            goal, position = (channels.get(f"{name}.{joint}") for name in ("goal", "position"))
+            if goal is not None and position is not None:
+                servo, error = t.model.servo(joint), goal - position
+                beyond = np.maximum(np.abs(error) - servo.margin, 0.0)
+                nominal[joint] = np.where(on, np.copysign(servo.punch_duty * (beyond > 0) + servo.gain * beyond, error), np.nan)
+        out.append(Registers(duty, nominal, channels.get("voltage")))
+    return out
+
+
+def within_registers(candidates: Sequence[Candidate], takes: Sequence[ReadTake], options: EvidenceOptions
+                     ) -> tuple[list[Candidate], list[Rejected]]:
+    """Candidates as far as the registers let them go, and those that they refute: of which not even `refuted` of the
+    typical size is within `sure` standard errors of what a register says."""
+    logs, kept, refuted = registers_of(takes), [], []
+    for c in candidates:
+        told = c.effect.in_registers(logs, c.where)
+        if told is None:
+            kept.append(c)
+            continue
+        value, error = told
+        reach = abs(value - c.neutral[0]) + options.sure * error
+        if reach < options.refuted * abs(c.typical[0] - c.neutral[0]):
+            p = c.parameters[0]
+            refuted.append(Rejected(c.name, c.where, RefutedByRegister(p.name, value, error, p.unit)))
+        else:
+            kept.append(replace(c, reach=reach))
+    return kept, refuted

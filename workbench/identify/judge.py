@@ -1,0 +1,39 @@
+"""Drake judges what the compiled station says.
+
+Every diagnosis rolls its nominal and its final model out by both. Where they part, its rollouts are Drake's from the start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.robot import RobotModel
+
+APART = 0.1
+"""Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
+
+
+class EnginesPartError(ArithmeticError):
+    """The compiled station and Drake part on a model; the text says by how much."""
+
+
+def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
+    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of all takes. 0 where
+    rollouts are Drake's already. EnginesPartError beyond APART; name: of the model, for its text."""
+    if evaluator.config.engine == "drake":
+        return 0.0
+    drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)
+    everywhere = [RolloutRequest(model, tuple(range(len(evaluator.evidence))))]
+    (ours,), (theirs,) = evaluator.residuals(everywhere), drake.residuals(everywhere)
+    worst = 0.0
+    for i, residual in ours.items():
+        apart = np.square(residual - theirs[i])
+        seen = np.isfinite(apart)
+        each = np.sqrt(np.where(seen, apart, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
+        worst = max(worst, float(each.max(initial=0.0)))
+        if np.any(np.isfinite(residual) != np.isfinite(theirs[i])) or worst > APART:
+            raise EnginesPartError(f"the compiled station and Drake part by {worst:.2g} sigma on the {name} model")
+    return float(f"{worst:.2g}")

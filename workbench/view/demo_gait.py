@@ -1,0 +1,49 @@
+"""The end of the demo: a new gait, sought in seconds, certified, exported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from workbench.device import export
+from workbench.gait.ensemble import load_ensemble
+from workbench.gait.machine import GaitMachine
+from workbench.gait.optimize import Optimized, OptimizeOptions, optimize, options_of, write_gait
+from workbench.gait.request import Request
+from workbench.motion import load_motion
+from workbench.robot import RobotModel
+from workbench.view.report.gait import write_gait_page
+from workbench.view.report.page import Part, Section, Text
+
+SPEED = 0.10
+"""What the demo asks for [m/s]: four times what the ROBOTIS walk does on this model."""
+
+
+def demo_options() -> OptimizeOptions:
+    """A look that takes seconds: few seeds, four robots of the ensemble, no finer step than half a millisecond."""
+    first = options_of(1)
+    return replace(first, budget=replace(first.budget, seeds=40, starts=1, generations=3, robust=3, draws=3, enough=1),
+                   certify=replace(first.certify, draws=6, seconds=4.0, variants=("2 ms", "1 ms", "0.5 ms")))
+
+
+def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:
+    """Seeks a gait, writes it with its certificate and page into `folder`, and its firmware tables if its certificate is good."""
+    result = optimize(GaitMachine(model), Request(speed=SPEED), load_ensemble(), demo_options(),
+                      lambda what, done: progress(f"a new gait: {what}", done))
+    parts: list[Part] = [Text(_said(result))]
+    if result.table is not None and result.certified is not None:
+        write_gait(folder, result.table, result.certified)
+        write_gait_page(folder, model, result)
+        if result.met:
+            export(load_motion(folder / "gait.csv", model), model, folder / "firmware", result.certified.take)
+            parts.append(Text("`gait/report.html` shows it in 3D, with every limit; `gait/firmware/` is what the robot plays. "
+                              "`workbench optimize --help` says what else can be asked for."))
+    return Section("A new gait", parts)
+
+
+def _said(result: Optimized) -> str:
+    if not result.met:
+        return result.problem
+    assert result.certified is not None
+    return "\n\n".join(result.certified.certificate.summary().splitlines())
