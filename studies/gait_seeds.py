@@ -19,10 +19,11 @@ from studies.common import publish, run_study, sign
 from workbench.gait.certificate import CLAIM
 from workbench.gait.evaluate import Evaluator
 from workbench.gait.machine import GaitMachine
+from workbench.gait.planned import bundled_tasks
 from workbench.gait.request import Request, Way
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import gait_table
-from workbench.gait.trajopt import Planned, Task, bundled_tasks, plan
+from workbench.gait.trajopt import Planned, Task, plan
 from workbench.recording.take import Take
 from workbench.robot import puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -14,8 +15,8 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built as a release is: a source distribution first, the wheel from that."""
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source distribution; the wheel, built from it as a release is, lies beside it."""
     tree, out = tmp_path_factory.mktemp("tree") / "project", tmp_path_factory.mktemp("dist")
     tracked = _run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"], ROOT).stdout.split("\0")
     for name in filter(None, tracked):  # a copy, so that building leaves nothing in the source tree
@@ -23,8 +24,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
             (tree / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, tree / name)
     _run([sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), "."], tree)
-    assert len(list(out.glob("*.tar.gz"))) == 1
-    (built,) = out.glob("*.whl")
+    (built,) = out.glob("*.tar.gz")
+    return built
+
+
+@pytest.fixture(scope="module")
+def wheel(sources: Path) -> Path:
+    (built,) = sources.parent.glob("*.whl")
     return built
 
 
@@ -75,6 +81,20 @@ def test_the_command_is_installed(python: Path, tmp_path: Path) -> None:
     done = _run([str(python.with_name("workbench")), "inspect", "package://puppy/puppy.sdf"], tmp_path)
     assert "15: blb blm blt" in done.stdout
     assert _run([str(python.with_name("workbench")), "--version"], tmp_path).stdout.startswith("workbench 0.")
+
+
+@pytest.mark.slow
+def test_the_demo_runs_from_the_wheel_in_an_empty_folder(python: Path, tmp_path: Path) -> None:
+    done = _run([str(python.with_name("workbench")), "demo"], tmp_path)
+    assert "wrote runs/demo" in done.stdout
+    assert (tmp_path / "runs/demo/report.html").stat().st_size > 100_000
+
+
+def test_the_source_distribution_builds_what_the_repository_has(sources: Path) -> None:
+    with tarfile.open(sources) as tar:
+        inside = {name.partition("/")[2] for name in tar.getnames()}
+    tracked = _run(["git", "ls-files"], ROOT).stdout.split()
+    assert not {name for name in tracked if (ROOT / name).is_file()} - inside
 
 
 def _run(command: list[str], cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

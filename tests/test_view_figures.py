@@ -142,8 +142,10 @@ def test_roll_and_pitch_have_the_signs_that_the_axis_says(model: RobotModel, tak
 
 def test_a_take_without_a_base_has_an_empty_path(model: RobotModel, takes: tuple[Take, Take]) -> None:
     fixed = replace(takes[0], p_WB=None, quat_WB=None, base="fixed")
-    figures.encode(figures.body_path(fixed))
-    figures.encode(figures.body_attitude(fixed))
+    for figure in (figures.body_path(fixed), figures.body_attitude(fixed)):
+        figures.encode(figure)
+        drawn = [np.asarray(line.get_ydata(), dtype=float) for axes in figure.axes for line in axes.lines]
+        assert not any(np.isfinite(y).any() for y in drawn)
 
 
 def test_duty_factor_leaves_out_what_was_not_seen() -> None:

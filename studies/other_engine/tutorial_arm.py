@@ -22,6 +22,8 @@ SEED = 7
 HIDDEN = EffectSpec("coulomb_friction", ("elbow",), {"torque": 0.12})
 STEP = 5e-4
 """Of the other engine [s]."""
+MOUNT = '<joint name="mount" type="fixed"><parent>world</parent><child>base</child></joint>'
+"""The arm stands on a table; the other engine holds its base by itself."""
 KEPT = {"slow": 5.0, "steps": 5.0}
 """Takes that ship, cut to so many seconds."""
 README = """# The tutorial's data
@@ -52,6 +54,7 @@ def make(folder: Path) -> None:
         takes.append({"name": plan.name, "recording": f"takes/{plan.name}.csv", "base": "fixed"})
     servo = {k: v for k, v in vars(robot.servo).items() if isinstance(v, (float, str))}
     session = {"format": 1, "robot": {"model": "robot.sdf", "base": "base", "servos": "servo.yaml"}, "takes": takes}
+    (folder / "robot.sdf").write_text(robot.sdf.replace("</model>", f"{MOUNT}\n</model>"), encoding="utf-8")
     write_together(folder / "takes", files)
     write_together(folder, {
         "servo.yaml": yaml.safe_dump(servo, sort_keys=False), "session.yaml": yaml.safe_dump(session, sort_keys=False),

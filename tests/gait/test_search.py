@@ -77,8 +77,8 @@ def test_what_no_gait_can_do_is_told_at_once_with_the_limit_that_binds(machine, 
 
 
 def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
-    options = OptimizeOptions(replace(SMALL, robust=0, draws=0), replace(options_of(1).certify, draws=0, seconds=1.0,
-                                                                         floor_seconds=0.3, step=2e-3, variants=("2 ms",)))
+    brief = replace(options_of(1).certify, draws=0, seconds=1.0, floor_seconds=0.3, step=2e-3, variants=("2 ms",))
+    options = OptimizeOptions(replace(SMALL, robust=0, draws=0), brief, planned=False)
     request = Request(speed=1.5)
     lax = replace(request.limits, drift=50.0, aside=50.0)
     result = optimize(machine, replace(request, limits=lax), Ensemble(), options, quiet)

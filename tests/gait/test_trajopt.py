@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from workbench.gait.machine import GaitMachine
+from workbench.gait.planned import bundled_tasks
 from workbench.gait.shape import GaitShape
-from workbench.gait.trajopt import FRICTION_SHARE, Task, bundled_tasks, plan
+from workbench.gait.trajopt import FRICTION_SHARE, Task, plan
 from workbench.robot import GRAVITY, SPEED_UNIT, puppy_model
 
 

@@ -120,7 +120,8 @@ def sage(names: tuple[str, ...] = ("",), compressed: bool = True) -> bytes:
     for name in names:
         prefix = f"{name}/" if name else ""
         arrays |= {f"{prefix}t_cmd": time, f"{prefix}t_meas": time + 0.001}
-        arrays |= {f"{prefix}{field}": np.deg2rad(np.tile(angles[:, None], 6)) for field, angles in (("q_cmd", goal), ("q_meas", position))}
+        arrays[f"{prefix}q_cmd"] = np.deg2rad(np.tile(goal[:, None], 6))
+        arrays[f"{prefix}q_meas"] = np.deg2rad(np.tile(position[:, None], 6))
     out = io.BytesIO()
     (np.savez_compressed if compressed else np.savez)(out, **arrays)
     return out.getvalue()

@@ -126,7 +126,8 @@ def test_written_by_other_programs(tmp_path: Path, how: str) -> None:
     content = {"utf-16": text.encode("utf-16"), "cr": text.replace("\n", "\r").encode(),
                "tab": text.replace(",", "\t").encode(),
                "semicolon": text.replace(".", "?").replace(",", ";").replace("?", ",").encode(),
-               "stray quote": text.replace("0.100", '"0.100', 1).encode(), "cr in header": text.replace("demo", "de\rmo").encode()}[how]
+               "stray quote": text.replace("0.100", '"0.100', 1).encode(),
+               "cr in header": text.replace("demo", "de\rmo").encode()}[how]
     path.write_bytes(content)
     if how == "stray quote":
         with pytest.raises(InputError, match="line"):

@@ -83,7 +83,8 @@ def test_a_joint_at_its_stop_is_no_stuck_sensor(tmp_path: Path) -> None:
 def test_duty_in_per_cent_is_told(tmp_path: Path) -> None:
     time, goal, position = swing()
     rows = joint_log(time, goal, position).splitlines()
-    (tmp_path / "log.csv").write_text("\n".join([rows[0] + ",duty.arm", *[f"{r},{40 * np.sin(k)}" for k, r in enumerate(rows[1:])]]))
+    with_duty = [rows[0] + ",duty.arm", *[f"{r},{40 * np.sin(k)}" for k, r in enumerate(rows[1:])]]
+    (tmp_path / "log.csv").write_text("\n".join(with_duty))
     assert any("per cent" in p for p in read_recording(tmp_path / "log.csv").problems)
 
 

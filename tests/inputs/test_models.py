@@ -14,7 +14,7 @@ from tests.inputs.corpus import ROBOT, SDF
 from workbench.effects.apply import physics_of
 from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel
 from workbench.robot.model_source import model_problems, prepared
-from workbench.simulation import MakePuppyStation, SimulationConfig
+from workbench.simulation import MakeStation
 from workbench.view.report.inspection import inspect_file
 
 
@@ -71,7 +71,8 @@ def test_a_urdf_has_the_kinematics_that_drake_reads_of_it(tmp_path: Path) -> Non
     ("joint_compliance", ("hip",), {"stiffness": 5.0}), ("link_length", ("shank",), {"change": 0.01}),
     ("com_shift", ("trunk",), {"offset": (0.01, 0.0, 0.0)}), ("joint_stop", ("knee",), {"lower": -10.0, "upper": 20.0}),
 ])
-def test_effects_that_change_the_build_act_on_a_urdf(tmp_path: Path, effect: str, where: tuple[str, ...], parameters: dict) -> None:
+def test_effects_that_change_the_build_act_on_a_urdf(tmp_path: Path, effect: str, where: tuple[str, ...],
+                                                            parameters: dict) -> None:
     model = RobotModel(str(_robot(tmp_path))).with_effect(EffectSpec(effect, where, parameters))
     description = physics_of(model).description
     assert description is not None
@@ -79,7 +80,18 @@ def test_effects_that_change_the_build_act_on_a_urdf(tmp_path: Path, effect: str
     assert set(model.kinematics.links) <= set(changed.links)
     if effect == "payload":
         assert changed.masses["shank"] == pytest.approx(0.08)
-    MakePuppyStation(SimulationConfig(), model)
+    MakeStation(model)
+
+
+@pytest.mark.parametrize("name", ["robot.urdf", "robot.sdf"])
+def test_effects_act_on_a_robot_with_meshes(tmp_path: Path, name: str) -> None:
+    _box_mesh(tmp_path / "box.stl")
+    _box_mesh(tmp_path / "box.obj")
+    mesh = "<mesh><uri>box.obj</uri><scale>.001 .001 .001</scale></mesh>"
+    text = _meshed("box.stl") if name == "robot.urdf" else SDF.replace("<box><size>.02 .02 .05</size></box>", mesh)
+    model = RobotModel(str(_robot(tmp_path, text, name)))
+    joint = model.joints[-1]
+    MakeStation(model.with_effect(EffectSpec("backlash", (joint,), {"gap": 3.0})))
 
 
 @pytest.mark.parametrize("uri", ["mesh/trunk.stl", "mesh\\trunk.stl", "package://dog/mesh/trunk.stl", "package:///mesh/trunk.stl",
@@ -166,7 +178,8 @@ def test_what_cannot_be_built_is_refused(tmp_path: Path, old: str, new: str, sai
     (SDF.replace("<mass>.1</mass>", "<mass>inf</mass>").encode(), "link 'a': mass"),
     (SDF.replace("<link name=\"r\">", '<include><uri>robot.sdf</uri></include><link name="r">').encode(), "includes itself"),
     (SDF.replace("<child>a</child>", "<child>r</child>").encode(), "loop|Drake cannot read"),
-    (SDF.replace("<box><size>.02 .02 .05</size></box>", "<mesh><uri>nope.obj</uri></mesh>").encode(), "mesh 'nope.obj': file not found"),
+    (SDF.replace("<box><size>.02 .02 .05</size></box>", "<mesh><uri>nope.obj</uri></mesh>").encode(),
+     "mesh 'nope.obj': file not found"),
     (b"\xff\xfe" + SDF.encode("utf-16-le")[:40], "robot.sdf"), (b"<sdf>" * 5000, "robot.sdf"), (b"<html></html>", "found <html>"),
 ])
 def test_descriptions_that_are_none(tmp_path: Path, content: bytes, said: str) -> None:

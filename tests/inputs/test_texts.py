@@ -32,7 +32,8 @@ def test_yaml_is_bounded(tmp_path: Path, text: str, said: str) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [
-    ("stall_torque: 1.5", "stall_torque:", "stall_torque: is empty"), ("model: AX-12A", "model: [a]", "model: expected the servo"),
+    ("stall_torque: 1.5", "stall_torque:", "stall_torque: is empty"),
+    ("model: AX-12A", "model: [a]", "model: expected the servo"),
     ("model: AX-12A", "model: {a: 1}", "model: expected"), ("punch: 32", "punch: 1" + "0" * 400, "digits"),
     ("supply_voltage: 11.1", "supply_voltage: 11100", "expected at most 100 V"), ("punch: 32", "punch: 2000", "at most 1023"),
 ])
@@ -92,7 +93,8 @@ def test_a_cut_motion_file_is_refused(tmp_path: Path, share: float) -> None:
 
 
 @pytest.mark.parametrize(("option", "value"), [
-    ("--cycles", "1000000000"), ("--cycles", "1" + "0" * 30), ("--cycles", "1_0"), ("--cycles", "\u0661"), ("--time-step", "1e-12"),
+    ("--cycles", "1000000000"), ("--cycles", "1" + "0" * 30), ("--cycles", "1_0"), ("--cycles", "\u0661"),
+    ("--time-step", "1e-12"),
     ("--time-step", "1"), ("--time-step", "0.05"), ("--time-step", "nan"), ("--cycles", "0")])
 def test_options_out_of_bounds(tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str) -> None:
     (tmp_path / "m.csv").write_text(POSES)

@@ -11,7 +11,7 @@ from tests.gap_sessions import record_arm
 from workbench.compare.session import load_session
 from workbench.identify import rollout_key
 from workbench.identify.diagnosis import diagnose_session
-from workbench.simulation import Simulation
+from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.compiled import run_compiled
 from workbench.view.report.diagnosis import diagnosis_report
 
@@ -57,4 +57,4 @@ def test_where_engines_part_a_diagnosis_is_drakes(session, monkeypatch):
 
 def test_a_simulation_is_drakes(monkeypatch, session):
     monkeypatch.setattr(workbench.simulation.compiled, "run_compiled", None)
-    assert Simulation(session.model).run(None, 0.01) is not None
+    assert Simulation(session.model, SimulationConfig(base="fixed")).run(None, 0.01) is not None

@@ -111,12 +111,13 @@ class Progress:
         while not self._ended.wait(BEAT):
             with self._lock:
                 if self._speaks and self._now[0] and time.monotonic() - self._last >= BEAT:
-                    self._show()
+                    self._show(again=True)
 
-    def _show(self) -> None:
+    def _show(self, again: bool = False) -> None:
+        """Writes the line, not too often; `again`: whatever was written."""
         what, done = self._now
         now = time.monotonic()
-        if what == self._shown and now - self._last < (0.1 if self._tty else 5.0):
+        if not again and what == self._shown and now - self._last < (0.1 if self._tty else 5.0):
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"

@@ -51,8 +51,8 @@ class SdfRobot:
     def text(self) -> str:
         """The changed SDF, its relative files made absolute."""
         for uri in self._model.iter("uri"):
-            if uri.text and "://" not in uri.text and not Path(uri.text).is_absolute():
-                uri.text = str((self.path.parent / uri.text).resolve())
+            if uri.text and "://" not in uri.text:  # of a text without a file Drake takes neither relative nor absolute paths
+                uri.text = f"file://{(self.path.parent / uri.text.strip()).resolve()}"
         return ElementTree.tostring(self._tree.getroot(), encoding="unicode")
 
     def add_play(self, joint: str, gap: float) -> None:

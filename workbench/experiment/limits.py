@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.motion import Motion
-from workbench.robot import InputError, RobotModel
+from workbench.robot import COUNT, InputError, RobotModel
+from workbench.robot.servo_profile_file import servo_profile
 
 Array = NDArray[np.float64]
 
@@ -39,16 +40,15 @@ class Reach:
         )
 
     def allows(self, segment: Segment) -> bool:
-        """Whether registers, ranges and speeds hold what is asked: goals and speeds 0 to 1023, dwells of 1 ms or more."""
+        """Whether a motion table (docs/formats.md, section 2), ranges and speeds hold what is asked."""
         try:
             table = Motion(segment.name, segment.times, self.model.joints, segment.angles).as_table()
         except InputError:
             return False
-        count = math.radians(300 / 1023)
         ends = np.array([self.range(j) for j in self.model.joints])
         asked = np.abs(np.diff(segment.angles, axis=0)) / np.diff(segment.times)[:, None]
         angles = table.angles()
-        return bool((angles > ends[:, 0] - count).all() and (angles < ends[:, 1] + count).all()
+        return bool((angles > ends[:, 0] - COUNT).all() and (angles < ends[:, 1] + COUNT).all()
                     and (asked <= self.speeds * 1.001).all())
 
     def cleared(self, segment: Segment) -> Segment | None:
@@ -107,5 +107,13 @@ def _reached(model: RobotModel, joint: str) -> float:
     servo = model.servo(joint)
     surplus = max(servo.torque_at_full_duty - servo.coulomb_friction, 0.0)
     no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
-    register = 1020 * 114 / 1023 * 2 * math.pi / 60
-    return EXPERIMENT.speed_share * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, register)
+    return EXPERIMENT.speed_share * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, _told(servo.model))
+
+
+def _told(servo: str) -> float:
+    """Highest speed [rad/s] that a servo's register holds; infinite where nobody knows its registers."""
+    try:
+        family = servo_profile(servo)
+    except InputError:
+        return math.inf
+    return family.largest_speed * family.speed_unit

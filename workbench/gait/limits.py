@@ -26,10 +26,9 @@ class GaitLimits:
     mm, twice what a degree of play in a knee lets it hang; feet that drag go as the floor lets them.
     capacity: poses in the controller's table: 512 poses of 15 servos take 32 kB, half of a CM-530's memory. bus: bit rate of the
     servo bus [1/s].
-    fall_draws: share of draws that may fall: none. tilt: of the base [rad], 30 deg, where the feet's track no longer
-    holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the
-    same, RMS over draws [rad/m]: 30 deg, by which it ends a quarter of a metre beside a line of one. aside: speed across over
-    speed along.
+    tilt: of the base [rad], 30 deg, where the feet's track no longer holds the centre of mass over them. drift: change of heading
+    by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 30 deg, by which it ends a quarter
+    of a metre beside a line of one. aside: speed across over speed along.
     """
 
     rms: float | None = None

@@ -20,6 +20,7 @@ from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import measure
+from workbench.gait.planned import planned_seeds
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, search
 from workbench.gait.shape import GaitShape
@@ -38,14 +39,15 @@ MEMORY = ".rollouts.jsonl"
 
 @dataclass(frozen=True)
 class OptimizeOptions:
-    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start
-    from."""
+    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start from;
+    planned: whether solved kino-centroidal programmes are, too."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
     seed: int = 0
     n_jobs: int = 2
     given: tuple[GaitShape, ...] = ()
+    planned: bool = True
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
         evaluator = Evaluator(machine, request, draws, memory, options.n_jobs)
-        found = search(evaluator, options.budget, options.seed, progress, options.given)
+        if options.planned:
+            progress("planning seeds", 0.0)
+        planned = planned_seeds(machine, request) if options.planned else ()
+        found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
         chosen = found.best if found.best.good else found.nearest
         if chosen is None:
             return Optimized(request, False, _unmet(request, found, None), None, None, found)

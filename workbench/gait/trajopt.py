@@ -9,7 +9,6 @@ forces ask of the joints (through the legs' Jacobians in the middle of the path)
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +31,7 @@ FRICTION_SHARE = 0.9
 LARGEST_TILT = 0.25
 """[rad] up to which the programme's small rotations are right to 1 %."""
 MOST_ITERATIONS = 300
+
 
 
 @dataclass(frozen=True)
@@ -284,23 +284,3 @@ def _inertia(machine: GaitMachine) -> Array:
         d = p[0] + R[0] @ k.centers[link] - com
         out += k.masses[link] * (d @ d * np.eye(3) - np.outer(d, d))
     return out
-
-
-def bundled_tasks() -> Sequence[Task]:
-    """Twenty tasks: forward and backward, sideways, turns, uphill, in all families."""
-    trot = GaitShape("trot", (1, 1), 8, 2.4, duty=0.6, lift=0.02, crouch=0.04)
-    crawl = replace(trot, family="crawl", frequency=1.0, duty=0.8)
-    walk = replace(trot, family="walk", frequency=1.6, duty=0.7)
-    return (
-        *(Task(f"trot {v:g} m/s", trot, (v, 0.0)) for v in (0.05, 0.1, 0.2, 0.3)),
-        Task("trot 0.4 m/s, 3.2 Hz", replace(trot, frequency=3.2), (0.4, 0.0)),
-        *(Task(f"walk {v:g} m/s", walk, (v, 0.0)) for v in (0.05, 0.1, 0.15)),
-        *(Task(f"crawl {v:g} m/s", crawl, (v, 0.0)) for v in (0.03, 0.06)),
-        *(Task(f"trot backward {v:g} m/s", trot, (-v, 0.0)) for v in (0.1, 0.2)),
-        Task("crawl backward 0.04 m/s", crawl, (-0.04, 0.0)),
-        *(Task(f"trot sideways {v:g} m/s", trot, (0.0, v)) for v in (0.05, 0.1)),
-        *(Task(f"turn {np.degrees(w):.0f} deg/s", trot, (0.0, 0.0), w) for w in np.radians([20.0, 40.0])),
-        Task("arc of 0.5 m at 0.1 m/s", trot, (0.1, 0.0), 0.2),
-        Task("uphill 15 deg 0.1 m/s", trot, (0.1, 0.0), 0.0, float(np.radians(15))),
-        Task("pace 0.1 m/s", replace(trot, family="pace"), (0.1, 0.0)))
-

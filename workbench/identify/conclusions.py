@@ -1,4 +1,4 @@
-"""From a fit to findings: numbers with intervals, rivals, what is left over, and the verdict."""
+"""From a fit to findings: parameters with intervals, rivals, residuals that remain, and the verdict."""
 
 from __future__ import annotations
 

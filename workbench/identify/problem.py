@@ -1,4 +1,4 @@
-"""What the recordings show, channel by channel, with what noise and numerics alone would make of each."""
+"""The identification problem: recorded channels, their standard deviation from noise and numerics, and the split of frames."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from workbench.robot import RobotModel
 
 
 def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:
-    """All that this installation knows and a search from neutral could find in these takes."""
+    """Every known effect at every place where it could act, these takes could show it and a search from neutral find it."""
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
     start_known = not any(e.start_is_free for e in evidence)

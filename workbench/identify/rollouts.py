@@ -1,4 +1,4 @@
-"""Rolls models out on every take, over both cores, and weighs what they leave."""
+"""Rollouts of models on every take, in batches and remembered, and the chi squared of their residuals."""
 
 from __future__ import annotations
 
@@ -38,8 +38,9 @@ class RolloutRequest:
 
 
 class RolloutEvaluator:
-    """Rollouts of models on the session's takes. memory: folder in which every answer is kept, so that a killed run resumes;
-    answers are the same with and without. work: seconds of a puppy's rollouts asked so far, at the search's step."""
+    """Rolls models out on the session's takes and evaluates the residuals. memory: folder in which every result is kept, so that
+    a killed run resumes; results are the same with and without. work: seconds of a puppy's rollouts requested so far, at the
+    search's step."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
                  memory: Path | None = None) -> None:

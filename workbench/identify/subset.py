@@ -1,4 +1,4 @@
-"""What of the recordings a search looks at, as it asks for hundreds of rollouts, and which of it judges."""
+"""The data subset that a search of a long session uses, as it needs hundreds of rollouts, and a balanced split of its frames."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class Take:
 
     def resampled(self, time: Array) -> Take:
         """The take at other times (M,) [s] on its own clock, linear between samples, NaN outside and in gaps."""
-        from scipy.spatial.transform import Rotation, Slerp
+        from workbench.recording.mocap import quaternions as quat
 
         time = np.asarray(time, dtype=float)
 
@@ -105,8 +105,7 @@ class Take:
             if (q[good] == q[good][0]).all():  # a base that is held
                 out[inside] = q[good][0]
             else:
-                path = Slerp(self.time[good], Rotation.from_quat(q[good], scalar_first=True))
-                out[inside] = path(time[inside]).as_quat(scalar_first=True)
+                out[inside] = quat.interpolated(self.time[good], q[good], time[inside])
             out[inside & ~np.isfinite(np.interp(time, self.time, q[:, 0]))] = np.nan
             return out
 

@@ -1,5 +1,5 @@
-"""What is looked at anew once held takes have told what the robot is: which poses a servo never got, as the nominal robot may
-have said so of what went otherwise for other reasons."""
+"""Dropped commands, estimated again once the fixed-base takes have identified the servos: beside the nominal robot, what went
+differently for other reasons may look like a command that never arrived."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the bodies show of a robot's build before any simulation: links that are not as long as drawn, horns that sit turned.
+"""Kinematic calibration without simulation: link lengths that differ from the model's, and horns that sit turned.
 
 Both show only in where feet meet the ground, and there in much the same way: walks alone hardly say which link it is. Where a
 link lies between two joints that turn, cameras see both axes, and so how far they are apart and, with the base held, which way.

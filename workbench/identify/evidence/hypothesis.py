@@ -16,8 +16,8 @@ from workbench.identify.parameters import Candidate
 from workbench.robot import EffectSpec
 
 Array = NDArray[np.float64]
-FAR = 6.0
-"""Standard deviations that a recalibrated number may go: beyond, the nominal model is of another servo."""
+FAR = 2.0
+"""Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 

@@ -45,7 +45,7 @@ class EvidenceOptions:
     refined: int = 5
     paired: int = 4
     most: int = 6
-    seconds: float = 150.0
+    seconds: float = 100.0
     stop: float = 0.3
     occam: float = 7.0
     veto: float = 3.0

@@ -24,8 +24,7 @@ Report = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class Found:
-    """What the search of one region fitted, by which effects there are, and which of these are as good as any more could make
-    them (extended)."""
+    """What the search of one region fitted, by which effects there are, and which of these were extended by all others."""
 
     region: Region
     fits: Mapping[Key, Fitted]
@@ -35,6 +34,11 @@ class Found:
     def best(self) -> Fitted:
         """The likeliest fit."""
         return max(self.fits.values(), key=lambda f: f.log_posterior)
+
+    def goes_on(self, options: EvidenceOptions) -> bool:
+        """Whether the likeliest fit may have a better one beyond it: it was not extended yet."""
+        best = self.best.hypothesis
+        return best.key not in self.extended and len(best.effects) < options.most
 
     def beam(self, options: EvidenceOptions) -> list[Fitted]:
         """The likeliest fits, few enough to go on with."""
@@ -51,14 +55,13 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
     open_ = set(range(len(regions)))
     for level in range(options.most + 1):
         report(f"effects, level {level + 1}", level / (options.most + 1))
-        before = [f.best.log_posterior for f in found]
         levels = {i: _level(found[i], options) for i in sorted(open_)}
         found = _replaced(found, lockstep(rollouts, levels))
-        open_ = {i for i in open_ if found[i].best.log_posterior > before[i] + options.stop}
-        open_ = {i for i in open_ if len(found[i].best.hypothesis.effects) < options.most}
         rollouts = standing(rollouts, found)
         again = {i: _renewed(found[i], options) for i in range(len(found))}  # other joints moved, and what is left is shorter
         found = _replaced(found, lockstep(rollouts, again))
+        rollouts = standing(rollouts, found)
+        open_ = {i for i in open_ if found[i].goes_on(options)}
         if not open_:
             break
     report("taking effects out, and others in their place", None)
@@ -107,11 +110,11 @@ def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks
 
 
 def _renewed(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """All fits within reach of the best judged anew, as other regions stand now, by the correlation time that the best leaves."""
+    """All fits within reach of the best judged anew, as other regions stand now, by the correlation time that the closest of them
+    leaves: what a poorer model leaves is correlated because it lacks something."""
     near = [f for f in found.fits.values() if f.log_posterior > found.best.log_posterior - 3 * options.occam]
     left = yield [f.hypothesis for f in near]
-    best = found.best.hypothesis.key
-    r = next(x for f, x in zip(near, left) if f.hypothesis.key == best)
+    r = min(left, key=found.region.likelihood.discrepancy)
     region = found.region.measured(r, options)
     fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)

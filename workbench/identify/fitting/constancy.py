@@ -1,4 +1,4 @@
-"""Whether fitted numbers stay what they are: physics without a name can look like a known effect whose size changes."""
+"""Parameter constancy: physics that the vocabulary lacks can look like a known effect whose parameter drifts within a take."""
 
 from __future__ import annotations
 

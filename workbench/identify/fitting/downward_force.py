@@ -1,4 +1,4 @@
-"""A pull straight down: cables pull up or aside, loads resist being moved. What weighs and does neither hangs, and may swing."""
+"""Forces straight down: a cable pulls up or aside, a load has inertia; a vertical force without inertia is a hanging mass."""
 
 from __future__ import annotations
 

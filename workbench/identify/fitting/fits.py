@@ -25,10 +25,11 @@ Report = Callable[[str, float | None], None]
 
 
 class Search:
-    """Fits on one session.
+    """Fits of effects to one session.
 
-    settled: effects that showed with the base held, as held takes tell them: these keep their numbers in all fits that follow,
-    as contact bends what walks tell. signatures: what was seen of effects so far, a memory that all searches of a session share.
+    settled: effects identified from fixed-base takes. They keep the values that these takes give them in all fits that follow,
+    because contact biases what floating-base takes say of them. signatures: responses scanned so far, a memory that all searches
+    of a session share.
     """
 
     def __init__(
@@ -251,7 +252,7 @@ def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence
 
 
 def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
-    """Whether held takes speak against a fit, beside another."""
+    """Whether the fixed-base takes contradict a fit, compared with another: by more than `against` of chi squared."""
     return gained(search.evaluator, fit, other, search.held, "fit") > FIT.against
 
 

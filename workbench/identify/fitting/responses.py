@@ -1,4 +1,4 @@
-"""What signatures of an effect say of it before it is fitted: where it is looked at, and what sizes that tells."""
+"""Responses to a candidate before it is fitted: the sizes at which they are scanned, and the size that they predict."""
 
 from __future__ import annotations
 

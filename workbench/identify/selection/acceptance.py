@@ -1,4 +1,4 @@
-"""Whether enough is left for another effect, and whether an effect brings enough."""
+"""The stopping criterion and the acceptance test of the forward selection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Backward: effects that were taken and that the others left nothing to say go."""
+"""Backward elimination: accepted effects that the others have made redundant are dropped."""
 
 from __future__ import annotations
 

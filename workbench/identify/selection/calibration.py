@@ -1,4 +1,4 @@
-"""What makes a finding less sure, whatever its rivals do."""
+"""Calibration of probabilities: what makes a finding less sure, whatever its rivals do."""
 
 from __future__ import annotations
 

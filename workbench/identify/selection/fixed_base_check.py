@@ -1,5 +1,5 @@
-"""What walks told and held takes gainsay: a walk answers small differences with large ones, so that a fit may end where chance
-leaves little, beside a motor's end that held takes, which it barely shows in, tell smoothly."""
+"""Consistency with fixed-base data: on walking data a fit may stop in a spurious minimum, where the fixed-base takes, in which
+the parameter is barely excited, contradict it smoothly."""
 
 from __future__ import annotations
 

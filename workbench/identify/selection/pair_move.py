@@ -1,4 +1,4 @@
-"""Two causes that look like one: a pull that lifts the robot explains much of what a slope and a slippery floor do together.
+"""Pair moves, for confounded causes: a force that lifts the robot explains much of what a slope and a slippery floor do together.
 
 What explains most by itself is found first, and then nothing completes it. So it and what came near it are given company,
 foretold by lines around each one's own fit, in which all that walks told gives way: a motor that ends early makes up for much of

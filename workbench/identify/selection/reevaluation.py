@@ -1,4 +1,4 @@
-"""What was taken while more was missing, and all channels judge: its rivals are fitted in its place beside what came since.
+"""Re-evaluation of terms that were accepted early: their rivals are fitted in their place beside what was accepted since.
 
 A spring in one joint bends what all joints seem to have in common, so that a weak supply came ahead of one that sags; beside a
 soft knee a longer leg came ahead of a joint that is zeroed askew.

@@ -1,4 +1,4 @@
-"""What is worth asking of which takes: effects that could make what is ill so, the likely ones first."""
+"""Scheduling of candidates: which are evaluated on which takes, the likely ones first."""
 
 from __future__ import annotations
 

@@ -37,10 +37,33 @@ def matrix(q: Array) -> Array:
 
 def from_matrix(R: Array) -> Array:
     """Unit quaternions (N, 4), w not negative, of rotation matrices (N, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    q = Rotation.from_matrix(R).as_quat(scalar_first=True)
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    squares = np.stack([1 + xx + yy + zz, 1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz])  # 4 w^2, 4 x^2, 4 y^2, 4 z^2
+    a, b, c = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]  # 4 wx, 4 wy, 4 wz
+    d, e, f = R[:, 1, 0] + R[:, 0, 1], R[:, 2, 0] + R[:, 0, 2], R[:, 2, 1] + R[:, 1, 2]  # 4 xy, 4 xz, 4 yz
+    products = np.stack([squares[0], a, b, c, a, squares[1], d, e, b, d, squares[2], f, c, e, f, squares[3]]).reshape(4, 4, -1)
+    largest = np.argmax(squares, axis=0)  # by the row of the greatest component, so that none is divided by little
+    q = products[largest, :, np.arange(len(R))]
+    q = q / np.linalg.norm(q, axis=1, keepdims=True)
     return np.asarray(np.where(q[:, :1] < 0, -q, q))
+
+
+def interpolated(time: Array, q: Array, at: Array) -> Array:
+    """Rotations (M, 4) at times `at` (M,) within `time` (N,), increasing, by the shortest turn at an even rate between
+    neighbours of q (N, 4) (slerp)."""
+    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    share = ((at - time[i]) / (time[i + 1] - time[i]))[:, None]
+    begin, end = q[i], q[i + 1]
+    cosine = np.sum(begin * end, axis=1, keepdims=True)
+    end = np.where(cosine < 0, -end, end)
+    half = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    sine = np.sin(half)
+    near = sine < 1e-6  # a straight line is as good, and sin / sin is not
+    safe = np.where(near, 1.0, sine)
+    left = np.where(near, 1 - share, np.sin((1 - share) * half) / safe)
+    right = np.where(near, share, np.sin(share * half) / safe)
+    out = left * begin + right * end
+    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
 
 
 def rotation_vector(q: Array) -> Array:

@@ -96,12 +96,12 @@ def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache
                 made[found.suffix[1:].upper()] += 1
             plain = text.startswith("package://puppy/") or (path == found and "://" not in text and "\\" not in text)
             if not plain or path.suffix.lower() not in READ:
-                uri.text, moved = str(path), True
+                uri.text, moved = f"file://{path}", True
     if moved or made:
         for uri in root.iter("uri"):
             text = (uri.text or "").strip()
-            if "://" not in text and not Path(text).is_absolute():
-                uri.text = str((source.parent / text).resolve())
+            if "://" not in text:
+                uri.text = f"file://{(source.parent / text).resolve()}"
     return made, moved
 
 

@@ -60,8 +60,8 @@ def _inertia_problems(path: Path, link: Element, moved: bool) -> list[str]:
     for i, k, tag in ((0, 0, "ixx"), (1, 1, "iyy"), (2, 2, "izz"), (0, 1, "ixy"), (0, 2, "ixz"), (1, 2, "iyz")):
         moments[i, k] = moments[k, i] = float(inertial.findtext(f"inertia/{tag}") or ("1" if i == k else "0"))
     if mass == 0:  # that nothing weighs anything is told of all that is fixed together
-        instead = "Drake takes a ball of water of 1 kg instead"
-        return [f"{name} has moments of inertia but no mass: {instead}"] if moments.any() else []
+        odd = f"{name} has moments of inertia but no mass: Drake takes a ball of water of 1 kg instead"
+        return [odd] if moments.any() else []
     if not moments.any():
         return [f"{name} weighs {mass:g} kg and has no rotational inertia, as if it were a point"] if moved else []
     principal = np.sort(np.linalg.eigvalsh(moments))

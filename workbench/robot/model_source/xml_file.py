@@ -93,14 +93,13 @@ def check_numbers(path: Path, root: Element) -> None:
 
 
 def _check(path: Path, owner: Element, what: str, text: str) -> None:
+    place = f"{owner.tag} '{owner.get('name', '')}': {what}"
     words, counts = text.split(), _NUMBERS.get(what) or _COUNTS.get(what, (1,))
     if len(words) not in counts:
-        wanted = f"expected {' or '.join(map(str, counts))} number(s), found {len(words)}"
-        raise InputError(path, f"{owner.tag} '{owner.get('name', '')}': {what}: {wanted}")
+        raise InputError(path, f"{place}: expected {' or '.join(map(str, counts))} number(s), found {len(words)}")
     for word in words:
         endless = what in _ENDLESS and word.lower().lstrip("+-") in ("inf", "infinity")
         value = number_of(word)
         bad = value is None or abs(value) > _LARGEST or 0 < abs(value) < _SMALLEST
         if bad and not endless and not (what in _ENDLESS and value is not None):
-            wanted = f"expected finite numbers of a usual size, found '{word[:40]}'"
-            raise InputError(path, f"{owner.tag} '{owner.get('name', '')}': {what}: {wanted}")
+            raise InputError(path, f"{place}: expected finite numbers of a usual size, found '{word[:40]}'")

@@ -97,7 +97,7 @@ def base_wrench(
 ) -> Figure:
     """The wrench on the base that the motion needs and no contact inside the friction cone supplies.
 
-    time: (N,) [s] since the first command. residual: (N, 6) [moment about the base's origin N m, force N] in the world.
+    time: (N,) [s] on the take's clock. residual: (N, 6) [moment about the base's origin N m, force N] in the world.
     sigma: (N, 6), what the measurement's noise makes of it, drawn as ±2σ. weight: of the robot [N], for scale.
     """
     figure = new_figure(10, 5.4)
@@ -122,7 +122,7 @@ def base_wrench(
             for a, b in feet:
                 axes.axvspan(a, b, color=ERROR, alpha=0.04, linewidth=0, zorder=0.4)
     figure.legend(*rows[0].get_legend_handles_labels(), loc="outside upper right", ncols=3)
-    rows[1].set_xlabel("time since the first command [s]")
+    rows[1].set_xlabel("time [s]")
     return figure
 
 

@@ -126,7 +126,7 @@ def test_what_a_jury_remembers_it_does_not_simulate_again(worn, tmp_path):
 
 def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(worn):
     for c in candidates(worn[0].model, worn[1].evaluator.evidence):
-        if not c.neutral or isinstance(c, SwungMass):  # of that, test_gap_point_mass
+        if not c.neutral or isinstance(c, SwungMass):  # of that, test_point_mass
             continue
         neutral = c.values(np.zeros(c.size))
         assert all(v == n or (n == np.inf and v == p.high) for v, n, p in zip(neutral, c.neutral, c.parameters)), str(c)

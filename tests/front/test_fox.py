@@ -1,0 +1,112 @@
+"""A robot with other names, joints and servos than the puppy's goes through every verb."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from tests.command import succeeds
+from workbench import load_model, load_motion
+from workbench.compare.footfalls import foot_phases
+from workbench.experiment.limits import Reach
+from workbench.experiment.stance import BodyMoves
+from workbench.recording import BodyTrack, Measurement, Take, observe, write_motive
+from workbench.robot import RobotModel, data_file
+from workbench.simulation import Simulation, SimulationConfig
+
+TROT = data_file("fox/trot.csv")
+FEET = {"LF_KFE", "LH_KFE", "RF_KFE", "RH_KFE"}
+STARTS_AT, CYCLES, CYCLE = 0.4137, 3, 0.64
+
+
+@pytest.fixture(scope="module")
+def fox() -> RobotModel:
+    model = load_model("fox")
+    return replace(model, rigid_bodies={"Trunk": "trunk", **{f"{leg} shank": f"{leg}_SHANK" for leg in ("LF", "LH", "RF", "RH")},
+                                        **{f"{leg} thigh": f"{leg}_THIGH" for leg in ("LF", "LH", "RF", "RH")},
+                                        **{f"{leg} hip": f"{leg}_HIP" for leg in ("LF", "LH", "RF", "RH")}})
+
+
+@pytest.fixture(scope="module")
+def trot(fox: RobotModel) -> Take:
+    return Simulation(fox, SimulationConfig()).run(load_motion(TROT, fox).commands(cycles=CYCLES), 2.1, 0.4)
+
+
+def write_session(folder: Path, fox: RobotModel, take: Take, cycles: int) -> Path:
+    """The take before cameras, with noise, as a session."""
+    rng = np.random.default_rng(3)
+    measurement = Measurement(starts_at=STARTS_AT, yaw=0.2, origin=np.array([0.1, -0.2, 0.0]),
+                              pivots={a: rng.normal(0, 0.01, 3) for a in fox.rigid_bodies})
+    bodies = {}
+    for asset, track in observe(take, measurement, fox, np.arange(0, STARTS_AT + take.time[-1] - 0.1, 1 / 120))[1].items():
+        turn = Rotation.from_rotvec(rng.normal(0, np.deg2rad(0.1), (len(track.p), 3)))
+        bodies[asset] = BodyTrack(track.p + rng.normal(0, 1e-4, track.p.shape),
+                                  (turn * Rotation.from_quat(track.quat, scalar_first=True)).as_quat(scalar_first=True))
+    write_motive(folder / "trot.csv", bodies, 120.0)
+    content = {"format": 1, "robot": {"model": "package://fox/fox.sdf", "servos": str(data_file("fox/servo.yaml")),
+                                      "rigid_bodies": dict(fox.rigid_bodies)},
+               "ground": {"friction": 0.6},
+               "takes": [{"name": "trot", "motion": str(TROT), "cycles": cycles, "recording": "trot.csv", "base": take.base}]}
+    (folder / "session.yaml").write_text(yaml.safe_dump(content))
+    return folder / "session.yaml"
+
+
+@pytest.fixture(scope="module")
+def session(fox: RobotModel, trot: Take, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_session(tmp_path_factory.mktemp("fox"), fox, trot, CYCLES)
+
+
+def test_it_trots_forward_on_the_feet_that_were_meant(fox: RobotModel, trot: Take) -> None:
+    assert trot.p_WB is not None
+    went = np.interp([CYCLE, CYCLES * CYCLE], trot.time, trot.p_WB[:, 0])  # in the first cycle it crouches
+    assert went[1] - went[0] > 0.01
+    phases = foot_phases(trot, fox)
+    assert set(phases) == FEET
+    assert all(0.2 < p.duty < 0.98 for p in phases.values())
+
+
+def test_the_next_experiment_may_move_its_body(fox: RobotModel) -> None:
+    pose = BodyMoves(fox, Reach(fox))._pose((0.0, 0.0, -0.15, 0.0, 0.0, 0.0))
+    assert pose is not None
+    assert set(pose) == set(fox.joints)
+    k = fox.kinematics
+    for link in fox.foot_links.values():
+        at = [k.forward(np.array([[q.get(j, 0.0) for j in fox.joints]]))[link][0][0, 2] for q in ({}, pose)]
+        assert at[1] > at[0] + 0.005  # nearer to the body, which goes down
+
+
+def test_a_session_is_compared_with_footfalls(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = succeeds(capsys, "compare", str(session), "--out", str(tmp_path), "--jobs", "1")
+    (take,) = json.loads((tmp_path / "comparison.json").read_text())["takes"]
+    assert set(take["feet"]) == FEET
+    assert all(c["error"] < 1.0 for c in take["joints"].values()), said  # deg: the simulation that was recorded, and noise
+    assert (tmp_path / "report.html").stat().st_size > 100_000
+
+
+@pytest.mark.parametrize("arguments", [
+    ("inspect", "package://fox/fox.sdf"), ("inspect", str(TROT)),
+    ("inverse-dynamics", str(TROT), "--model", "fox", "--cycles", "1", "--out"),
+    ("export", str(TROT), "--model", "fox", "--cycles", "1", "--force", "--out")], ids=lambda a: "_".join(a[:1]))
+def test_other_verbs_take_it(arguments: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = [str(tmp_path / "out")] if arguments[-1] == "--out" else []
+    assert succeeds(capsys, *arguments, *out)
+
+
+@pytest.mark.slow
+def test_dry_friction_in_it_is_found(fox: RobotModel, tmp_path: Path) -> None:
+    """Minutes: the whole of `diagnose` on a robot with none of the puppy's names."""
+    import workbench
+
+    worn = fox.with_effect(workbench.EffectSpec("coulomb_friction", ("RF_HFE",), {"torque": 0.2}))
+    commands = load_motion(TROT, fox).commands(cycles=5)
+    take = Simulation(worn, SimulationConfig(base="fixed")).run(commands, commands.end + 0.6, 0.3)
+    result = workbench.diagnose(write_session(tmp_path, fox, take, 5))
+    (found,) = result.diagnosis.findings
+    assert (found.effect, found.where) == ("coulomb_friction", ("RF_HFE",))
+    assert found.parameters["torque"].value == pytest.approx(0.2, abs=0.03)

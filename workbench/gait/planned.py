@@ -1,0 +1,48 @@
+"""Motions for which the kino-centroidal programme is solved: seeds of a request, and twenty tasks that try it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.gait.machine import GaitMachine
+from workbench.gait.request import Request
+from workbench.gait.shape import KNEES, GaitShape
+from workbench.gait.trajopt import Task, plan
+
+MODEST, MODEST_TURN = 0.2, 0.5
+"""Speeds [m/s, rad/s] of seeds where a request says none: CMA-ES goes on from there."""
+_TROT = GaitShape("trot", (1, 1), 12, 2.4, duty=0.6, lift=0.025, crouch=0.04)
+
+
+def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ...]:
+    """Shapes of solved programmes for a request: trots at the speed asked for, or at MODEST, knees both back, and the front ones
+    forward if that is allowed."""
+    speed = request.speed if request.speed is not None else MODEST_TURN if request.way == "turn" else MODEST
+    ways = {"forward": (speed, 0.0), "arc": (speed, 0.0), "backward": (-speed, 0.0), "sideways": (0.0, speed), "turn": (0.0, 0.0)}
+    velocity = ways[request.way]
+    turn = speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius
+    knees = KNEES[:1] if request.built_knees else (KNEES[0], KNEES[2])
+    plans = [plan(machine, Task(str(k), replace(_TROT, knees=k), velocity, turn, request.slope)) for k in knees]
+    return tuple(p.shape for p in plans if p.solved)
+
+
+def bundled_tasks() -> Sequence[Task]:
+    """Twenty tasks: forward and backward, sideways, turns, uphill, in all families."""
+    trot = GaitShape("trot", (1, 1), 8, 2.4, duty=0.6, lift=0.02, crouch=0.04)
+    crawl = replace(trot, family="crawl", frequency=1.0, duty=0.8)
+    walk = replace(trot, family="walk", frequency=1.6, duty=0.7)
+    return (
+        *(Task(f"trot {v:g} m/s", trot, (v, 0.0)) for v in (0.05, 0.1, 0.2, 0.3)),
+        Task("trot 0.4 m/s, 3.2 Hz", replace(trot, frequency=3.2), (0.4, 0.0)),
+        *(Task(f"walk {v:g} m/s", walk, (v, 0.0)) for v in (0.05, 0.1, 0.15)),
+        *(Task(f"crawl {v:g} m/s", crawl, (v, 0.0)) for v in (0.03, 0.06)),
+        *(Task(f"trot backward {v:g} m/s", trot, (-v, 0.0)) for v in (0.1, 0.2)),
+        Task("crawl backward 0.04 m/s", crawl, (-0.04, 0.0)),
+        *(Task(f"trot sideways {v:g} m/s", trot, (0.0, v)) for v in (0.05, 0.1)),
+        *(Task(f"turn {np.degrees(w):.0f} deg/s", trot, (0.0, 0.0), w) for w in np.radians([20.0, 40.0])),
+        Task("arc of 0.5 m at 0.1 m/s", trot, (0.1, 0.0), 0.2),
+        Task("uphill 15 deg 0.1 m/s", trot, (0.1, 0.0), 0.0, float(np.radians(15))),
+        Task("pace 0.1 m/s", replace(trot, family="pace"), (0.1, 0.0)))
