@@ -21,8 +21,7 @@ from workbench.dynamics.derivatives import differentiate
 from workbench.dynamics.trajectory import angular_motion
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
-from workbench.recording import Take
-from workbench.recording.mocap import quaternions
+from workbench.recording import Take, quaternions
 from workbench.robot import Ground, InputError, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
-from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
 from workbench.recording.recording import Measurement, Recording

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.compare.metrics import heading, turned
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.take import Take
 
 FELL_TILT = np.deg2rad(60.0)

@@ -18,8 +18,7 @@ from workbench.dynamics.stance import dearness, floor_under
 from workbench.dynamics.trajectory import RobotTrajectory, smoothed
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
-from workbench.recording import Take
-from workbench.recording.mocap import quaternions
+from workbench.recording import Take, quaternions
 from workbench.robot import GRAVITY, InputError, RobotModel
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import MultibodyForces
 
 from workbench.dynamics.trajectory import RobotTrajectory
 from workbench.effects.apply import physics_of, resolved
-from workbench.recording.mocap import quaternions
+from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import rotation_about
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.dynamics.derivatives import Derivatives, differentiate
-from workbench.recording.mocap import quaternions
+from workbench.recording import quaternions
 from workbench.robot import InputError
 
 Array = NDArray[np.float64]

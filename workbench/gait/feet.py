@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
-from workbench.recording.mocap import quaternions
+from workbench.recording import quaternions
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 

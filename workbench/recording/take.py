@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 
 Array = NDArray[np.float64]
@@ -82,8 +83,6 @@ class Take:
 
     def resampled(self, time: Array) -> Take:
         """The take at other times (M,) [s] on its own clock, linear between samples, NaN outside and in gaps."""
-        from workbench.recording.mocap import quaternions as quat
-
         time = np.asarray(time, dtype=float)
 
         def linear(y: Array | None) -> Array | None:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.joint_names import named_by_model
-from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.angles import angle_sigma, base_row, in_world, joint_angles
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import Tracks, check_assets, tracks_of

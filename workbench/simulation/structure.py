@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.apply import Physics
+from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
-from workbench.recording.mocap import quaternions as quat
 from workbench.robot import Kinematics, RobotModel
 
 Array = NDArray[np.float64]

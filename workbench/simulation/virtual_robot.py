@@ -172,7 +172,7 @@ def _law(model: RobotModel, joint: str, family: ServoProfile) -> dict[str, int]:
 
 def _shaken(quat: Array, turn: Array) -> Array:
     """Quaternions wxyz (N, 4), each turned by a small rotation vector (N, 3) [rad]."""
-    from workbench.recording.mocap import quaternions
+    from workbench.recording import quaternions
 
     half = np.concatenate([np.ones((len(turn), 1)), turn / 2], axis=1)
     return quaternions.multiply(quat, half / np.linalg.norm(half, axis=1, keepdims=True))

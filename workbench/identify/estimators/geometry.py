@@ -20,7 +20,7 @@ from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import CONCLUSIONS, READ_OFF
 from workbench.identify.parameters import Candidate, Key
 from workbench.identify.problem import TakeEvidence
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import seen_joints, tracks_of, turned

@@ -21,7 +21,7 @@ from workbench.recording.formats.motive_header import (
 )
 from workbench.recording.formats.numbers import Bytes, column, read_columns, stacked, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
-from workbench.recording.mocap.quaternions import from_euler
+from workbench.recording.quaternions import from_euler
 from workbench.recording.recording import Recording
 from workbench.robot import InputError
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import Tracks, relative_rotation, seen_joints, turned, turned_quaternion
 from workbench.robot import RobotModel
 

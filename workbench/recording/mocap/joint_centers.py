@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import SeenJoint, Tracks
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.swaps import unswap
 from workbench.recording.mocap.tracks import Tracks, tracks_of

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
-from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.angles import base_row, joint_angles
 from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, turned, turned_quaternion
 from workbench.recording.recording import Measurement

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.angles import Angles, base_row
 from workbench.recording.mocap.tracks import Tracks, turned, turned_quaternion
 from workbench.robot import RobotModel

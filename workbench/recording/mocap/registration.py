@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.recording import quaternions as quat
 from workbench.recording.joint_names import named_by_model
 from workbench.recording.log_state import first_command, resolution
-from workbench.recording.mocap import quaternions as quat
 from workbench.recording.mocap.angles import Angles, joint_angles
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.pivots import base_origin, find_pivots

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import Tracks
 from workbench.robot import RobotModel
 

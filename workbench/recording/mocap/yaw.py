@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-from workbench.recording.mocap import quaternions as quat
+from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, relative_rotation, seen_joints, tracks_of, turned
 from workbench.recording.mocap.unseen import without_unseen
