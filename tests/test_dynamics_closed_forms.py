@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.shared_data import shared
+from tests.quadruped import quadruped_sdf
 from workbench.dynamics import InverseDynamics, RobotTrajectory
 from workbench.dynamics.contact import STICKING, project, share_forces
 from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, torque_margin
@@ -47,7 +47,7 @@ def box(tmp_path: Path) -> RobotModel:
 
 @pytest.fixture
 def quadruped() -> RobotModel:
-    return RobotModel(description=str(shared("practice/p0_nothing_hidden/robot.sdf")), ground=Ground(friction=0.6))
+    return RobotModel(description=str(quadruped_sdf()), ground=Ground(friction=0.6))
 
 
 def standing(model: RobotModel, **changes: np.ndarray) -> RobotTrajectory:

@@ -8,7 +8,7 @@ import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from tests.shared_data import shared
+from tests.quadruped import quadruped_sdf
 from workbench.dynamics import InverseDynamics, RobotTrajectory
 from workbench.robot import ConfigureParser, Ground, RobotModel, puppy_model, resource_dir
 
@@ -84,10 +84,10 @@ def dofs(m: mujoco.MjModel, model: RobotModel) -> list[int]:
     return [int(m.joint(j).dofadr[0]) for j in model.joints]
 
 
-@pytest.fixture(params=["practice", "puppy"])
+@pytest.fixture(params=["quadruped", "puppy"])
 def model(request: pytest.FixtureRequest) -> RobotModel:
-    if request.param == "practice":
-        return RobotModel(description=str(shared("practice/p0_nothing_hidden/robot.sdf")), ground=Ground(friction=0.6))
+    if request.param == "quadruped":
+        return RobotModel(description=str(quadruped_sdf()), ground=Ground(friction=0.6))
     if not (Path(resource_dir("models")) / "puppy" / "puppy.sdf").is_file():
         pytest.skip("the puppy's SDF is not made yet")
     return puppy_model()

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
-from tests.shared_data import shared
+from tests.quadruped import quadruped_sdf, stand_csv
 from workbench.dynamics import (
     InverseDynamics,
     InverseDynamicsResult,
@@ -22,7 +22,7 @@ from workbench.dynamics.trajectory import angular_motion
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.recording import Take, quaternions
-from workbench.robot import Ground, InputError, RobotModel
+from workbench.robot import Ground, InputError, RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 
@@ -31,12 +31,12 @@ RATE = 120.0
 
 @pytest.fixture(scope="module")
 def model() -> RobotModel:
-    return RobotModel(description=str(shared("practice/p0_nothing_hidden/robot.sdf")), ground=Ground(0.6, 1e5, 20.0))
+    return RobotModel(description=str(quadruped_sdf()), ground=Ground(0.6, 1e5, 20.0))
 
 
 @pytest.fixture(scope="module")
 def walk(model: RobotModel) -> Take:
-    motion = load_motion(shared("practice/p0_nothing_hidden/motions/walk.csv"), model)
+    motion = load_motion(data_file("robotis_walk.csv"), model)
     return play_motion(Simulation(model, SimulationConfig(contact_period=1e-3)), motion, cycles=3)
 
 
@@ -295,7 +295,7 @@ def test_a_floor_believed_too_slippery_shows_in_the_residual(model: RobotModel, 
 
 def test_at_rest_the_servos_hold_what_statics_says(model: RobotModel) -> None:
     """On the stand nothing is left to choose: simulated and reconstructed torques agree closely."""
-    motion = load_motion(shared("practice/p0_nothing_hidden/motions/stand.csv"), model)
+    motion = load_motion(stand_csv(), model)
     take = play_motion(Simulation(model, SimulationConfig(base="fixed")), motion, cycles=1)
     part = take.resampled(np.arange(-0.2, 3.0, 1e-3))
     result = inverse_dynamics(model, part, draws=0)

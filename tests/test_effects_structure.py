@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.quadruped import quadruped_sdf
 from tests.recording_robot import write_robot
 from tests.servo_rig import GRAVITY, LENGTH, rig_model
 from tests.shared_data import shared
@@ -504,9 +505,8 @@ def test_neighbours_that_overlap_still_do_not_collide(arm):
     np.testing.assert_allclose(loose.q[-1], plain.q[-1], atol=2e-3)
 
 
-def test_the_practice_robot_takes_all_of_them():
-    path = shared("practice/p0_nothing_hidden/robot.sdf")
-    model = RobotModel(str(path), servos={})
+def test_a_quadruped_takes_all_of_them():
+    model = RobotModel(str(quadruped_sdf()), servos={})
     effects = (("backlash", "flm", {"gap": 2.0}), ("joint_compliance", "frm", {"stiffness": 8.0}),
                ("loose_mount", "blm", {"play": 2.0, "axis": (1.0, 0.0, 0.0)}),
                ("joint_stop", "tail", {"lower": -5.0, "upper": 5.0}),

@@ -85,7 +85,7 @@ def test_the_command_is_installed(python: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_demo_runs_from_the_wheel_in_an_empty_folder(python: Path, tmp_path: Path) -> None:
-    done = _run([str(python.with_name("workbench")), "demo"], tmp_path)
+    done = _run([str(python.with_name("workbench")), "demo"], tmp_path, 1500)
     assert "wrote runs/demo" in done.stdout
     assert (tmp_path / "runs/demo/report.html").stat().st_size > 100_000
 
@@ -97,8 +97,8 @@ def test_the_source_distribution_builds_what_the_repository_has(sources: Path) -
     assert not {name for name in tracked if (ROOT / name).is_file()} - inside
 
 
-def _run(command: list[str], cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def _run(command: list[str], cwd: Path | None = None, timeout: float = 300) -> subprocess.CompletedProcess[str]:
     environment = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
-    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=timeout, check=False)
     assert done.returncode == 0, f"{' '.join(command[:4])}: {done.stdout}{done.stderr}"
     return done
