@@ -145,7 +145,7 @@ def test_a_take_without_a_base_has_an_empty_path(model: RobotModel, takes: tuple
     for figure in (figures.body_path(fixed), figures.body_attitude(fixed)):
         figures.encode(figure)
         drawn = [np.asarray(line.get_ydata(), dtype=float) for axes in figure.axes for line in axes.lines]
-        assert not any(np.isfinite(y).any() for y in drawn)
+        assert all(np.isfinite(y).sum() <= 2 for y in drawn)  # but for the lines of reference
 
 
 def test_duty_factor_leaves_out_what_was_not_seen() -> None:

@@ -26,7 +26,7 @@ MAX_LENGTH = {"robot": 400, "table": 800, "answer": 300}
 PLANTED = (
     ("robot", "upload.c", "if (offset > u->got || offset + n > u->size) return UPLOAD_OFFSET;",
      "if (offset > u->got) return UPLOAD_OFFSET;"),
-    ("robot", "upload.c", "if (u->got != u->size) return UPLOAD_OFFSET;", ""),
+    ("robot", "upload.c", "if (u->running != u->crc) return TABLE_CRC;", ""),
     ("robot", "upload.c", "return fault ? fault : table_fits(u->spare, u->active);", "return fault;"),
     ("robot", "upload.c", "if (!fault && u->checked++ < table_poses(u->spare)) return false;",
      "if (!fault && u->checked++ < 1u) return false;"),

@@ -58,6 +58,20 @@ static void upload(struct sim *sim, struct script *s) {
     sim_frame(sim, link, FRAME_END, p, 0);
 }
 
+/* An upload that says one size and sends another, in order. */
+static void flood(struct sim *sim, struct script *s) {
+    uint8_t p[FRAME_PAYLOAD] = {0};
+    uint32_t said = (next(s) * 32u) % 4800u, sent = (next(s) * 32u) % 6400u;
+    put32(p, said);
+    p[8] = (uint8_t)(sim->r.upload.accepted + 1u);
+    sim_frame(sim, LINK_PC, FRAME_BEGIN, p, 10);
+    memset(p, 0x55, sizeof p);
+    for (uint32_t at = 0; at < sent; at += 200u) {
+        put16(p, at);
+        sim_frame(sim, LINK_PC, FRAME_DATA, p, FRAME_PAYLOAD - 2u);
+    }
+}
+
 static void fault(struct sim *sim, struct script *s) {
     struct sim_servo *v = &sim->servo[next(s) % (sim->joints ? sim->joints : 1u)];
     uint8_t value = next(s);
@@ -105,7 +119,7 @@ static void check(const struct sim *sim) {
 static void one(struct sim *sim, struct script *s) {
     uint8_t bytes[256];
     uint32_t n;
-    switch (next(s) % 12u) {
+    switch (next(s) % 13u) {
     case 0: sim_run(sim, 1u + next(s)); break;
     case 1: n = take(s, bytes, 200); sim_send(sim, next(s) & 1u, bytes, n); break;
     case 2: n = take(s, bytes, FRAME_PAYLOAD); sim_frame(sim, next(s) & 1u, next(s), bytes, n); break;
@@ -116,6 +130,7 @@ static void one(struct sim *sim, struct script *s) {
     case 7: fault(sim, s); break;
     case 8: bridge_packet(sim, s); break;
     case 9: sim_frame(sim, LINK_PC, (uint8_t)(1u + next(s) % 4u), bytes, 0); break;
+    case 12: flood(sim, s); break;
     case 10: sim_frame(sim, LINK_PC, (uint8_t)(FRAME_BRIDGE + (next(s) & 1u)), bytes, 0); break;
     default: sim_run(sim, 3u * next(s)); break;
     }

@@ -38,6 +38,7 @@ def test_the_bus_through_the_flashed_image():
     r.sound()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_silence_on_the_bridge_ends_with_torque_off():
     """What a killed program, or a pulled plug, comes to."""

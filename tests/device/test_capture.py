@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import signal
 import socket
 import subprocess
@@ -21,6 +22,7 @@ from workbench.recording.formats.read import read_recording
 from workbench.robot import InputError
 
 VERSIONS = [(2, 7), (2, 10), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 4)]
+MANY = Faults(lost=0.02, broken=0.01, doubled=0.01, swapped=0.01)
 FAULTS = Faults(lost=0.01, broken=0.001, doubled=0.001, swapped=0.001)
 
 
@@ -37,7 +39,8 @@ def check(capture, motive):
     counts, sent = capture.counts, motive.sent
     assert counts.lost == within(counts, sent.lost)
     assert counts.broken == len({n for n in sent.broken if counts.first <= n <= counts.last})
-    assert counts.late == within(counts, sent.swapped)
+    overtaken = {n for n in sent.swapped if n + 1 not in sent.lost | sent.broken | sent.swapped}
+    assert counts.late == within(counts, overtaken)
     assert abs(counts.doubled - within(counts, sent.doubled)) <= (counts.last in sent.doubled)
     recording = read_recording(capture.take)
     assert len(recording.time) == counts.last - counts.first + 1
@@ -62,8 +65,8 @@ def check(capture, motive):
 @pytest.mark.parametrize("group", ["239.255.42.99", None], ids=["multicast", "unicast"])
 @pytest.mark.parametrize("version", VERSIONS, ids=lambda v: f"{v[0]}.{v[1]}")
 def test_each_version_is_recorded_exactly(tmp_path, version, group):
-    motive = VirtualMotive(NAMES, scene, version=version, group=group, faults=FAULTS, seed=version[1], started=77.0)
-    capture = recorded(tmp_path, motive, 2.5)
+    motive = VirtualMotive(NAMES, scene, version=version, group=group, faults=MANY, seed=version[1], started=77.0)
+    capture = recorded(tmp_path, motive, 1.5)
     check(capture, motive)
     assert (motive.keep_alives > 0) == (group is None or version < (3, 0))
     assert not (tmp_path / "take.natnet").exists()
@@ -95,7 +98,7 @@ def test_ten_minutes_with_faults(tmp_path):
 def test_the_servers_clock_is_found(tmp_path):
     """A clock that is 1000 s ahead and runs 50 ppm fast, seen through a link with 0.2 ms each way."""
     motive = VirtualMotive(NAMES[:2], scene_of_two, started=12.0, clock=1012.0, clock_ratio=1 + 50e-6)
-    capture = recorded(tmp_path, motive, 40.0)
+    capture = recorded(tmp_path, motive, 15.0)
     begin = 12.0 + (capture.counts.first - motive.first_number) / motive.rate
     assert capture.first_host == pytest.approx(begin, abs=1e-5)
     assert capture.clock.offset == pytest.approx(1000.0, abs=1e-4)
@@ -267,7 +270,7 @@ def test_what_is_wrong_is_one_line(tmp_path, capsys):
     assert "not a recording cut short" in refused(capsys, "record", "--finish", str(tmp_path / "x"), *out)
     with MotiveOnSockets(mute=True) as server:
         line = refused(capsys, "record", "127.0.0.1", "--port", str(server.port), *out)
-    assert "no frame came in 3.0 s by multicast group 239.255.42.99" in line or "no frame came in 3.1 s" in line
+    assert re.search(r"no frame came in \d+\.\d s by multicast group 239\.255\.42\.99", line)
     assert "through interface 127.0.0.1 (chosen by the route to it; this machine has" in line
     assert "--interface" in line
     assert sorted(p.name for p in tmp_path.iterdir()) == ["x"]

@@ -7,9 +7,12 @@ from tests.firmware.image import needs_compiler
 from workbench.robot import EffectSpec
 
 
-def test_a_worn_gear_of_an_arm_is_named(tmp_path):
-    verdict, found = named(of_an_arm(tmp_path, (EffectSpec("coulomb_friction", ("two",), {"torque": 0.2}),)))
+def test_a_worn_gear_and_a_register_of_an_arm_are_named(tmp_path):
+    """The gear by what it does, the register by itself."""
+    worn = EffectSpec("coulomb_friction", ("two",), {"torque": 0.2})
+    verdict, found = named(of_an_arm(tmp_path, (worn,), margins={"one": 3}))
     assert ("coulomb_friction", ("two",)) in found
+    assert found["dead_band", ("one",)] > 0.95
     assert verdict != "no_gap"
 
 

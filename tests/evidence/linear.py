@@ -57,4 +57,4 @@ class Linear(Rollouts):
 
 
 def linear(of: Region, truth: np.ndarray, does: Mapping[str, np.ndarray]) -> Linear:
-    return Linear(None, None, (of,), (start(of.numbers),), truth, does)  # type: ignore[arg-type]
+    return Linear(None, None, (of,), (start(of.numbers),), truth=truth, does=does)  # type: ignore[arg-type]

@@ -17,6 +17,7 @@ from workbench.simulation import Job, SimulationConfig, simulate_batch
 SERVO = {"stall_torque": 0.7, "no_load_speed": 19.0, "rated_voltage": 7.4, "supply_voltage": 7.4, "coulomb_friction": 0.013,
          "viscous_friction": 0.004, "reflected_inertia": 0.0018, "proportional_gain": 1.15}
 GAINS = (0.3, 0.6, 1.2)
+pytestmark = pytest.mark.slow
 NOISE = 1.5e-3
 
 

@@ -31,7 +31,7 @@ def test_a_users_defaults_are_taken_and_what_is_typed_wins(defaults: Path, capsy
 @pytest.mark.parametrize(("text", "problem"), [
     ("dance: {jobs: 2}", "no verb 'dance'"), ("diagnose: {legs: 2}", "diagnose: no option --legs"),
     ("all: {legs: 2}", "all: no verb"),
-    ("diagnose: {jobs: 0}", "diagnose: jobs: expected 1 or more"),
+    ("diagnose: {jobs: 0}", "diagnose: jobs: expected a whole number from 1 to"),
     ("simulate: {contact: wet}", "simulate: contact: expected one of"),
     ("diagnose: 3", "expected verbs, each with its options"), ("inspect: {json: 1}", "inspect: json: expected true or false")])
 def test_bad_defaults_are_one_line(defaults: Path, text: str, problem: str, capsys: pytest.CaptureFixture[str]) -> None:

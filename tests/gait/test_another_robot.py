@@ -19,5 +19,4 @@ def test_the_practice_quadruped_walks_by_the_same_numbers():
     assert not forward.nominal.fell
     assert forward.nominal.speed > 0.15
     assert {m.where for m in forward.margins if m.name == "range"} == set(model.joints)
-    assert all(m.limit > 0 for m in forward.margins)
     assert np.isfinite([m.use for m in forward.margins]).all()

@@ -81,6 +81,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
                           steadied=run.steadied))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
+    progress("simulating", 0.0)
     done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
     out = []
     for i in range(len(runs)):

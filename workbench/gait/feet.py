@@ -14,8 +14,9 @@ from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 
-TOUCHING = 1.5e-3
-"""Height of a foot's tip [m] below which it carries load: what points of 1e4 N/m and a foot tilted by 10 deg make of it."""
+TOUCHING = 1e-3
+"""Height of a foot's lowest point [m], over where it stands at rest, below which it carries load: there points of 1e4 N/m give
+way by 0.3 mm, loaded twice as much by as much again."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +31,11 @@ class FeetMeasure:
 
 
 def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float) -> FeetMeasure:
-    """Of a free take from `begin` [s] on, in whole cycles of `period` [s]. Feet are where the model's kinematics put them."""
-    places = tip_places(take, model, legs)
+    """Of a free take from `begin` [s] on, in whole cycles of `period` [s]. Feet are where the model's kinematics put them; what
+    counts of a tilted one is its lowest point."""
+    height, speed = _lowest(take, model, legs)
     inside = take.time >= begin - 1e-9
-    z = places[:, :, 2] - _floor(places[:, :, 2], take.time < 0)
-    speed = np.linalg.norm(np.gradient(places[:, :, :2], take.time, axis=0), axis=2)
+    z = height - _floor(height, take.time < 0)
     down = (z < TOUCHING) & inside[:, None]
     cycles = range(max(int((take.time[-1] - begin) / period + 1e-6), 1))
     tops = [z[(take.time >= begin + k * period - 1e-9) & (take.time < begin + (k + 1) * period)].max(axis=0) for k in cycles]
@@ -42,20 +43,26 @@ def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: fl
                        clearance=float(np.min(tops)), tipping=_tipping_angle(model, legs) - _tilt(take))
 
 
-def tip_places(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> Array:
-    """The feet's tips in W (N, F, 3) [m]."""
+def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array, Array]:
+    """Of each foot's lowest point: its height in W (N, F) [m] and its speed along the ground (N, F) [m/s]."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     poses, R_WB = model.kinematics.forward(take.q, take.joints), quaternions.matrix(take.quat_WB)
-    out = np.empty((len(take), len(legs), 3))
+    height, speed = np.empty((len(take), len(legs))), np.empty((len(take), len(legs)))
     for i, leg in enumerate(legs):
         p, R = poses[leg.link]
-        out[:, i] = take.p_WB + np.einsum("nij,nj->ni", R_WB, p + R @ leg.tip)
-    return out
+        p_B = p[:, None] + leg.spheres @ np.swapaxes(R, 1, 2)
+        p_W = take.p_WB[:, None] + np.einsum("nij,nsj->nsi", R_WB, p_B)
+        z = p_W[..., 2] - leg.radii
+        low = np.argmin(z, axis=1)[:, None]
+        along = np.linalg.norm(np.gradient(p_W[..., :2], take.time, axis=0), axis=2)
+        height[:, i] = np.take_along_axis(z, low, axis=1)[:, 0]
+        speed[:, i] = np.take_along_axis(along, low, axis=1)[:, 0]
+    return height, speed
 
 
 def _floor(z: Array, resting: NDArray[np.bool_]) -> Array:
-    """Where each foot's tip stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
+    """Where each foot stands (F,) [m] before the first command; without such frames, the lowest it ever is."""
     return np.asarray(np.median(z[resting], axis=0) if resting.any() else z.min(axis=0))
 
 

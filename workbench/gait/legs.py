@@ -26,7 +26,8 @@ _STRIDE = 0.4
 class Leg:
     """One leg. foot: its name (its last joint's). joints: from the body on, those that move this foot alone. tip: (3,) [m] where
     it touches the ground in neutral, in the last link's frame. neutral: (3,) [m] the tip in the base link's frame with all
-    joints at zero. hip: (3,) [m] where its first joint is, in the same."""
+    joints at zero. hip: (3,) [m] where its first joint is, in the same. spheres: (S, 3) [m] in the last link's frame, with
+    their radii (S,) [m], by which it can touch the ground."""
 
     foot: str
     joints: tuple[str, ...]
@@ -35,6 +36,8 @@ class Leg:
     hip: Array
     kinematics: Kinematics
     link: str
+    spheres: Array
+    radii: Array
 
     def place(self, q: Array) -> Array:
         """Where the tip is in the base link's frame (N, 3) [m] for angles (N, k) [rad], other joints at zero."""
@@ -128,5 +131,6 @@ def legs_of(model: RobotModel) -> tuple[Leg, ...]:
         lowest = np.array([*places[:, :2].mean(axis=0), float((places[:, 2] - points.radius[own]).min())])
         f = k.frames[joints[0]]
         p_P, R_P = k.forward(np.zeros((1, len(k.joints))))[f.parent]
-        out.append(Leg(foot, joints, R[0].T @ (lowest - p[0]), lowest, p_P[0] + R_P[0] @ f.X_PF_p, k, link))
+        out.append(Leg(foot, joints, R[0].T @ (lowest - p[0]), lowest, p_P[0] + R_P[0] @ f.X_PF_p, k, link,
+                       points.p_LS[own], points.radius[own]))
     return tuple(out)

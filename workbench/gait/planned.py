@@ -14,7 +14,8 @@ from workbench.gait.trajopt import Task, plan
 
 MODEST, MODEST_TURN = 0.2, 0.5
 """Speeds [m/s, rad/s] of seeds where a request says none: CMA-ES goes on from there."""
-_TROT = GaitShape("trot", (1, 1), 12, 2.4, duty=0.6, lift=0.025, crouch=0.04)
+LIFT, CROUCH = 0.11, 0.15
+"""By leg length: low enough that bent hind knees keep their range with what the inverse servo law asks beyond."""
 
 
 def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ...]:
@@ -25,7 +26,9 @@ def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ..
     velocity = ways[request.way]
     turn = speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius
     knees = KNEES[:1] if request.built_knees else (KNEES[0], KNEES[2])
-    plans = [plan(machine, Task(str(k), replace(_TROT, knees=k), velocity, turn, request.slope)) for k in knees]
+    length = machine.leg_length
+    trot = GaitShape("trot", poses=12, frequency=2.4, duty=0.6, lift=LIFT * length, crouch=CROUCH * length)
+    plans = [plan(machine, Task(str(k), replace(trot, knees=k), velocity, turn, request.slope)) for k in knees]
     return tuple(p.shape for p in plans if p.solved)
 
 

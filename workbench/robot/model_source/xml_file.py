@@ -18,8 +18,9 @@ DRAKE = "http://drake.mit.edu"
 
 _NUMBERS = {**dict.fromkeys(("mass", "ixx", "iyy", "izz", "ixy", "ixz", "iyz", "lower", "upper", "effort", "velocity", "damping",
                              "spring_stiffness", "spring_reference", "radius", "length", "mu", "mu2"), (1,)),
-            "pose": (6, 7), "xyz": (3,), "size": (2, 3), "scale": (3,)}
-"""SDF's elements whose text is numbers, and how many (a pose with a quaternion has seven, a plane's size two)."""
+            "pose": (0, 6, 7), "xyz": (3,), "size": (2, 3), "scale": (3,)}
+"""SDF's elements whose text is numbers, and how many (a pose with a quaternion has seven, one that is its frame none; a
+plane's size two)."""
 _ATTRIBUTES = {"mass": ("value",), "inertia": ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "origin": ("xyz", "rpy"),
                "axis": ("xyz",), "limit": ("lower", "upper", "effort", "velocity"), "dynamics": ("damping", "friction"),
                "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",), "capsule": ("radius", "length"),
