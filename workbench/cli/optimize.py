@@ -115,7 +115,9 @@ def _speed(text: str) -> float:
 
 
 def _positive(text: str) -> float:
-    value = float(text)
-    if not 0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"expected a positive number, got {text}")
+    from workbench.robot.numerals import number_of
+
+    value = number_of(text)
+    if value is None or not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"expected a positive number, got {text[:40]}")
     return value
