@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from tests.view_takes import small_robot, swing
 from workbench.bench.arm import arm_sdf
 from workbench.cli.diagnose import _line
-from workbench.identify.findings import (
+from workbench.identify.results.findings import (
     Alternative,
     Change,
     Diagnosis,
@@ -25,8 +25,8 @@ from workbench.identify.findings import (
     Unexplained,
     Verdict,
 )
-from workbench.identify.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
-from workbench.identify.take_report import TakeReport
+from workbench.identify.results.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
+from workbench.identify.results.take_report import TakeReport
 from workbench.robot import EffectSpec, RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors

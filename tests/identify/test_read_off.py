@@ -23,11 +23,11 @@ from workbench.identify.estimators.dropped_commands import (
 )
 from workbench.identify.estimators.dropped_in_motion import _suspects, dropped_in_motion, played_without
 from workbench.identify.estimators.stops_and_mounts import _stop, read_off_candidates
-from workbench.identify.findings import Change
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.problem import gather
+from workbench.identify.preparation import gather
+from workbench.identify.results.findings import Change
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job

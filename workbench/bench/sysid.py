@@ -20,7 +20,8 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, gather
+from workbench.identify.preparation import gather
+from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import RolloutEvaluator
 from workbench.identify.selection.best_subsets import MOST_STEPS

@@ -10,7 +10,7 @@ from workbench.cli.check import add_yes, check_session
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
-    from workbench.identify.findings import Finding
+    from workbench.identify.results.findings import Finding
 
 
 STAGES = ("reading", "simulating", "looking anew", "numbers", "rolling out whole", "rolling out the fitted", "drawing")

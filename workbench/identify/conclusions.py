@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.ledger import in_file_units
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
-from workbench.identify.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
+from workbench.identify.results.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
+from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
+from workbench.identify.results.ties import Tie
 from workbench.identify.selection.model_comparison import NamePosterior, Rival
 from workbench.identify.selection.record import SelectionStep
 from workbench.identify.selection.screening import CandidateFit
-from workbench.identify.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 

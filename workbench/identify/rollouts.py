@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollout_key import take_key
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel

@@ -11,9 +11,9 @@ from scipy.stats import beta
 
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, end_of, played_without, steps
-from workbench.identify.findings import Change, Estimate, Finding
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence, joint_error
+from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
 

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, smoothed
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.selection.best_subsets import NEARLY_ALL
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
 from workbench.identify.selection.scheduling import STANDS_OUT, standing_out

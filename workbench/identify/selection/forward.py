@@ -15,9 +15,9 @@ from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Report, Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
+from workbench.identify.problem import channel_gaps
 from workbench.identify.selection.acceptance import (
     ALL_CLOSED,
     LAST_CLOSED,

@@ -9,8 +9,8 @@ import numpy as np
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
+from workbench.identify.problem import channel_gaps
 from workbench.identify.proposals import heavy_links
 
 TIERS, TIERS_OF_ALL = 8, 6
