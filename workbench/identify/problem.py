@@ -143,7 +143,7 @@ class TakeEvidence:
 
 
 def part_of(since: Array) -> NDArray[np.int_]:
-    """Which of PARTS a frame of a held take is in, by its time after the first command [s]."""
+    """Which of `ProblemOptions.parts` a frame of a fixed-base take is in, by its time after the first command [s]."""
     return np.mod(np.floor(since / PROBLEM.part).astype(int), PROBLEM.parts)
 
 
