@@ -23,6 +23,8 @@ from workbench.robot import InputError, RobotModel
 
 _SMALL = np.deg2rad(1.6)
 """No motion of a robot is as small; in radians, it is a right angle."""
+_LARGE = np.deg2rad(200.0)
+"""No servo's goal lies as far from its centre."""
 LONG = 600.0
 """A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
 _ROUTINE = " unseen in "
@@ -116,6 +118,9 @@ def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
     if np.abs(motion.angles).max() < _SMALL and np.ptp(motion.angles) > 0:
         most = np.rad2deg(np.abs(motion.angles).max())
         out.append(f"no joint leaves {most:.2g} deg: are the angles in radians? (a table has degrees)")
+    if np.abs(motion.angles).max() > _LARGE:
+        most = np.rad2deg(np.abs(motion.angles).max())
+        out.append(f"a joint goes to {most:.4g} deg from its servo's centre: are the angles in counts? (a table has degrees)")
     try:
         motion.as_table()
     except InputError as e:

@@ -178,7 +178,8 @@ class InverseDynamics:
                 problems: list[str]) -> InverseDynamicsResult:
         motor = self._motor(solution, trajectory)
         torque_left, speed_left = self._margins(solution, trajectory)
-        loads = {j: servo_load(s, motor[:, i], torque_left[:, i], speed_left[:, i], sigma.torque_left[:, i], sigma.speed_left[:, i])
+        columns = motor, torque_left, speed_left, sigma.torque_left, sigma.speed_left
+        loads = {j: servo_load(s, *(values[:, i] for values in columns))
                  for i, (j, s) in enumerate(zip(self.model.joints, self._servos))}
         if self.machine.left_out:
             problems.append(f"{', '.join(self.machine.left_out)}: not in the inverse dynamics; only effects on masses are")
