@@ -45,7 +45,8 @@ class ServoLoad:
 
 def motor_torque(servos: Sequence[ServoConstants], torque: Array, v: Array, a: Array, friction: bool = True) -> Array:
     """What motor and gear must give, back-EMF taken off, so that `torque` (N, n) [N m] reaches the links:
-    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), the last fading below CREEP (docs/formats.md, section 4)."""
+    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), the last fading
+    below CREEP (docs/formats.md, section 4)."""
     inertia, viscous, coulomb = (_row(servos, key) for key in ("reflected_inertia", "viscous_friction", "coulomb_friction"))
     needed = torque + inertia * a
     if friction:
