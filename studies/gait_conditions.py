@@ -22,7 +22,7 @@ from workbench.gait.certificate import CLAIM
 from workbench.gait.feet import feet_measure
 from workbench.gait.legs import legs_of
 from workbench.gait.measure import fallen, measure
-from workbench.gait.rollouts import rollouts
+from workbench.gait.rollouts import Rollouts
 from workbench.motion import Commands, Motion, load_motion
 from workbench.robot import GRAVITY, EffectSpec, RobotModel, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -73,7 +73,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         jobs = [Job(m, SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01), gait.commands, SECONDS)
                 for m in floors.values()]
         measures = [fallen(len(model.joints)) if t is None else measure(t, m, gait.begin, gait.period, electrical=False)
-                    for t, m in zip(rollouts(jobs), floors.values())]
+                    for t, m in zip(Rollouts().takes(jobs), floors.values())]
         speeds[gait.name] = {name: (math.nan if m.fell else m.speed) for name, m in zip(floors, measures)}
         told[gait.name]["floors"] = {name: None if math.isnan(v) else v for name, v in speeds[gait.name].items()}
     figures["floors"] = _map(speeds)

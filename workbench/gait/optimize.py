@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -35,6 +35,12 @@ WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""
 MEMORY = ".rollouts.jsonl"
 """Where a folder remembers what its searches have simulated."""
+
+
+FIRST_LOOK = Budget(seeds=80, generations=6, robust=0, draws=0)
+"""Beside a refusal: what works instead, in half a minute."""
+BRIEFLY: Mapping[str, Any] = {"draws": 8, "checked": 0, "seconds": 3.0, "floor_seconds": 1.5}
+"""How the nearest table beside a refusal is examined, so that a refusal comes within a minute."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +75,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     ends in the same table."""
     impossible = out_of_reach(machine, request)
     if impossible is not None:
-        return Optimized(request, False, f"cannot be met by any gait: {impossible}", None, None, None)
+        return _instead(machine, request, impossible, ensemble, options, progress, other)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
@@ -87,9 +93,24 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
             "ensemble_sha256": ensemble.sha256, "generations": found.generations, "rollouts": found.rollouts,
             "searched in": round(time.monotonic() - began, 1)}
-        certified = certify(machine, request, table, fresh, options.certify, progress, provenance, other)
+        examined = options.certify if found.best.good else replace(options.certify, **BRIEFLY)
+        certified = certify(machine, request, table, fresh, examined, progress, provenance, other)
     met = found.best.good and certified.certificate.kept
     return Optimized(request, met, "" if met else _unmet(request, found, certified), table, certified, found)
+
+
+def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
+             progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
+    """Of a speed that no gait has: the nearest table, after a first look for the fastest. Up a slope on which nothing stands
+    there is none."""
+    said = f"cannot be met by any gait: {impossible}"
+    if impossible.name == "slope":
+        return Optimized(request, False, said, None, None, None)
+    look = replace(options, budget=FIRST_LOOK, certify=replace(options.certify, **BRIEFLY))
+    nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
+    if nearest.found is not None and nearest.found.best.good:
+        said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
+    return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
 
 
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
