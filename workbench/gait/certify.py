@@ -181,12 +181,13 @@ class _Examiner:
         return {"count": len(robots), "speed apart, RMS": float(np.sqrt((apart**2).mean()))}
 
     def _measured(self, take: Take, model: RobotModel) -> tuple[GaitMeasure, FeetMeasure]:
-        begin, period = self.table.start_seconds, self.table.period
+        period = self.table.period
+        begin = self.table.start_seconds + period  # as in the search, the heading settles in the first whole cycle
         feet = feet_measure(take, model, self.machine.legs, begin, period)
         return replace(measure(take, model, begin, period), clearance=feet.clearance), feet
 
     def _commands(self, seconds: float) -> tuple[Commands, float]:
-        cycles = max(2, math.ceil(seconds / self.table.period))
+        cycles = 1 + max(2, math.ceil(seconds / self.table.period))
         return self.table.commands(cycles), self.table.start_seconds + cycles * self.table.period
 
     def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, name: str = "gait") -> Job:

@@ -99,7 +99,7 @@ class _Run:
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
             self.progress(f"seeds {k} of {len(shapes)}{self._told()}", 0.0)
-            judged += _steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
+            judged += steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
             self._note(judged[k:])
         out: list[Candidate] = []
         for c in sorted(judged, key=Candidate.rank):
@@ -181,7 +181,7 @@ class _Refiner:
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
         judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
-        judged = _steered(run.evaluator, run.space, judged)
+        judged = steered(run.evaluator, run.space, judged)
         if draws:
             judged = run.evaluator.judged([c.shape for c in judged], draws, _better_half)
         order = sorted(range(len(judged)), key=lambda k: (bool(draws) and not judged[k].draws, *judged[k].rank()))
@@ -195,7 +195,7 @@ class _Refiner:
         self.best = min(self.best, *judged, key=Candidate.rank)
 
 
-def _steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> list[Candidate]:
+def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> list[Candidate]:
     """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
     need not be searched for. First by as much as it turns, then by the secant of two runs."""
     request, out = evaluator.request, list(candidates)
@@ -205,12 +205,12 @@ def _steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) ->
     before: dict[int, Candidate] = {}
     last = dict(enumerate(candidates))
     for _ in range(STEERED):
-        steered = {}
+        tried = {}
         for k, c in last.items():
             if c.nominal is not None and not c.nominal.fell and any(m.name in STRAYING and m.use > 1 for m in c.margins):
-                steered[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
+                tried[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
         before = last
-        last = dict(zip(steered, evaluator.judged(list(steered.values()), 0)))
+        last = dict(zip(tried, evaluator.judged(list(tried.values()), 0)))
         for k, c in last.items():
             out[k] = min(out[k], c, key=Candidate.rank)
     return out

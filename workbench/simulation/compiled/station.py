@@ -50,6 +50,8 @@ def _check(job: Job) -> None:
     for name, value in known.items():
         if getattr(c, name) != value:
             raise NotCoveredError(f"{name} '{getattr(c, name)}'")
+    if c.boxes:
+        raise NotCoveredError("boxes on the floor")
     if c.time_step == 0:
         raise NotCoveredError("a continuous plant")
     if c.base not in ("free", "fixed"):
