@@ -22,22 +22,24 @@ from workbench.identify.conclusions import Residuals, change, finding, posterior
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
 from workbench.identify.estimators.geometry import Geometry, Measured, geometry_of
+from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explain, is_by_logs
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.findings import Diagnosis, Finding, GapEntry, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import EnginesPartError, judged
-from workbench.identify.ledger import channel_gaps, ledger
+from workbench.identify.ledger import ledger
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import Prepared, check_duration, prepared
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.proposals import candidates
-from workbench.identify.registers import read_off_registers
+from workbench.identify.results.findings import Diagnosis, Finding, GapEntry, Unexplained
+from workbench.identify.results.take_report import TakeReport
+from workbench.identify.results.ties import ObservationModel, Tie, observation_models
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
@@ -45,8 +47,6 @@ from workbench.identify.selection.forward import select
 from workbench.identify.selection.model_comparison import NamePosterior, compare_models
 from workbench.identify.selection.record import SelectionResult
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
-from workbench.identify.take_report import TakeReport
-from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
 from workbench.robot import Posterior, RobotModel
 from workbench.simulation import SimulationConfig
@@ -160,24 +160,26 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
                  unreadable: LeftOut, progress: Progress, began: float) -> DiagnosisResult:
     """Steps 4 to 6 of servo logs, by evidence."""
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
-    told = explain(evaluator, known, pool, progress)
-    fitted = told.model
+    explained = explain(evaluator, known, pool, progress)
+    fitted = explained.model
     progress("rolling out the fitted model", None)
     steps = (2 * PROBLEM.fine, PROBLEM.fine)
     longer, after = evaluator.residuals([RolloutRequest(fitted, everywhere, step) for step in steps])
     floors = {i: np.nan_to_num(rms((longer[i] - after[i])[evidence[i].moving])) for i in everywhere}
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
-                  for m in build.measured), *(m.finding() for m in missed), *told.findings(evidence, nominal.residuals, after))
+                  for m in build.measured), *(m.finding() for m in missed),
+                *explained.findings(evidence, nominal.residuals, after))
     left = left_over(evidence, after, floors)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(findings or left), findings, left),
         model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
-        findings=findings, rejected=told.losers(), unexplained=left, posterior=Posterior() if missed else told.posterior(),
+        findings=findings, rejected=explained.losers(), unexplained=left,
+        posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - began)
         | {"seed": 0, "rollouts": evaluator.rollouts},
-        left_out=unreadable + seen.left_out, recalibrated=told.recalibrated)
+        left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
-    return DiagnosisResult(diagnosis, reports, told.ties(), observation_models(evidence))
+    return DiagnosisResult(diagnosis, reports, explained.ties(), observation_models(evidence))
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:

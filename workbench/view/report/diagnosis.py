@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.findings import Diagnosis, Estimate, Finding, GapEntry, Recalibrated, Rejected
 from workbench.identify.options import PROBLEM
-from workbench.identify.take_report import TakeReport
+from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Recalibrated, Rejected
+from workbench.identify.results.take_report import TakeReport
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
