@@ -18,9 +18,9 @@ from workbench.identify.problem import TakeEvidence, joint_error, ratios
 from workbench.identify.results.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
 from workbench.identify.results.ties import Tie
+from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.model_comparison import NamePosterior, Rival
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.screening import CandidateFit
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
@@ -48,29 +48,29 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplaine
     return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
 
 
-def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePosterior, before: Residuals, after: Residuals
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NamePosterior, before: Residuals, after: Residuals
             ) -> Finding:
     """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
     the nominal and the fitted model."""
     c, x = fit.sizes()[i]
-    elsewhere = _elsewhere(c, standing)
+    elsewhere = _elsewhere(c, posterior)
     where = (*c.where, *(place for r in elsewhere for place in r.candidate.where))
-    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
+    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in posterior.rivals
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
     numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
     return Finding(
-        effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
+        effect=c.name, where=where, confidence=posterior.probability + sum(r.probability for r in elsewhere), parameters=numbers,
         alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
         validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
 
 
-def _elsewhere(c: Candidate, standing: NamePosterior) -> list[Rival]:
+def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
     """The same effect where the data cannot tell it from this place."""
     return [
         r
-        for r in standing.rivals
-        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * standing.probability
+        for r in posterior.rivals
+        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * posterior.probability
     ]
 
 
@@ -87,7 +87,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
         ends = np.array([values - spread, values + spread])
         unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     else:
-        unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
+        unknown[[k for k, fixed in enumerate(c.fixed) if not fixed]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = CONCLUSIONS.z90 * np.maximum(
@@ -125,8 +125,8 @@ def rejected(
     unseen = any(e.uses["validate"].any() for e in evidence)
     kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
-    for c, standing in zip(fit.effects, posteriors):
-        for rival in standing.rivals:
+    for c, posterior in zip(fit.effects, posteriors):
+        for rival in posterior.rivals:
             if rival.candidate.key not in kept and rival.fit is not None:
                 left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
                 out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where,
@@ -188,14 +188,14 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
 
 
 def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
-    """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
+    """Of each finding and its likeliest rival, where that was fitted and is worth an experiment."""
     return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
                  if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     """Of all numbers in the contract's units; variances by the local slope between a size and its value. read_off: effects of one
-    number that no fit told."""
+    number that no fit identified."""
     if not fit.effects and not read_off:
         return Posterior()
     names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))

@@ -13,38 +13,23 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, channel_gaps
-from workbench.identify.selection.best_subsets import NEARLY_ALL
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
-from workbench.identify.selection.scheduling import STANDS_OUT, standing_out
-from workbench.identify.selection.screening import CandidateFit
+from workbench.identify.selection.scheduling import standing_out
 
 Array = NDArray[np.float64]
-LEAST_WALKING = 300.0
-"""LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
-ALL_CLOSED = 0.5
-"""Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE, WALKING_SHARE = 0.01, 0.02
-"""Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
-held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
-a second effect must not live on that."""
-ALONE = 0.25
-"""Of LEAST_SHARE, for a held joint that nothing was given to and of which much more than of any other is left: what engines
-play differently of an effect that all joints show, they do in all."""
-ROUGH_SHARE, LEFT_SHARE = 0.04, 0.02
-"""The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
-LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
-"""Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
-several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
 
 
-def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
+def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = ACCEPTANCE.least_share
                ) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
+    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is fixed."""
     evidence = search.evaluator.evidence
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, share if i in search.held else ROUGH_SHARE)))
+        allowed = share if i in search.fixed_base else ACCEPTANCE.rough_share
+        least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, allowed)))
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least[c] * (was.get(c, 0.0)**2 - 1)}
     return out
 
@@ -53,11 +38,12 @@ def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> 
     """By channel of a take, the share that effects may err by, of what they brought from `before` to `now`."""
     e = search.evaluator.evidence[take]
     shares = np.full(len(e.channels), share)
-    if not search.evaluator.walks((take,)):
+    if not search.evaluator.any_floating((take,)):
         was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
         parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > PROBLEM.gap_ratio**2 - 1)
-        if len(parts) > 1 and parts[-1][0] > STANDS_OUT * parts[-2][0] and parts[-1][1] not in {c.joint for c in now.effects}:
-            shares[e.columns(parts[-1][1])] *= ALONE
+        given = {c.joint for c in now.effects}
+        if len(parts) > 1 and parts[-1][0] > SCHEDULING.stands_out * parts[-2][0] and parts[-1][1] not in given:
+            shares[e.columns(parts[-1][1])] *= ACCEPTANCE.alone
     return shares
 
 
@@ -68,37 +54,37 @@ def _of_joints(e: TakeEvidence, residual: Array) -> dict[str, float]:
 
 
 def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
-    """Share that an effect on the ground must take away, beside what held takes told. More, where a joint that was given an
-    effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray."""
+    """Share that an effect on the ground must take away, beside what fixed-base takes identified. More, where a joint that was
+    given an effect still goes wrong on a fixed base: no known name is what it lacks, and it leads all others astray."""
     given = {c.joint for c in current.effects}
-    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ROUGH_SHARE))
-    return LAST_CLOSED if part else LEAST_CLOSED
+    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.fixed_base, ACCEPTANCE.rough_share))
+    return ACCEPTANCE.last_closed if part else ACCEPTANCE.least_closed
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep], everywhere: bool = True
                     ) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
-    that walks told, and beyond what others, as all with the base held, may err by in each channel. everywhere: of walks, not in
-    channels with a gap alone."""
+    that floating-base takes identified, and beyond what others, as all on a fixed base, may err by in each channel. everywhere:
+    of floating-base takes, not in channels with a gap alone."""
     evaluator, left = search.evaluator, 0.0
-    walks = evaluator.walks(takes)
-    before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
+    floating = evaluator.any_floating(takes)
+    before, share = current if floating else before_rough(rounds, current), ACCEPTANCE.least_share
     settled = _settling(search, rounds)
-    if walks and search.settled is not None and settled:
-        before, share = settled[0].before, ROUGH_SHARE
+    if floating and search.settled is not None and settled:
+        before, share = settled[0].before, ACCEPTANCE.rough_share
     for i in takes:
         if channel_gaps(evaluator.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
             may_err = _may_err(search, before, current, i, share)
             left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
-    if not walks:
-        return left < ALL_CLOSED * FIT.least_gain
+    if not floating:
+        return left < ACCEPTANCE.all_closed * FIT.least_gain
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
-    return left < max(LEAST_WALKING, LEFT_SHARE * brought)
+    return left < max(ACCEPTANCE.least_walking, ACCEPTANCE.left_share * brought)
 
 
 def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
-    """Those in which something was taken that held takes told."""
+    """Those in which something was taken that fixed-base takes identified."""
     return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
 
 
@@ -106,21 +92,21 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
     """Whether an effect that was fitted beside `current` brings enough."""
     if t.screened_out:
         return False
-    walks = search.evaluator.walks(takes)
-    least = LEAST_WALKING if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
-    if t.joint is not None and t.closed > NEARLY_ALL:
-        least *= ALL_CLOSED
+    floating = search.evaluator.any_floating(takes)
+    least = ACCEPTANCE.least_walking if t.joint is None and floating else FIT.least_gain * max(1, t.candidate.size)
+    if t.joint is not None and t.closed > SUBSETS.nearly_all:
+        least *= ACCEPTANCE.all_closed
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    if not walks:
-        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
-    walked = [(r, a) for r in rounds for a in taken([r])
+    if not floating:
+        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, ACCEPTANCE.least_share)) > least
+    floating_terms = [(r, a) for r in rounds for a in taken([r])
               if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate)]
-    brought = sum(a.gain["choose"] for _, a in walked)
+    brought = sum(a.gain["choose"] for _, a in floating_terms)
     settled = _settling(search, rounds)
     if search.settled is not None and settled:
-        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    if walked and gain <= WALKING_SHARE * brought:  # which may have been in other channels
-        gain = min(gain, _beyond_error(search, t, takes, walked[0][0].before, current, WALKING_SHARE))
+        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ACCEPTANCE.rough_share))
+    if floating_terms and gain <= ACCEPTANCE.walking_share * brought:  # which may have been in other channels
+        gain = min(gain, _beyond_error(search, t, takes, floating_terms[0][0].before, current, ACCEPTANCE.walking_share))
     return gain > least
 
 
@@ -137,11 +123,12 @@ def _beyond_error(search: Search, t: CandidateFit, takes: Sequence[int], before:
 
 def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on held takes alone, where they told it. Of a joint that walks tell, its own gap, if it has
-    one, counts as much as all that follows from it, and not what is left to the effects of others."""
+    that was judged or stood out; on fixed-base takes alone, where they identified it. Of a joint that floating-base takes
+    identify, its own gap, if it has one, counts as much as all that follows from it, and not what is left to the effects of
+    others."""
     joint = t.candidate.joint
     outstanding = joint in standing_out(search, r.before, search.fitted)
-    takes = search.held if search.is_settled(t.candidate) else search.fitted
+    takes = search.fixed_base if search.is_settled(t.candidate) else search.fitted
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
     if t.joint is not None or joint is None or outstanding:
         return search.evaluator.closed(before, after, "choose", joint if outstanding else t.joint)
@@ -151,13 +138,13 @@ def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now:
 
 
 def idle(search: Search, fit: Fit) -> list[Candidate]:
-    """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for.
-    fit: as fine steps judge it."""
-    walked = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
-    if not walked or not search.floating_base(search.fitted):
+    """Effects that floating-base takes identified and that, in fine steps, bring too little: a coarse step's error may be what
+    they made up for. fit: as fine steps judge it."""
+    floating_terms = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
+    if not floating_terms or not search.floating_base(search.fitted):
         return []
-    points = np.tile(fit.x, (len(walked), 1))
-    for x, (_, own) in zip(points, walked):
+    points = np.tile(fit.x, (len(floating_terms), 1))
+    for x, (_, own) in zip(points, floating_terms):
         x[own] = 0.0
     without = search.finely(fit, search.takes, *points)
-    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - fit.cost["choose"] < LEAST_WALKING]
+    return [c for (c, _), f in zip(floating_terms, without) if f.cost["choose"] - fit.cost["choose"] < ACCEPTANCE.least_walking]

@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.selection.screening import CandidateFit
-
-COMPLETE = 0.97
-"""Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
+from workbench.identify.selection.candidate_fit import CandidateFit
 
 
 @dataclass(frozen=True)
@@ -64,5 +61,5 @@ def _exact(t: CandidateFit) -> bool:
 
 
 def judged_by_all(search: Search, t: CandidateFit) -> bool:
-    """Whether it was fitted by some number, and all channels judged it; not what held takes told."""
+    """Whether it was fitted by some number, and all channels judged it; not what fixed-base takes identified."""
     return not t.screened_out and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)

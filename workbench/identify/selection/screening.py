@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,78 +15,23 @@ from workbench.identify.fitting.responses import Part, ResponseBank, linearised_
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
+from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
+from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-FAR, FAR_WALKING = 5.0, 1.6
-"""Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
-LOOKED, LOOKED_SHARE, LOOKED_SHARE_HELD = 2.5, 0.3, 0.5
-"""How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on the
-ground and with the base held; else longer. Late in walks small differences have grown into others."""
-CALM = 0.5
-"""Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
-them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
-"""
-WORTH, WORTH_WALKING = 0.3, 0.5
-"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
-where that is cheap, and on a walk."""
-DOUBTED = 0.6
-"""Share of the least gain from which on the best are fitted where none is foretold all of it: signatures say too little where
-only a part of a walk was looked at."""
-BEHIND = 0.6
-"""Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
-REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
-"""Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect is
-looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
-MOST_FITTED = 3
-"""Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
-STEPS, STEPS_WALKING = 3, 2
-"""Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
-
-
-@dataclass(frozen=True)
-class CandidateFit:
-    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
-    `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
-    choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
-    much less of it than of a rival that no fit was made."""
-
-    candidate: Candidate
-    x: Array
-    gain: Mapping[str, float]
-    joint: str | None
-    screened_out: bool = False
-    closed: float = 0.0
-    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
 
 Asking = Part[list[CandidateFit]]
 
 
-@dataclass(frozen=True)
-class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
-    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
-    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
-    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
-    and how long these are looked at."""
-
-    remembered: dict[str | None, float] = field(default_factory=dict)
-    screened_out: dict[str | None, float] = field(default_factory=dict)
-    reached: dict[str | None, float] = field(default_factory=dict)
-    wide: dict[bool, list[float]] = field(default_factory=dict)
-    least: float = 0.0
-    unheld: bool = False
-    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
-
-
 def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
           report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
-    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
+    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is fixed, one effect
     at several joints, each judged by its own joint's channels. takes: on which, by group.
     ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
-    signatures must foretell of one that is fitted."""
-    race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not search.held), []
+    responses must predict of one that is fitted."""
+    race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, no_fixed_base=not search.fixed_base), []
     for n, group in enumerate(groups):
         base = {i: current.residuals[i] for i in takes[n]}
         asking.append(
@@ -98,7 +43,7 @@ def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], t
                 group,
                 race,
                 search.apart(group[0], takes[n]),
-                search.signatures,
+                search.responses,
             ).run()
         )
     return [trial for trials in search.side_by_side(asking, report) for trial in trials]
@@ -108,7 +53,7 @@ class CandidateEvaluation:
     """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
-    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. signatures: of earlier
+    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. responses: of earlier
     races; this one's are added.
     """
 
@@ -121,17 +66,17 @@ class CandidateEvaluation:
         group: Sequence[Candidate],
         race: Race,
         apart: bool,
-        signatures: ResponseBank,
+        responses: ResponseBank,
     ) -> None:
-        self.evaluator, self.group, self.race, self.signatures = evaluator, group, race, signatures
+        self.evaluator, self.group, self.race, self.responses = evaluator, group, race, responses
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
-        self.walking = evaluator.walks(tuple(base))
+        self.walking = evaluator.any_floating(tuple(base))
         self.base, self.takes = base, tuple(base)
         self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
         self.power = {i: evaluator.cost({i: r}, "fit") for i, r in base.items()}
-        alone = self.coarse and self.walking  # walks are expensive
+        alone = self.coarse and self.walking  # floating-base takes are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
         single_joint = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
         self.until = self._shown() if self.coarse and not single_joint else np.inf
@@ -147,7 +92,8 @@ class CandidateEvaluation:
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
             return out
-        sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
+        steps = SCREENING.steps_walking if self.walking else SCREENING.steps
+        sizes = yield from self._fitted([starts[b] for b in alive], alive, steps)
         finely = self.coarse and self.walking  # coarse steps say where to go, not what a walk makes of small differences
         question = self._question(alive, sizes)
         (final,) = yield [replace(question, step=1.0) if finely else question]
@@ -155,81 +101,81 @@ class CandidateEvaluation:
         return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
-        """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
-        known = self.signatures.get(self._name) if self.walking else None
+        """Sizes and gains as responses of an earlier race predict them, where that is hopeless; None: to be looked at."""
+        known = self.responses.get(self._name) if self.walking else None
         guesses = None if known is None else self._guessed(*known)
         if guesses is not None:
-            _tell(self.race.remembered, self.joints, guesses[1])
+            note_best(self.race.remembered, self.joints, guesses[1])
         yield []  # until all have said what they remember
-        enough = max(REMEMBERED_LEAST * self.race.least, REMEMBERED * _best(self.race.remembered, None))
+        enough = max(SCREENING.remembered_least * self.race.least, SCREENING.remembered * best_at(self.race.remembered, None))
         return None if guesses is None or guesses[1][0] >= enough else guesses
 
     def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
-        """Sizes to start from and what signatures say they gain, from coarse rollouts."""
+        """Sizes to start from and what responses say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
-        probes = scan(c, scan_sizes(c, self.walking, self.race.unheld), self.walking)
+        probes = scan(c, scan_sizes(c, self.walking, self.race.no_fixed_base), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse, until=self.until) for q in looks]
         before = self._left(plain)
-        signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
-        self.signatures[self._name] = probes, signatures, self.until
-        told = self._guessed(probes, signatures, self.until)
-        calm = None if self.coarse or not self.walking else self._calmest(probes, signatures, told[1][0])
+        responses = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
+        self.responses[self._name] = probes, responses, self.until
+        guess = self._guessed(probes, responses, self.until)
+        calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
         if calm is None:
-            return told
+            return guess
         x = yield from self._fitted_on(*calm)
         (answer,) = yield [self._question([0], [x])]
-        return max(told, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
+        return max(guess, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
 
     def _fitted_on(self, take: int, x: Array) -> Part[Array]:
         """Sizes as one take alone wants them."""
         def ask(point: Sequence[Array]) -> RolloutRequest:
             return replace(self._question([0], point), takes=(take,))
 
-        def tell(answer: dict[int, Array]) -> list[Array]:
+        def as_vectors(answer: dict[int, Array]) -> list[Array]:
             return [self.evaluator.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
-        (solved,) = yield from through(self._stepping([x], tell(answer), [0], STEPS_WALKING), ask, tell)
+        (solved,) = yield from through(self._stepping([x], as_vectors(answer), [0], SCREENING.steps_walking), ask, as_vectors)
         return solved.x
 
-    def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
-        """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
+    def _calmest(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
+        """The take of which responses explain most, and sizes as it wants them; None where none is, or all are (gain)."""
         beyond = {i: self.power[i] - self.evaluator.expected((i,), "fit") for i in self.takes}
-        if gain > CALM * sum(beyond.values()):
+        if gain > SCREENING.calm * sum(beyond.values()):
             return None
         take = take_of(self.evaluator.stretches(self.takes, "fit"))
         best: tuple[int, Array] | None = None
-        most = CALM
+        most = SCREENING.calm
         for i in self.takes:
             here = take == i
             r0 = self.r0[0][here]
-            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
+            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in responses], SCREENING.far_walking)
             share = gain / max(beyond[i], self.race.least, 1.0)
             if share > most:
                 best, most = (i, x), share
         return best
 
-    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
+    def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], until: float
                  ) -> tuple[list[Array], list[float]]:
         """Sizes to start from and what they gain, on all takes as on what was looked at."""
         looked_at = self._early(until)
         r0 = self._left(looked_at)
-        far = FAR_WALKING if self.walking else FAR
+        far = SCREENING.far_walking if self.walking else SCREENING.far
         guesses = [
-            linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)
+            linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in responses], far) for b, c in enumerate(self.group)
         ]
         share = max(self.evaluator.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _shown(self) -> float:
         """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
-        seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
-        share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
+        seen, until = {i: self.base[i] for i in self.looked_at}, SCREENING.looked
+        share = SCREENING.looked_share if self.walking else SCREENING.looked_share_fixed
         least = {j: share * self.evaluator.cost(seen, "fit", j) for j in self.joints}
         while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
-            until += LOOKED / 2
+            until += SCREENING.looked / 2
         return until
 
     def _early(self, until: float) -> dict[int, Array]:
@@ -240,17 +186,17 @@ class CandidateEvaluation:
         return self.race.early[key]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
-        """Of the group, those that are not told to be far behind a rival."""
+        """Of the group, those that are not predicted to be far behind a rival."""
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
-        _tell(race.screened_out, self.joints, gains)
-        yield []  # until all have said what they foretell
-        last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
-        worth = WORTH_WALKING if self.walking else WORTH
-        least = race.least * (1.0 if _best(race.screened_out, None) > race.least else DOUBTED)
+        note_best(race.screened_out, self.joints, gains)
+        yield []  # until all have said what they predict
+        last = sorted(alike, reverse=True)[:SCREENING.most_fitted][-1] if alike else 0.0
+        worth = SCREENING.worth_walking if self.walking else SCREENING.worth
+        least = race.least * (1.0 if best_at(race.screened_out, None) > race.least else SCREENING.doubted)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > least and g >= worth * _best(race.screened_out, j) and (j is not None or g >= last)]
+                if g > least and g >= worth * best_at(race.screened_out, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
@@ -263,9 +209,10 @@ class CandidateEvaluation:
 
         solved = yield from improved(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
-        _tell(self.race.reached, [self.joints[b] for b in alive], gains)
+        note_best(self.race.reached, [self.joints[b] for b in alive], gains)
         yield []  # until all have come as far
-        if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
+        ahead = [g > SCREENING.behind * best_at(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)]
+        if iterations > 1 and any(ahead):
             solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
 
@@ -297,13 +244,3 @@ class CandidateEvaluation:
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
         return [self.evaluator.vector(answer, "fit", j) for j in self.joints]
-
-
-def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
-    for j, gain in zip(joints, gains):
-        best[j] = max(best.get(j, 0.0), gain)
-
-
-def _best(best: dict[str | None, float], joint: str | None) -> float:
-    """At a joint; of all, for what concerns all."""
-    return max(best.values()) if joint is None else best[joint]
