@@ -31,7 +31,7 @@ def term_of(c: Candidate) -> Term:
 
 def labels_of(c: Candidate) -> list[Label]:
     """Of the sizes of a candidate, whichever options it has."""
-    fitted = [p.name for p, held in zip(c.parameters, c.held) if not held]
+    fitted = [p.name for p, fixed in zip(c.parameters, c.fixed) if not fixed]
     if len(fitted) != c.size:  # moments, of a mass that swings
         fitted = ["size"] * c.size
     return [(c.name, c.where, name, fitted[:k].count(name)) for k, name in enumerate(fitted)]
