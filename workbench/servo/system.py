@@ -38,8 +38,9 @@ class ServoBank(LeafSystem):
         torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
 
     moving_speed and torque_enable may stay unconnected: at once, and all on. The reference advances every `period` seconds
-    (discrete state, n). Back-EMF and viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles
-    of this system (continuous state, n; after Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
+    (discrete state, n). Back-EMF and viscous friction act as joint damping of the plant, Coulomb friction as its joints'
+    actuators (implicit) or as bristles of this system (continuous state, n; after Dahl 1968), which both hold at rest, so
+    that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
