@@ -163,7 +163,7 @@ class CompiledJob:
                    force=np.empty((forces, s, 3)))
 
     def _rest(self) -> State:
-        n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.path)
+        n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.tree.path)
         return State(base=np.array([1.0, 0, 0, 0, 0, 0, 0]), q=np.zeros(n), v=np.zeros(nv), reference=np.zeros(m),
                      goal=self.physics.zero.copy(), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
                      memory=np.zeros((4, m)), stepped=np.zeros(1))
