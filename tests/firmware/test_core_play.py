@@ -230,6 +230,7 @@ def test_stale_foreign_big_and_broken_uploads_are_refused_with_the_reason() -> N
     sim.send(frame(FrameType.BEGIN, struct.pack("<IIBB", 5000, 0, 7, 0)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["too big"]
+    assert upload(sim, changed(10)[:-1] + b"\0", 7).result == "CRC"  # its own, in a frame that is right
     frames = upload_frames(changed(10, poses=16), 8)
     for data in [*frames[:2], *frames[3:]]:
         sim.send(data)
