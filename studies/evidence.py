@@ -27,7 +27,8 @@ from workbench.identify.evidence.fit import Fitted, fitting
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, start
 from workbench.identify.evidence.nuisance import uncertain_numbers
 from workbench.identify.evidence.options import EvidenceOptions
-from workbench.identify.evidence.region import Rollouts, region_of
+from workbench.identify.evidence.region import region_of
+from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import lockstep
 from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import prepared

@@ -4,7 +4,7 @@ from tests.gap_sessions import record_arm
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
-from workbench.identify.problem import gather
+from workbench.identify.preparation import gather
 from workbench.simulation import SimulationConfig
 
 NOMINAL, HIDDEN = 0.06, 0.14

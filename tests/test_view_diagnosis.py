@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from tests.view_takes import small_robot, swing
 from workbench.bench.arm import arm_sdf
-from workbench.cli.diagnose import _line
-from workbench.identify.findings import (
+from workbench.cli.diagnose import finding_line
+from workbench.identify.results.findings import (
     Alternative,
     Change,
     Diagnosis,
@@ -25,8 +25,8 @@ from workbench.identify.findings import (
     Unexplained,
     Verdict,
 )
-from workbench.identify.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
-from workbench.identify.take_report import TakeReport
+from workbench.identify.results.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
+from workbench.identify.results.take_report import TakeReport
 from workbench.robot import EffectSpec, RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
@@ -234,7 +234,7 @@ def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeR
     page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
     assert "96 % sure that it is this or joint compliance at flm" in page
     assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
-    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings do not tell" in _line(tied)
+    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings do not tell" in finding_line(tied)
 
 
 def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeReport) -> None:

@@ -11,7 +11,7 @@ from tests.view_takes import capture, small_robot, swing
 from workbench.robot import InputError, RobotModel, puppy_model
 from workbench.view.playback import play
 from workbench.view.scene.keyframes import kept_keys
-from workbench.view.scene.replay import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, _Scene, write_replay
+from workbench.view.scene.replay import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, Scene, write_replay
 from workbench.view.shapes import robot_shapes
 
 
@@ -59,7 +59,7 @@ def test_the_camera_stands_back_from_what_is_high_or_reaches_far(model: RobotMod
     high = replace(low, base_p=low.base_p + np.array([0.0, 0.0, 1.0]))
     link = model.kinematics.links[-1]
     far = replace(low, links=dict(low.links) | {link: (low.links[link][0] + [0.0, 2.0, 0.0], low.links[link][1])})
-    near, up, wide = (_Scene(model, robot_shapes(model), [p], 30.0) for p in (low, high, far))
+    near, up, wide = (Scene(model, robot_shapes(model), [p], 30.0) for p in (low, high, far))
     assert near.tall < 0.5
     assert up.tall == pytest.approx(near.tall + 1.0, abs=0.1)
     assert up.reach > near.reach + 1.0

@@ -5,7 +5,7 @@ import yaml
 
 from tests.gap_sessions import session_content, write_session
 from workbench.compare.session import load_session
-from workbench.identify.registers import read_off_registers
+from workbench.identify.estimators.registers import read_off_registers
 from workbench.robot import InputError
 from workbench.robot.servo_registers import ServoReading, ServoRegisters, save_registers
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.diagnose.sessions import arm_session
 from workbench.identify.diagnosis import diagnose_session
-from workbench.identify.findings import Diagnosis
+from workbench.identify.results.findings import Diagnosis
 from workbench.robot import EffectSpec
 
 

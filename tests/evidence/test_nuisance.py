@@ -9,7 +9,8 @@ import yaml
 from tests.servo_rig import rig_model
 from workbench.effects.base import Registers
 from workbench.effects.registry import effect_named
-from workbench.identify.evidence.nuisance import Uncertain, recalibrated, uncertain_numbers, what_changed
+from workbench.identify.evidence.explain import what_changed
+from workbench.identify.evidence.nuisance import Uncertain, recalibrated, uncertain_numbers
 from workbench.robot import InputError, ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
 

@@ -101,6 +101,17 @@ def test_flips_in_answers_stop_nothing() -> None:
     assert (sim.get("state"), sim.get("reason")) == (5, 7)
 
 
+@pytest.mark.slow
+def test_flips_in_answers_stop_nothing_in_ten_thousand_poses() -> None:
+    sim = Sim(TABLE, seed=4)
+    sim.play()
+    sim.set("flip_from", 1000)
+    while sim.get("poses") < 10_000:
+        sim.run(50)
+        sim.received()
+        assert (sim.get("state"), sim.get("reason")) == (5, 7)
+
+
 def test_settings_that_a_broken_packet_changed_are_put_back() -> None:
     sim = Sim(TABLE)
     sim.play()

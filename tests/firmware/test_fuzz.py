@@ -11,9 +11,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "firmware/fuzz"))
 
-from campaign import kept_inputs  # noqa: E402
+from campaign import kept_inputs
 
-from tests.firmware.native import FIRMWARE  # noqa: E402
+from tests.firmware.native import FIRMWARE
 
 CAMPAIGN = [sys.executable, str(FIRMWARE / "fuzz/campaign.py")]
 needs_clang = pytest.mark.skipif(shutil.which("clang") is None, reason="needs clang")

@@ -8,12 +8,12 @@ import pytest
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
 from workbench.identify.conclusions import estimates, finding, rejected, verdict_of
-from workbench.identify.findings import Alternative, Change, Finding, Unexplained
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
-from workbench.identify.reasons import Dependence
+from workbench.identify.results.findings import Alternative, Change, Finding, Unexplained
+from workbench.identify.results.reasons import Dependence
 from workbench.identify.selection.model_comparison import NamePosterior, Rival
 
 FRAME = {0: np.ones((1, 1))}

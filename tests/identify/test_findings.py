@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.identify.findings import (
+from workbench.identify.results.findings import (
     Alternative,
     Change,
     Diagnosis,
@@ -20,7 +20,7 @@ from workbench.identify.findings import (
     Rejected,
     Unexplained,
 )
-from workbench.identify.reasons import Dependence, TooLittle
+from workbench.identify.results.reasons import Dependence, TooLittle
 from workbench.robot import EffectSpec, load_model, load_model_file, puppy_model
 
 BACKLASH = Finding(

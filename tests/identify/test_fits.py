@@ -18,7 +18,8 @@ from workbench.identify.point_mass import PointMass, SwungMass
 from workbench.identify.problem import ratios, smoothed
 from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
-from workbench.identify.selection import forward as selection
+from workbench.identify.selection import forward
+from workbench.identify.selection.options import FORWARD
 from workbench.identify.selection.screening import tried
 
 
@@ -38,21 +39,20 @@ def test_stretches_for_fitting_choosing_and_validating_do_not_meet(worn):
 def test_a_search_stops_at_its_limit_of_work_and_says_so(worn, monkeypatch):
     session, search, _ = worn
     pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name == "viscous_friction"]
-    monkeypatch.setattr(selection, "MOST_WORK", 0.0)
-    monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
-    chosen = selection.select(search, pool, lambda what, share: None)
+    monkeypatch.setattr(forward, "FORWARD", replace(FORWARD, most_work=0.0, most_rollouts=0.0))
+    chosen = forward.select(search, pool, lambda what, share: None)
     assert chosen.stopped
     assert not chosen.fit.effects
-    assert not selection.select(search, pool, lambda what, share: None, thorough=True).stopped
+    assert not forward.select(search, pool, lambda what, share: None, thorough=True).stopped
 
 
 def test_what_was_tried_when_the_limit_of_work_came_decides(worn, monkeypatch):
     session, search, _ = worn
     pool = [c for c in candidates(session.model, search.evaluator.evidence) if c.name == "coulomb_friction"]
-    monkeypatch.setattr(selection, "_says_it", lambda *a: False)  # it would ask for more
-    monkeypatch.setattr(selection, "MOST_WORK", search.evaluator.work + 2 * search.evaluator.seconds)
-    monkeypatch.setattr(selection, "MOST_ROLLOUTS", 0.0)
-    chosen = selection.select(search, pool, lambda what, share: None)
+    monkeypatch.setattr(forward, "_says_it", lambda *a: False)  # it would ask for more
+    enough = search.evaluator.work + 2 * search.evaluator.seconds
+    monkeypatch.setattr(forward, "FORWARD", replace(FORWARD, most_work=enough, most_rollouts=0.0))
+    chosen = forward.select(search, pool, lambda what, share: None)
     assert chosen.stopped
     assert [c.key for c in chosen.fit.effects] == [("coulomb_friction", ("three",))]
 

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
 from workbench.identify.estimators import geometry as built
-from workbench.identify.findings import Change
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
+from workbench.identify.results.findings import Change
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.mocap.tracks import capture_axes
 from workbench.recording.recording import Measurement, Recording

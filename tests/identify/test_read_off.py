@@ -16,18 +16,18 @@ from workbench.effects.schedules import without_poses
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.estimators.dropped_commands import (
     DroppedCommands,
-    _least_closed,
-    _lost,
-    _stands_at_an_end,
+    least_explained,
+    poses_lost,
+    stands_at_an_end,
     with_dropped_commands,
 )
-from workbench.identify.estimators.dropped_in_motion import _suspects, dropped_in_motion, played_without
-from workbench.identify.estimators.stops_and_mounts import _stop, read_off_candidates
-from workbench.identify.findings import Change
+from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, played_without, suspects
+from workbench.identify.estimators.stops_and_mounts import read_off_candidates, stops
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.problem import gather
+from workbench.identify.preparation import gather
+from workbench.identify.results.findings import Change
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import run_job
@@ -87,7 +87,7 @@ def test_a_peak_of_few_frames_is_no_stop(stop, asked):
     said = np.deg2rad(np.concatenate([np.zeros(2000), peak, np.zeros(2000)]))[:, None]
     seen = np.minimum(said, np.deg2rad(stop)) + np.deg2rad(0.05)
     e = SimpleNamespace(joints=("knee",), recorded=seen, sigma=np.array([1e-3]), zero=lambda joint: 0.0)
-    assert len(_stop(known_effects()["joint_stop"], "knee", [e], {0: (seen - said) / e.sigma})) == asked
+    assert len(stops(known_effects()["joint_stop"], "knee", [e], {0: (seen - said) / e.sigma})) == asked
 
 
 @pytest.mark.parametrize("upper", [18.0, 1.0])
@@ -185,22 +185,22 @@ def test_of_poses_in_a_row_that_may_be_missed_the_first_is_asked_alone(quiet):
     residual = np.zeros_like(e.recorded)
     residual[(time > times[6] - 0.05) & (time < times[7])] = np.nan
     residual[time > times[7] + 0.03, e.joints.index("one")] = 20.0  # poses 6 and 7 go down
-    assert _suspects(quiet[1].on([e]), {0: residual}, {}, set()) == {(0, "one"): (6,)}
-    assert _suspects(quiet[1].on([e]), {0: residual}, {}, {(0, "one", 6)}) == {(0, "one"): (7,)}
+    assert suspects(quiet[1].on([e]), {0: residual}, {}, set()) == {(0, "one"): (6,)}
+    assert suspects(quiet[1].on([e]), {0: residual}, {}, {(0, "one", 6)}) == {(0, "one"): (7,)}
 
 
 def test_a_joint_that_stands_at_its_end_missed_no_pose(quiet):
     stopped = replace(quiet[0], effects=(EffectSpec("joint_stop", ("two",), {"lower": -180.0, "upper": 6.0}),))
     evaluator = recorded_with(quiet, stopped)
-    kept = _lost(evaluator, quiet[0], "two", {0: ()}, nominal_residuals(quiet, evaluator))[0][0]
+    kept = poses_lost(evaluator, quiet[0], "two", {0: ()}, nominal_residuals(quiet, evaluator))[0][0]
     assert len(kept) == 2
-    assert all(_stands_at_an_end(evaluator.evidence, 0, "two", k) for k in kept)
+    assert all(stands_at_an_end(evaluator.evidence, 0, "two", k) for k in kept)
     commands = quiet[1].evidence[0].take.commands
     goals, c = commands.goals.copy(), commands.column("one")
     goals[1, c] = goals[0, c]
     evaluator = recorded_with(quiet, quiet[0], replace(commands, goals=goals))
-    ((lost,),) = _lost(evaluator, quiet[0], "one", {0: ()}, nominal_residuals(quiet, evaluator))[0].values()
-    assert not _stands_at_an_end(evaluator.evidence, 0, "one", lost)
+    ((lost,),) = poses_lost(evaluator, quiet[0], "one", {0: ()}, nominal_residuals(quiet, evaluator))[0].values()
+    assert not stands_at_an_end(evaluator.evidence, 0, "one", lost)
 
 
 def test_where_a_link_lay_in_its_play_when_it_was_zeroed_is_left_open_within_the_play(quiet):
@@ -224,7 +224,7 @@ def test_poses_missed_on_the_ground_alone_must_explain_nearly_all():
     def evaluator(*bases):
         return SimpleNamespace(evidence=[SimpleNamespace(take=SimpleNamespace(spec=SimpleNamespace(base=b))) for b in bases])
 
-    assert _least_closed(evaluator("fixed", "free"), {0: 1, 1: 0}) == READ_OFF.dropped_explains
-    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 2}) == READ_OFF.dropped_explains_free
-    assert _least_closed(evaluator("free", "free"), {0: 1, 1: 1}) == READ_OFF.dropped_explains
-    assert _least_closed(evaluator("fixed", "free"), {0: 0, 1: 1}) is None
+    assert least_explained(evaluator("fixed", "free"), {0: 1, 1: 0}) == READ_OFF.dropped_explains
+    assert least_explained(evaluator("fixed", "free"), {0: 0, 1: 2}) == READ_OFF.dropped_explains_free
+    assert least_explained(evaluator("free", "free"), {0: 1, 1: 1}) == READ_OFF.dropped_explains
+    assert least_explained(evaluator("fixed", "free"), {0: 0, 1: 1}) is None

@@ -12,7 +12,8 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify import subset as share
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import gather, part_of
+from workbench.identify.preparation import gather
+from workbench.identify.problem import part_of
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
 from workbench.simulation import SimulationConfig

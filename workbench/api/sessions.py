@@ -14,8 +14,8 @@ from workbench.compare.session import Session, load_session
 from workbench.compare.session_takes import no_progress
 from workbench.experiment.next_experiment import with_next_experiment
 from workbench.identify.diagnosis import diagnose_session
-from workbench.identify.findings import Diagnosis
-from workbench.identify.take_report import TakeReport
+from workbench.identify.results.findings import Diagnosis
+from workbench.identify.results.take_report import TakeReport
 from workbench.motion import Motion, save_motion
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig

@@ -20,10 +20,11 @@ from workbench.compare.session_takes import read_takes, register_takes
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, gather
+from workbench.identify.preparation import gather
+from workbench.identify.problem import TakeEvidence
 from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import RolloutEvaluator
-from workbench.identify.selection.best_subsets import MOST_STEPS
+from workbench.identify.selection.options import SUBSETS
 from workbench.simulation import SimulationConfig
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class Ours:
     rollouts: int
 
 
-def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iterations: int = MOST_STEPS) -> Figure:
+def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iterations: int = SUBSETS.most_steps) -> Figure:
     """duration: of the log [s], which MuJoCo makes in steps of TRUE_STEP, so that nothing of it is this library's own.
     iterations: of our fit, at most."""
     try:

@@ -10,7 +10,7 @@ from workbench.cli.check import add_yes, check_session
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
-    from workbench.identify.findings import Finding
+    from workbench.identify.results.findings import Finding
 
 
 STAGES = ("reading", "simulating", "looking anew", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
@@ -58,12 +58,12 @@ def run(args: argparse.Namespace) -> int:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
-        print(f"  {_line(finding)}")
+        print(f"  {finding_line(finding)}")
     print(f"wrote {args.out}: {', '.join(path.name for path in paths if path.parent == folder)}")
     return 0
 
 
-def _line(finding: Finding) -> str:
+def finding_line(finding: Finding) -> str:
     from workbench.view.report.words import this_or
 
     tie, error = finding.tie, finding.validation

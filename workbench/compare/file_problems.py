@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.compare.options import FILES
 from workbench.compare.prediction import read_start
 from workbench.compare.session import PredictSpec, Session, TakeSpec
 from workbench.compare.session_takes import readable
@@ -21,10 +22,6 @@ from workbench.recording.recording import Recording
 from workbench.recording.take_from import named_by_model
 from workbench.robot import InputError, RobotModel
 
-_SMALL = np.deg2rad(1.6)
-"""No motion of a robot is as small; in radians, it is a right angle."""
-LONG = 600.0
-"""A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
 _ROUTINE = " unseen in "
 
 
@@ -113,7 +110,7 @@ def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
     out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
     if (text := long_work(motion.duration)) is not None:
         out.append(text)
-    if np.abs(motion.angles).max() < _SMALL and np.ptp(motion.angles) > 0:
+    if np.abs(motion.angles).max() < FILES.smallest_motion and np.ptp(motion.angles) > 0:
         most = np.rad2deg(np.abs(motion.angles).max())
         out.append(f"no joint leaves {most:.2g} deg: are the angles in radians? (a table has degrees)")
     try:
@@ -125,7 +122,7 @@ def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
 
 def long_work(seconds: float) -> str | None:
     """A line where so much is to be simulated that it was probably a slip."""
-    if seconds <= LONG:
+    if seconds <= FILES.longest:
         return None
     return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: a slip in times, frames or cycles?"
 
@@ -153,12 +150,9 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    if len(recording.time) < _FEWEST:
-        out.insert(0, f"holds {len(recording.time)} frame(s); expected {_FEWEST} or more")
+    if len(recording.time) < FILES.fewest_frames:
+        out.insert(0, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
     return ([text] if (text := long_work(seconds)) else []) + out, seconds
-
-
-_FEWEST = 20  # frames of a take
 
 
 def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:

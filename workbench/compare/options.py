@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import radians
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,29 @@ class CompareOptions:
     above that from contact forces."""
     shortest: float = 0.03
     """Stance or swing shorter than this is chatter, not a step [s]."""
+    fell_tilt: float = radians(60.0)
+    """A base that leans further lies [rad]."""
+    fell_height: float = 0.5
+    """Of its height at rest, below which a base lies."""
+    camera_rate: float = 120.0
+    """Frames per second of the virtual robot's cameras."""
+
+
+@dataclass(frozen=True)
+class FileLimits:
+    """What is taken for a slip of whoever wrote a file."""
+
+    most_seconds: float = 86_400.0
+    """Of a start and of a prediction [s]: a day."""
+    most_frames: int = 10_000_000
+    """Of a prediction: hours at any camera's rate."""
+    smallest_motion: float = radians(1.6)
+    """No motion of a robot is as small [rad]; in radians, it is a right angle."""
+    longest: float = 600.0
+    """A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
+    fewest_frames: int = 20
+    """Of a take."""
 
 
 COMPARE = CompareOptions()
+FILES = FileLimits()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from workbench.compare.options import COMPARE
 from workbench.compare.session_file import write_session
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import family_of, survey
@@ -21,8 +22,6 @@ from workbench.robot.servo_registers import save_registers
 from workbench.simulation.virtual_robot import VirtualRobot
 
 Progress = Callable[[str, float | None], None]
-CAMERAS = 120.0
-"""Frames per second of the virtual robot's cameras."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +106,8 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
 
 def _filmed(virtual: VirtualRobot, played: Played | ControllerRun, take: Path, seed: int) -> Capture:
     names, scene, begin, end = virtual.scene(played.started, seed)
-    motive = VirtualMotive(names, scene, rate=CAMERAS, started=begin, seed=seed)
-    seconds = end - begin - 1 / CAMERAS
+    motive = VirtualMotive(names, scene, rate=COMPARE.camera_rate, started=begin, seed=seed)
+    seconds = end - begin - 1 / COMPARE.camera_rate
     return record_take(Recorder(VirtualLink(motive)), take, lambda: False, seconds, until_time=lambda: played.ended)
 
 

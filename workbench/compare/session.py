@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
+from workbench.compare.options import FILES
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.motion.table import MOST_CYCLES
@@ -17,8 +18,6 @@ from workbench.robot.robot_section import read_model
 from workbench.robot.servo_registers import ServoRegisters, load_registers
 from workbench.robot.yaml_file import Fields, read_yaml
 
-MOST_SECONDS, MOST_FRAMES = 86_400.0, 10_000_000
-"""Of a start and of a prediction: a day, and hours at any camera's rate."""
 Base = Literal["free", "fixed"]
 
 
@@ -121,7 +120,7 @@ def _take(f: Fields, model: RobotModel) -> TakeSpec:
     take = TakeSpec(
         name=name, recording=_recording(f, name), motion=f.file("motion"),
         cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1, base=_base(f, model),
-        starts_at=f.number("starts_at", least=0, most=MOST_SECONDS),
+        starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
         servos=_changes(f, model), use=use,  # type: ignore[arg-type]
     )
     f.done()
@@ -140,8 +139,8 @@ def _recording(f: Fields, take: str) -> Path:
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:
     spec = PredictSpec(
         name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1,
-        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=MOST_SECONDS),
-        frames=f.whole("frames", least=1, most=MOST_FRAMES),
+        commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
+        frames=f.whole("frames", least=1, most=FILES.most_frames),
         base=_base(f, model), servos=_changes(f, model),
     )
     f.done()

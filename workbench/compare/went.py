@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.compare.metrics import heading, turned
+from workbench.compare.options import COMPARE
 from workbench.recording import quaternions as quat
 from workbench.recording.take import Take
-
-FELL_TILT = np.deg2rad(60.0)
-"""A base that leans further lies [rad]."""
-FELL_HEIGHT = 0.5
-"""Of its height at rest, below which a base lies."""
 
 
 def how_it_went(take: Take) -> str:
@@ -29,7 +25,7 @@ def how_it_went(take: Take) -> str:
     seconds = float(take.time[last] - take.time[first])
     speed = f" ({abs(forward) / seconds:.3f} m/s)" if seconds > 0 else ""
     up = quat.matrix(take.quat_WB)[:, 2, 2]
-    fell = np.flatnonzero((up < np.cos(FELL_TILT)) | (take.p_WB[:, 2] < FELL_HEIGHT * take.p_WB[first, 2]))
+    fell = np.flatnonzero((up < np.cos(COMPARE.fell_tilt)) | (take.p_WB[:, 2] < COMPARE.fell_height * take.p_WB[first, 2]))
     ending = f"; fell at {take.since_start[fell[0]]:.2f} s" if len(fell) else "; did not fall"
     turn = float(np.rad2deg(turned(take.quat_WB, take.since_start)))
     return f"went {forward:+.3f} m forward{speed} and {left:+.3f} m to the left, turned {turn:+.1f} deg{ending}"

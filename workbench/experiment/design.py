@@ -26,7 +26,7 @@ from workbench.experiment.rivals import Pair
 from workbench.experiment.runs import Progress, Runs, spans
 from workbench.experiment.segment import Segment
 from workbench.experiment.stance import BodyMoves
-from workbench.identify.findings import NextExperiment
+from workbench.identify.results.findings import NextExperiment
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, legs

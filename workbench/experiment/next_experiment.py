@@ -7,7 +7,7 @@ from dataclasses import replace
 from workbench.compare.session_takes import Progress, no_progress
 from workbench.experiment.design import design_experiment
 from workbench.identify.diagnosis import DiagnosisResult
-from workbench.identify.findings import Diagnosis
+from workbench.identify.results.findings import Diagnosis
 from workbench.motion import Motion
 
 MOTION = "next_experiment.csv"

@@ -14,7 +14,7 @@ from workbench.compare.options import COMPARE
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.rivals import Pair, Rival
 from workbench.identify.options import PROBLEM
-from workbench.identify.ties import ObservationModel
+from workbench.identify.results.ties import ObservationModel
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 

@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
-from workbench.identify.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.ledger import in_file_units
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
-from workbench.identify.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
+from workbench.identify.results.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
+from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
+from workbench.identify.results.ties import Tie
+from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.model_comparison import NamePosterior, Rival
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.screening import CandidateFit
-from workbench.identify.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
@@ -188,7 +188,7 @@ def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
 
 
 def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> tuple[Tie, ...]:
-    """Of each finding and its likeliest rival, where that was fitted and is WORTH_AN_EXPERIMENT."""
+    """Of each finding and its likeliest rival, where that was fitted and is worth an experiment."""
     return tuple(Tie(fit.model(nominal), s.rivals[0].fit.model(nominal), s.rivals[0].probability) for s in posteriors
                  if s.rivals and s.rivals[0].fit is not None and s.rivals[0].probability > CONCLUSIONS.worth_an_experiment)
 

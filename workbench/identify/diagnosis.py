@@ -22,22 +22,24 @@ from workbench.identify.conclusions import Residuals, change, finding, posterior
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
 from workbench.identify.estimators.geometry import Geometry, Measured, geometry_of
+from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explain, is_by_logs
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.findings import Diagnosis, Finding, GapEntry, Unexplained
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import EnginesPartError, judged
-from workbench.identify.ledger import channel_gaps, ledger
+from workbench.identify.ledger import ledger
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import Prepared, check_duration, prepared
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.proposals import candidates
-from workbench.identify.registers import read_off_registers
+from workbench.identify.results.findings import Diagnosis, Finding, GapEntry, Unexplained
+from workbench.identify.results.take_report import TakeReport
+from workbench.identify.results.ties import ObservationModel, Tie, observation_models
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
@@ -45,8 +47,6 @@ from workbench.identify.selection.forward import select
 from workbench.identify.selection.model_comparison import NamePosterior, compare_models
 from workbench.identify.selection.record import SelectionResult
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced, subset_used
-from workbench.identify.take_report import TakeReport
-from workbench.identify.ties import ObservationModel, Tie, observation_models
 from workbench.recording.take import Take
 from workbench.robot import Posterior, RobotModel
 from workbench.simulation import SimulationConfig

@@ -9,11 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from workbench.identify.options import PROBLEM
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
-
-APART = 0.1
-"""Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
 
 
 class EnginesPartError(ArithmeticError):
@@ -22,7 +20,7 @@ class EnginesPartError(ArithmeticError):
 
 def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
     """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of all takes. 0 where
-    rollouts are Drake's already. EnginesPartError beyond APART; name: of the model, for its text."""
+    rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its text."""
     if evaluator.config.engine == "drake":
         return 0.0
     drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)
@@ -34,6 +32,6 @@ def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
         seen = np.isfinite(apart)
         each = np.sqrt(np.where(seen, apart, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1))
         worst = max(worst, float(each.max(initial=0.0)))
-        if np.any(np.isfinite(residual) != np.isfinite(theirs[i])) or worst > APART:
+        if np.any(np.isfinite(residual) != np.isfinite(theirs[i])) or worst > PROBLEM.engines_apart:
             raise EnginesPartError(f"the compiled station and Drake part by {worst:.2g} sigma on the {name} model")
     return float(f"{worst:.2g}")

@@ -10,21 +10,11 @@ from numpy.typing import NDArray
 from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
 from workbench.effects.base import Layer
-from workbench.identify.findings import GapEntry
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, ratios, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, ratios, smoothed
+from workbench.identify.results.findings import GapEntry
 
 Array = NDArray[np.float64]
-
-
-def channel_gaps(e: TakeEvidence, residual: Array) -> dict[str, float]:
-    """Channels of a take that are beyond noise, with their RMS over sigma (or what their running means amount to)."""
-    raw, smooth = ratios(e, residual), ratios(e, residual, smooth=True)
-    # the body's frames overlap as it is
-    size = {
-        c: raw[c] if c in BODY else max(raw[c], smooth[c] * PROBLEM.gap_ratio / PROBLEM.gap_ratio_smoothed) for c in e.channels
-    }
-    return {c: s for c, s in size.items() if s > PROBLEM.gap_ratio}
 
 
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:

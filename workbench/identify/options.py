@@ -65,6 +65,10 @@ class ProblemOptions:
     """Share of what a channel lacks with the base held below which the frames that decide show too little of it."""
     heavy: float = 0.15
     """Share of the robot's mass from which on a link's centre of mass is a candidate: of lighter ones it hardly shows."""
+    most_stretches: int = 10_000
+    """More than a take has: numbers of stretches count on by as many from take to take."""
+    engines_apart: float = 0.1
+    """Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
     heavy_trunk: float = 0.09
     """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
 
@@ -73,6 +77,8 @@ class ProblemOptions:
 class ReadOffOptions:
     """Estimators without a search: geometry, stops, mounts, frames, dropped commands."""
 
+    register_exact: float = 0.005
+    """Standard deviation of what a servo's register sets, as a share: the servo itself calculates with that number."""
     least_along: float = 0.5
     """Cosine between a link's length and what of it two axes tell, at least."""
     length_error: float = 1e-4
@@ -134,6 +140,8 @@ class FitOptions:
     """What a finite difference is a share of at least, in typical sizes."""
     vector_move: float = 0.5
     """The same of one of a vector's numbers, in its length."""
+    most_doubled: float = 1000.0
+    """Doublings that a number still holds; where a bound is infinite it is the parameter's own range that ends it."""
     least_mass: float = 0.05
     """What positions of a point mass are divided by at least, in typical masses."""
     most_moment: float = 100.0

@@ -15,8 +15,6 @@ from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]
-MOST_DOUBLED = 1000.0
-"""Doublings that a number still holds; where a bound is infinite it is the parameter's own range that ends it."""
 Key = tuple[str, tuple[str, ...]]
 """What an effect is, and where."""
 
@@ -108,7 +106,7 @@ class Candidate:
             elif math.isinf(n):
                 value = t / max(size, t / p.high)
             else:
-                value = n * 2.0 ** min(size, MOST_DOUBLED) if p.shapes else n + size * (t - n)
+                value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else n + size * (t - n)
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 

@@ -1,4 +1,4 @@
-"""The identification problem: recorded channels, their standard deviation from noise and numerics, and the split of frames."""
+"""The evidence of a take: recorded channels, their standard deviation, the split of frames, and which channels have a gap."""
 
 from __future__ import annotations
 
@@ -8,17 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.channels import ACROSS, BODY, channel_names, channels_of, joint_of
-from workbench.compare.compare_session import Rollouts
-from workbench.compare.comparison import noise_of
-from workbench.compare.metrics import rms
-from workbench.compare.options import COMPARE
+from workbench.compare.channels import BODY, channels_of, joint_of
 from workbench.compare.session_takes import RegisteredTake
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
 from workbench.identify.options import PROBLEM
-from workbench.identify.shooting import unsettled
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -147,86 +142,12 @@ class TakeEvidence:
         return np.where(np.isfinite(simulated), shifted, np.nan)
 
 
-def gather(takes: Sequence[RegisteredTake], rollouts: Mapping[str, Rollouts],
-           steadied: Mapping[str, BaseStates | None] | None = None) -> list[TakeEvidence]:
-    """The evidence of registered takes; rollouts: of the nominal model at the search's step, put back to `steadied`, with floors,
-    by take name."""
-    known = noise_of([t.recorded for t in takes])
-    alone = not any(t.spec.use == "validate" for t in takes)
-    return [_evidence(t, rollouts[t.spec.name], known.joints, alone, (steadied or {}).get(t.spec.name)) for t in takes]
-
-
-def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, float], alone: bool, steadied: BaseStates | None
-              ) -> TakeEvidence:
-    names = channel_names(t)
-    joints = t.recorded.joints
-    recorded = channels_of(t.recorded, names)
-    moving = t.recorded.time >= t.measurement.starts_at
-    if steadied is not None:
-        moving &= ~unsettled(steadied, t.recorded.since_start)
-    nominal = channels_of(t.observed(r.nominal), names)
-    finer = [channels_of(t.observed(f), names) for f in r.finer]
-    finest = finer[-1] if finer else nominal
-    floor = _apart(finest, finer[:-1] or [nominal], moving)
-    others = [channels_of(t.observed(o), names) for o in r.other_contact]
-    spread = _apart(nominal, others, moving)
-    noise = np.array([noise_of_joints.get(c, np.nan) if c in joints else np.nan for c in names])
-    resting = recorded[t.recorded.resting]
-    noise = np.where(np.isnan(noise), [t.measurement.noise.get(c, np.nan) for c in names], noise)
-    if len(resting) > 5:  # a pose is a mean over rest, so that this is about zero
-        own = rms(resting - np.nanmean(resting, axis=0))
-        noise = np.where(np.isnan(noise), own, noise)
-    across = [i for i, c in enumerate(names) if ACROSS in c]
-    if across:  # one camera system sees all bodies alike
-        noise[across] = np.nanmedian(noise[across])
-    sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
-    weight = np.ones(len(names))
-    if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
-        body = [names.index(c) for c in BODY]
-        sigma[body] = np.maximum(sigma[body], PROBLEM.least_body_sigma)
-        weight[body] = 1.0 / max(1.0, COMPARE.gain_span / float(np.median(np.diff(t.recorded.time))))
-    sigma = np.maximum(sigma, 1e-6)
-    apart = [*(f - finest for f in (*finer[:-1], nominal)), *(o - nominal for o in others)]
-    rough = _rough(sigma, noise, apart, t) if others else 1.0
-    offset = np.nan_to_num(finest - nominal)
-    contact = np.nan_to_num(others[0] - nominal) if others else np.zeros_like(nominal)
-    return TakeEvidence(
-        t, names, np.where(moving[:, None], recorded, np.nan), sigma, offset, _uses(t, moving, alone), weight,
-        t.recorded.zeroed and t.spec.starts_at is None, contact, np.nan_to_num(noise) ** 2 / sigma**2, rough, steadied)
-
-
-def _rough(sigma: Array, noise: Array, apart: Sequence[Array], t: RegisteredTake) -> Array:
-    """Times sigma (c,), by frame (N, c): at least 1, and more where steps and contact models part within a block."""
-    frames = max(1, round(PROBLEM.block / float(np.median(np.diff(t.recorded.time)))))
-    worst = np.max(np.square(np.nan_to_num(np.array(apart))), axis=0)
-    local = _running_sum(worst, frames) / frames
-    return np.maximum(np.sqrt(np.nan_to_num(noise) ** 2 + local) / sigma, 1.0)
-
-
 def part_of(since: Array) -> NDArray[np.int_]:
-    """Which of PARTS a frame of a held take is in, by its time after the first command [s]."""
+    """Which of `ProblemOptions.parts` a frame of a fixed-base take is in, by its time after the first command [s]."""
     return np.mod(np.floor(since / PROBLEM.part).astype(int), PROBLEM.parts)
 
 
-def _uses(t: RegisteredTake, moving: Mask, alone: bool) -> dict[str, Mask]:
-    since = t.recorded.since_start
-    role = np.array(PROBLEM.uses)[np.mod(np.floor(since / PROBLEM.block).astype(int), len(PROBLEM.uses))]
-    if t.spec.base == "fixed":
-        role = np.where(role == "validate", role, np.where(part_of(since) == PROBLEM.deciding_part, "choose", "fit"))
-    if t.spec.use == "validate":
-        role[:] = "validate"
-    elif not alone:
-        role = np.where(role == "validate", "fit", role)
-    return {use: moving & (role == use) for use in ("fit", "choose", "validate")}
-
-
-def _apart(nominal: Array, others: Sequence[Array], use: Mask) -> Array:
-    if not others:
-        return np.zeros(nominal.shape[1])
-    return np.asarray(np.max([np.nan_to_num(rms((o - nominal)[use])) for o in others], axis=0), dtype=float)
-
-
-def _running_sum(columns: Array, frames: int) -> Array:
+def running_sum(columns: Array, frames: int) -> Array:
     """Of each column (N, c), over `frames` around each frame; what lies beyond the ends is nothing."""
     kernel = np.ones(max(1, frames))
     return np.column_stack([np.convolve(c, kernel, mode="same") for c in columns.T])
@@ -235,7 +156,7 @@ def _running_sum(columns: Array, frames: int) -> Array:
 def smoothed(residual: Array, frames: int) -> Array:
     """Running means of residuals (N, c) over `frames`, scaled to stay 1 where they are white noise of 1; NaN stays."""
     known = np.isfinite(residual)
-    total, count = _running_sum(np.where(known, residual, 0.0), frames), _running_sum(known.astype(float), frames)
+    total, count = running_sum(np.where(known, residual, 0.0), frames), running_sum(known.astype(float), frames)
     return np.where(known, total / np.sqrt(np.maximum(count, 1.0)), np.nan)
 
 
@@ -248,6 +169,16 @@ def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: boo
     count = np.isfinite(rows).sum(axis=0)
     value = np.sqrt(np.nansum(np.square(rows), axis=0) / np.maximum(count, 1))
     return {c: float(value[i]) if count[i] else float("nan") for i, c in enumerate(e.channels)}
+
+
+def channel_gaps(e: TakeEvidence, residual: Array) -> dict[str, float]:
+    """Channels of a take that are beyond noise, with their RMS over sigma (or what their running means amount to)."""
+    raw, smooth = ratios(e, residual), ratios(e, residual, smooth=True)
+    # the body's frames overlap as it is
+    size = {
+        c: raw[c] if c in BODY else max(raw[c], smooth[c] * PROBLEM.gap_ratio / PROBLEM.gap_ratio_smoothed) for c in e.channels
+    }
+    return {c: s for c, s in size.items() if s > PROBLEM.gap_ratio}
 
 
 def joint_error(evidence: Sequence[TakeEvidence], joints: Sequence[str], residuals: Mapping[int, Array], use: str) -> float:

@@ -45,7 +45,8 @@ def _zeroed(evidence: Sequence[TakeEvidence]) -> bool:
 
 
 def heavy_links(model: RobotModel) -> list[str]:
-    """Links with at least the share HEAVY of the robot's mass, HEAVY_APART where they are no part of one leg."""
+    """Links with at least the share `ProblemOptions.heavy` of the robot's mass, `heavy_trunk` where they are no part of one
+    leg."""
     k = model.kinematics
     feet = list(model.foot_links.values())
     carried = Counter(link for foot in feet for link in (foot, *k.ancestors(foot)))

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollout_key import take_key
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
@@ -22,13 +21,11 @@ from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
 
 Array = NDArray[np.float64]
-STRETCHES = 10_000
-"""More than a take has."""
 
 
 @dataclass(frozen=True)
 class RolloutRequest:
-    """A model on some takes (indices). step: in search steps; COARSE ones are good for differences alone. until: how long after
+    """A model on some takes (indices). step: in search steps; coarse ones are good for differences alone. until: how long after
     the first command [s]; frames after that are NaN."""
 
     model: RobotModel
@@ -157,7 +154,7 @@ class RolloutEvaluator:
         parts = [np.empty(0, dtype=int)]
         for i in sorted(takes):
             e = self.evidence[i]
-            stretch = i * STRETCHES + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
+            stretch = i * PROBLEM.most_stretches + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
             parts.append(np.repeat(stretch, len(e.columns(joint))))
         return np.concatenate(parts)
 
@@ -229,7 +226,7 @@ class RolloutEvaluator:
 
 def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
     """Of `RolloutEvaluator.stretches`."""
-    return stretches // STRETCHES
+    return stretches // PROBLEM.most_stretches
 
 
 def _of_the_floor(e: EffectSpec) -> bool:

@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, part_of
+from workbench.identify.problem import TakeEvidence, channel_gaps, part_of
 
 Array = NDArray[np.float64]
 

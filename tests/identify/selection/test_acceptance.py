@@ -11,9 +11,10 @@ from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import candidates
-from workbench.identify.selection import acceptance as worth
+from workbench.identify.selection import acceptance
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import ACCEPTANCE
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
-from workbench.identify.selection.screening import CandidateFit
 
 
 def leaving(worn, **sizes):
@@ -44,8 +45,8 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
         gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
         return CandidateFit(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
 
-    assert worth.is_acceptable(search, trial("two"), (0,), [first], search.settled)
-    assert not worth.is_acceptable(search, trial("three"), (0,), [first], search.settled)
+    assert acceptance.is_acceptable(search, trial("two"), (0,), [first], search.settled)
+    assert not acceptance.is_acceptable(search, trial("three"), (0,), [first], search.settled)
 
 
 def test_on_the_ground_a_strong_effect_hides_nothing_in_channels_that_it_did_not_change(worn, monkeypatch):
@@ -66,8 +67,8 @@ def test_on_the_ground_a_strong_effect_hides_nothing_in_channels_that_it_did_not
         gain = np.where(np.arange(len(names)) == names.index(channel), 2000.0, 0.0)
         return CandidateFit(tilt, np.ones(2), {"fit": 4000.0, "choose": 2000.0}, None, closed=0.9, by_channel=gain)
 
-    assert worth.is_acceptable(search, trial("two"), (0,), [first], nominal)
-    assert not worth.is_acceptable(search, trial("three"), (0,), [first], nominal)
+    assert acceptance.is_acceptable(search, trial("two"), (0,), [first], nominal)
+    assert not acceptance.is_acceptable(search, trial("three"), (0,), [first], nominal)
 
 
 def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_what_another_had(worn):
@@ -76,9 +77,9 @@ def test_with_the_base_held_what_is_left_in_one_joint_is_not_too_little_beside_w
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = partial(leaving, worn)
     first = SelectionStep(fit(three=100.0), (), (CandidateFit(fade, np.ones(1), {"fit": 1e7, "choose": 1e7}, None),))
-    assert worth.too_little_left(search, fit(three=10.0), (0,), [first])
-    assert not worth.too_little_left(search, fit(three=40.0), (0,), [first])
-    assert not worth.too_little_left(search, fit(two=10.0), (0,), [first])
+    assert acceptance.too_little_left(search, fit(three=10.0), (0,), [first])
+    assert not acceptance.too_little_left(search, fit(three=40.0), (0,), [first])
+    assert not acceptance.too_little_left(search, fit(two=10.0), (0,), [first])
 
 
 @pytest.mark.parametrize(("left", "given", "asked"), [
@@ -90,7 +91,7 @@ def test_of_what_all_joints_show_hundredths_may_be_left_in_all_but_not_in_one_al
     search = Search(whole.evaluator, session.model)
     own = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.key == ("backlash", ("three",)))
     now = replace(leaving(worn, **left), effects=(own,) if given else ())
-    assert set(worth.remaining(search, now, leaving(worn, one=60.0, two=60.0, three=100.0), (0,))) == asked
+    assert set(acceptance.remaining(search, now, leaving(worn, one=60.0, two=60.0, three=100.0), (0,))) == asked
 
 
 def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
@@ -101,21 +102,21 @@ def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_
     first = SelectionStep(fit(three=100.0, two=15.0), (), (CandidateFit(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
     search = search.with_settled(replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals))
     monkeypatch.setattr(whole.evaluator, "walks", lambda takes: True)
-    assert not worth.too_little_left(search, fit(two=13.0), (0,), [first])
-    assert worth.too_little_left(search, fit(three=13.0), (0,), [first])
+    assert not acceptance.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert acceptance.too_little_left(search, fit(three=13.0), (0,), [first])
     search = search.with_settled(None)
-    assert worth.too_little_left(search, fit(two=13.0), (0,), [first])
+    assert acceptance.too_little_left(search, fit(two=13.0), (0,), [first])
 
 
 @pytest.mark.parametrize(("name", "left", "share"), [
-    ("backlash", {}, worth.LEAST_CLOSED), ("backlash", {"three": 2.0}, worth.LEAST_CLOSED),
-    ("backlash", {"three": 30.0}, worth.LAST_CLOSED), ("dead_band", {"three": 2.0}, worth.LEAST_CLOSED),
-    ("dead_band", {"three": 30.0}, worth.LAST_CLOSED)])
+    ("backlash", {}, ACCEPTANCE.least_closed), ("backlash", {"three": 2.0}, ACCEPTANCE.least_closed),
+    ("backlash", {"three": 30.0}, ACCEPTANCE.last_closed), ("dead_band", {"three": 2.0}, ACCEPTANCE.least_closed),
+    ("dead_band", {"three": 30.0}, ACCEPTANCE.last_closed)])
 def test_beside_a_joint_that_no_name_fits_an_effect_on_the_ground_has_to_be_half(worn, name, left, share):
     session, whole, _ = worn
     search = Search(whole.evaluator, session.model)
     given = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.key == (name, ("three",)))
-    assert worth.least_closed(search, leaving(worn, three=40.0), replace(leaving(worn, **left), effects=(given,))) == share
+    assert acceptance.least_closed(search, leaving(worn, three=40.0), replace(leaving(worn, **left), effects=(given,))) == share
 
 
 def test_what_is_well_hides_no_gap_and_closes_none(worn):
@@ -133,18 +134,18 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
 
 
 def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
-    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
+    monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
     c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
     fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
         search = SimpleNamespace(held=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
         r = SelectionStep(fit, (), ())
-        assert worth.explained_at_the_end(search, r, CandidateFit(c, np.ones(1), {}, None), fit) == 1.0
+        assert acceptance.explained_at_the_end(search, r, CandidateFit(c, np.ones(1), {}, None), fit) == 1.0
 
 
 def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_not_others(monkeypatch):
-    monkeypatch.setattr(worth, "standing_out", lambda *_: set())
+    monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
 
     def of(name, joint):
         return Candidate.of(known_effects()[name], (joint,), (0.0,) * len(known_effects()[name].parameters))
@@ -158,7 +159,7 @@ def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_
             closed=lambda before, after, use, joint=None, without=(), of=shares: of[joint, tuple(without)]
         )
         search = SimpleNamespace(held=(), fitted=(0,), is_settled=lambda _: False, evaluator=evaluator)
-        assert worth.explained_at_the_end(search, SelectionStep(fit, (), ()), trial, fit) == pytest.approx(share)
+        assert acceptance.explained_at_the_end(search, SelectionStep(fit, (), ()), trial, fit) == pytest.approx(share)
 
 
 def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
@@ -188,5 +189,5 @@ def test_what_fine_steps_do_not_miss_is_idle_where_walks_told_it(worn, monkeypat
     monkeypatch.setattr(search, "floating_base", lambda takes: takes if walks else ())
     monkeypatch.setattr(search, "is_settled", lambda c: c is friction)
     monkeypatch.setattr(search, "finely", finely)
-    assert worth.idle(search, fit) == ([load] if told else [])
+    assert acceptance.idle(search, fit) == ([load] if told else [])
     assert [[x.any() for _, x in sizes] for sizes in asked_without] == ([[False, True]] if walks else [])

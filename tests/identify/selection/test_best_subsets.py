@@ -9,7 +9,7 @@ from tests.gap_linear import names, trial
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
-from workbench.identify.selection.best_subsets import Seen, _best_sets, begun_again, several, variants
+from workbench.identify.selection.best_subsets import Seen, begun_again, best_sets, several, variants
 
 
 def seen(name, signature, size=1.0):
@@ -22,7 +22,7 @@ def test_two_are_named_where_both_together_explain_what_neither_does_though_a_th
     between = friction + play + rng.normal(size=400)
     r0 = -(2.0 * friction + 2.2 * play) + 0.01 * rng.normal(size=400)
     pool = [seen("viscous_friction", between), seen("coulomb_friction", friction, 4.0), seen("backlash", play)]
-    both, *_ = _best_sets(pool, r0)
+    both, *_ = best_sets(pool, r0)
     assert {t.candidate.name: float(t.x[0]) for t in both} == pytest.approx(
         {"coulomb_friction": 8.0, "backlash": 2.2}, rel=0.02)  # in the sizes at which they were looked at
     assert not any(t.screened_out for t in both)
@@ -32,9 +32,9 @@ def test_one_more_that_does_not_halve_what_is_left_is_not_asked_for_nor_one_that
     rng = np.random.default_rng(4)
     friction, play, other = rng.normal(size=(3, 400))
     alone = -2.0 * friction + rng.normal(size=400)
-    assert _best_sets([seen("coulomb_friction", friction), seen("backlash", play), seen("dead_band", other)], alone) == []
+    assert best_sets([seen("coulomb_friction", friction), seen("backlash", play), seen("dead_band", other)], alone) == []
     less = -2.0 * friction + 2.0 * play
-    assert names(_best_sets([seen("coulomb_friction", friction), seen("backlash", play)], less)) == []
+    assert names(best_sets([seen("coulomb_friction", friction), seen("backlash", play)], less)) == []
 
 
 def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept():
@@ -44,7 +44,7 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
     slow, fast, play = rng.normal(size=(3, 300))
     pool = [*variants(sticking, points, [slow, fast]), seen("backlash", play)]
     assert len(pool) == 3
-    (both,) = _best_sets(pool, -(1.5 * fast + play))
+    (both,) = best_sets(pool, -(1.5 * fast + play))
     assert next(t.x for t in both if t.candidate.name == "stribeck_friction") == pytest.approx([1.5, 2.0])
 
 
@@ -61,7 +61,7 @@ def test_pairs_that_lines_foretell_about_as_well_are_all_fitted():
     rng = np.random.default_rng(6)
     sag, late, noise = rng.normal(size=(3, 400))
     pool = [seen("supply_sag", sag), seen("clock_rate", late), seen("timing_drift", late + 0.1 * noise)]
-    sets = names(_best_sets(pool, -(2.0 * sag + late) + 0.2 * rng.normal(size=400)))
+    sets = names(best_sets(pool, -(2.0 * sag + late) + 0.2 * rng.normal(size=400)))
     assert sets == [{"supply_sag", "clock_rate"}, {"supply_sag", "timing_drift"}]
 
 

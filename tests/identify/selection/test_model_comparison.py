@@ -13,26 +13,23 @@ from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.proposals import candidates
-from workbench.identify.selection import calibration as doubts
+from workbench.identify.selection import calibration
 from workbench.identify.selection.calibration import calibrated
-from workbench.identify.selection.model_comparison import (
-    TEMPER,
-    WALKS_SAY,
-    NamePosterior,
-    Rival,
-    _better_by_both,
-    _better_held,
-    _misfit,
-    _near,
-    _outbid,
-    _put,
-    _temper,
-    _told,
-    _twin,
-    compare_models,
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.model_comparison import NamePosterior, Rival, compare_models
+from workbench.identify.selection.odds import (
+    better_by_both,
+    better_on_fixed_base,
+    dispersion,
+    is_equivalent,
+    is_outpriced,
+    misfit,
+    numbers_identified,
 )
+from workbench.identify.selection.options import ODDS, SCHEDULING
 from workbench.identify.selection.record import SelectionResult, SelectionStep
-from workbench.identify.selection.screening import CandidateFit, tried
+from workbench.identify.selection.rivals import put_in_place, rivals_near
+from workbench.identify.selection.screening import tried
 
 
 def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_as_rival(worn):
@@ -51,7 +48,7 @@ def test_a_rival_that_does_better_takes_the_place_and_the_other_stays_beside_it_
     assert NOMINAL + fit.model(session.model).effects[0].parameters["torque"] == pytest.approx(HIDDEN, rel=0.06)
     assert fit.cost["choose"] < first.cost["choose"]
     assert posteriors[0].probability > 0.5
-    assert [r.candidate.name for r in posteriors[0].rivals] in ([], ["viscous_friction"])
+    assert [r.candidate.name for r in posteriors[0].rivals] == ["viscous_friction"]
 
 
 def test_what_leaves_much_at_its_place_is_less_sure(worn):
@@ -86,7 +83,7 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
 def test_all_that_a_lone_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, single_joint, sure):
     _, search, _ = worn
     monkeypatch.setattr(type(search), "single_joint", single_joint)
-    monkeypatch.setattr(doubts, "FEW", 3)  # none of three may err for itself
+    monkeypatch.setattr(calibration, "SCHEDULING", replace(SCHEDULING, few=3))  # none of three may err for itself
     sag = Candidate.of(known_effects()["supply_sag"], (), (0.0,))
     stiff = Candidate.of(known_effects()["coulomb_friction"], ("one",), (NOMINAL,))
     fit = replace(search.evaluated([(sag, np.ones(1)), (stiff, np.ones(1))]), covariance=np.full((2, 2), np.inf))
@@ -157,7 +154,7 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
     fit = search.evaluated([(mass, np.array([0.2, 0.0, 2.0, -1.0]))])
     astray = CandidateFit(other, np.array([9.0, 9.0, 9.0]), {"fit": 1e9, "choose": 1e9}, None)
     seen = []
-    part = _put(search, fit, 0, astray)
+    part = put_in_place(search, fit, 0, astray)
     questions = next(part)
     try:
         while True:
@@ -174,7 +171,7 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
 def test_what_walks_told_is_weighed_on_all_that_was_fitted_too():
     """Twice as many stretches are fitted: where these say the opposite, they count as much as those that choose."""
     fit, rival = SimpleNamespace(cost={"choose": 1000.0, "fit": 2000.0}), SimpleNamespace(cost={"choose": 1100.0, "fit": 1600.0})
-    assert _better_by_both(fit, rival) == pytest.approx(50.0)
+    assert better_by_both(fit, rival) == pytest.approx(50.0)
 
 
 @pytest.mark.parametrize(("name", "choose", "told"), [("payload", 900.0, True), ("payload", 1300.0, False),
@@ -189,7 +186,7 @@ def test_a_name_that_only_the_price_of_its_numbers_keeps_out_stands_beside(name,
         return SimpleNamespace(effects=(effect,), covariance=np.eye(count), slices=lambda: [slice(0, count)],
                                cost={"choose": cost, "fit": 2 * cost})
 
-    assert _outbid(search, fit("coulomb_friction", 1, 1000.0), 0, fit(name, numbers, choose)) is told
+    assert is_outpriced(search, fit("coulomb_friction", 1, 1000.0), 0, fit(name, numbers, choose)) is told
 
 
 @pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),
@@ -201,24 +198,24 @@ def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
     tilt, other = (SimpleNamespace(name=n, effect=known_effects()[n]) for n in ("ground_tilt", name))
     fit = SimpleNamespace(effects=(tilt,), residuals={0: 100.0, 1: 900.0}, cost={"choose": 1000.0})
     rival = SimpleNamespace(effects=(other,), residuals={0: 100.0 + held, 1: 2000.0})
-    assert _twin(search, fit, 0, rival) is told
+    assert is_equivalent(search, fit, 0, rival) is told
 
 
-@pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, WALKS_SAY), (-5000.0, -WALKS_SAY)])
+@pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, ODDS.walks_say), (-5000.0, -ODDS.walks_say)])
 def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
     """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
     search = SimpleNamespace(held=(0,), fitted=(0, 1), floating_base=lambda takes: (1,),
                              evaluator=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
     fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})
-    assert _better_held(search, fit, rival) == pytest.approx(adds - 20.0)
+    assert better_on_fixed_base(search, fit, rival) == pytest.approx(adds - 20.0)
 
 
 def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
     _, search, _ = worn
     mass = PointMass.of(known_effects()["payload"], ("two_link",), (0.0, 0.0, 0.0, 0.0))
     fit = replace(search.evaluated([]), effects=(mass,), x=np.ones(4), covariance=np.full((4, 4), np.inf))
-    assert _told(fit, 0) == 4
-    assert _told(replace(fit, covariance=np.diag([1.0, 1.0, 1.0, np.inf])), 0) == 3
+    assert numbers_identified(fit, 0) == 4
+    assert numbers_identified(replace(fit, covariance=np.diag([1.0, 1.0, 1.0, np.inf])), 0) == 3
 
 
 def test_where_nothing_stays_nothing_is_contested(worn):
@@ -231,8 +228,8 @@ def test_where_nothing_stays_nothing_is_contested(worn):
 
 def test_a_rival_must_lead_by_more_where_no_fit_is_right():
     search = SimpleNamespace(fitted=(0,), evaluator=SimpleNamespace(expected=lambda takes, use: 100.0))
-    assert _misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
-    assert _misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0
+    assert misfit(search, SimpleNamespace(cost={"choose": 40000.0})) == 400.0
+    assert misfit(search, SimpleNamespace(cost={"choose": 60.0})) == 1.0
 
 
 def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
@@ -243,8 +240,8 @@ def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
     search = SimpleNamespace(fitted=(0, 1), held=(0,), evaluator=evaluator, is_settled=lambda c: False)
     fit = SimpleNamespace(cost={"choose": left[None]}, residuals={0: None, 1: None})
     knee, whole = SimpleNamespace(joint="knee", gain={"choose": 100.0}), SimpleNamespace(joint=None, gain={"choose": 100.0})
-    assert _temper(search, fit, None, knee) == pytest.approx(1.3 * TEMPER)
-    assert _temper(search, fit, None, whole) == pytest.approx(400.0 * FIT.overdispersion_free)
+    assert dispersion(search, fit, None, knee) == pytest.approx(1.3 * ODDS.temper)
+    assert dispersion(search, fit, None, whole) == pytest.approx(400.0 * FIT.overdispersion_free)
 
 
 def test_twins_name_each_other():
@@ -297,4 +294,4 @@ def test_what_moves_another_links_centre_of_mass_is_put_in_its_place_on_a_walk_h
                               trial(com, "foot", 0.0, screened_out=True))
     seats = {body.candidate.key: (SelectionStep(None, (body, load, tail, foot), (body,)), body)}
     search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: walks), fitted=(0,), is_settled=lambda c: False)
-    assert [str(t.candidate) for t in _near(search, seats, [body.candidate], body.candidate, body.x)] == near
+    assert [str(t.candidate) for t in rivals_near(search, seats, [body.candidate], body.candidate, body.x)] == near

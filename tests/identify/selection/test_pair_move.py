@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.identify.selection import pair_move as pulls
+from workbench.identify.selection import pair_move
+from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.screening import CandidateFit
 
 FORWARD, LEFT, SLIPPERY, LIFTS, SOFT = np.random.default_rng(4).normal(size=(5, COUNT)) * 2.0
 DOES = {"ground_tilt": [FORWARD, LEFT], "tether_force": [FORWARD, LEFT, 0.8 * SLIPPERY + 0.6 * LIFTS],
@@ -37,16 +37,16 @@ POOL = [candidate(n) for n in DOES]
 
 @pytest.fixture(autouse=True)
 def linear(monkeypatch):
-    monkeypatch.setattr(pulls, "with_effects", lambda nominal, sizes: list(sizes))
-    monkeypatch.setattr(pulls, "too_little_left", lambda search, current, takes, rounds: current.cost["choose"] < 1)
-    monkeypatch.setattr(pulls, "is_acceptable", lambda search, t, takes, rounds, current: t.gain["choose"] > 300)
+    monkeypatch.setattr(pair_move, "with_effects", lambda nominal, sizes: list(sizes))
+    monkeypatch.setattr(pair_move, "too_little_left", lambda search, current, takes, rounds: current.cost["choose"] < 1)
+    monkeypatch.setattr(pair_move, "is_acceptable", lambda search, t, takes, rounds, current: t.gain["choose"] > 300)
 
 
 def test_a_slope_and_a_slippery_floor_are_found_where_a_pull_that_lifts_was():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     fit, seat = found(search, "tether_force", "ground_friction")
     assert fit.cost["choose"] > 500
-    now, rounds = pulls.with_pair(search, POOL, fit, [seat], silent)
+    now, rounds = pair_move.with_pair(search, POOL, fit, [seat], silent)
     names = {c.name for c in now.effects}
     assert "ground_friction" in names
     assert names - {"ground_friction"} <= {"ground_tilt", "tether_force"}
@@ -59,14 +59,14 @@ def test_a_slope_and_a_slippery_floor_are_found_where_a_pull_that_lifts_was():
 def test_one_that_explains_nearly_all_is_left_alone_and_nothing_is_asked():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0))
     fit, seat = found(search, "ground_tilt", closed=0.99)
-    assert pulls.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
+    assert pair_move.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
     assert search.asked == 0
 
 
 def test_where_nothing_is_left_nothing_is_asked():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0))
     fit, seat = found(search, "ground_tilt")
-    assert pulls.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
+    assert pair_move.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
     assert search.asked == 0
 
 
@@ -74,14 +74,14 @@ def test_two_that_bring_little_more_than_one_do_not_take_its_place():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0), soft_ground=(0.1,))
     fit, seat = found(search, "tether_force")
     assert 0 < fit.cost["choose"] < 300
-    assert pulls.with_pair(search, POOL, fit, [seat], silent)[0] is fit
+    assert pair_move.with_pair(search, POOL, fit, [seat], silent)[0] is fit
     assert search.asked > 0
 
 
 def test_two_of_the_ground_take_the_place_of_a_joint_that_was_found_for_them():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     fit, seat = found(search, "backlash", "ground_friction", "tether_force")
-    now, rounds = pulls.with_pair(search, POOL, fit, [seat], silent)
+    now, rounds = pair_move.with_pair(search, POOL, fit, [seat], silent)
     assert "backlash" not in {c.name for c in now.effects}
     assert now.cost["choose"] == pytest.approx(0.0, abs=1e-9)
     assert all("tether_force" in {t.candidate.name for t in r.trials} for r in rounds), "a pull's rivals stay, for its place"
@@ -90,10 +90,10 @@ def test_two_of_the_ground_take_the_place_of_a_joint_that_was_found_for_them():
 def test_a_load_gets_no_company_and_what_was_only_foretold_gives_none():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     fit, seat = found(search, "payload")
-    assert pulls.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
+    assert pair_move.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])
     fit, seat = found(search, "tether_force", "ground_friction")
     told = replace(seat, trials=(seat.trials[0], replace(seat.trials[1], screened_out=True)))
-    pulls.with_pair(search, POOL, fit, [seat], silent)
+    pair_move.with_pair(search, POOL, fit, [seat], silent)
     both, search.asked = search.asked, 0
-    pulls.with_pair(search, POOL, fit, [told], silent)
+    pair_move.with_pair(search, POOL, fit, [told], silent)
     assert 0 < search.asked < both

@@ -11,9 +11,9 @@ from workbench.effects.registry import known_effects
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.proposals import candidates, heavy_links
-from workbench.identify.selection import forward as selection
-from workbench.identify.selection import scheduling as asked
-from workbench.identify.selection.screening import CandidateFit
+from workbench.identify.selection import forward, scheduling
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import SCHEDULING
 from workbench.robot import puppy_model
 
 
@@ -27,22 +27,23 @@ from workbench.robot import puppy_model
 ])
 def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatch, gaps, expected):
     named = {c.replace(" across ", ACROSS): s for c, s in gaps.items()}
-    monkeypatch.setattr(asked, "channel_gaps", lambda e, residual: named)
+    monkeypatch.setattr(scheduling, "channel_gaps", lambda e, residual: named)
     search = SimpleNamespace(floating_base=lambda takes: takes, evaluator=SimpleNamespace(evidence=[None]),
                              nominal=SimpleNamespace(joints=("one", "two")))
-    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
+    assert scheduling.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == expected
     search.floating_base = lambda takes: ()
-    assert asked.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
+    assert scheduling.standing_out(search, SimpleNamespace(residuals={0: None}), (0,)) == set()
 
 
-@pytest.mark.parametrize(("base", "tier", "said"), [("fixed", 2, False), ("free", 2, False), ("free", asked.TIERS_OF_ALL, True)])
+@pytest.mark.parametrize(("base", "tier", "said"),
+                         [("fixed", 2, False), ("free", 2, False), ("free", SCHEDULING.tiers_of_all, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
     """What a hand carries looks like a weak shoulder."""
     search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"), floating_base=lambda takes: ())
     shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
     for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
         trial = CandidateFit(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
-        assert selection._says_it(search, None, trial, (0,), tier) is enough
+        assert forward._says_it(search, None, trial, (0,), tier) is enough
 
 
 @pytest.mark.parametrize(("name", "tier", "base", "tips"), [("com_shift", 4, "free", True), ("payload", 4, "free", True),
@@ -53,7 +54,7 @@ def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_fr
     heard = Candidate.of(effect, () if name == "soft_ground" else ("body",), effect.neutral(None))
     trial = CandidateFit(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
     search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
-    assert selection._tips(search, trial, (0,), tier) is tips
+    assert forward._tips(search, trial, (0,), tier) is tips
 
 
 @pytest.mark.parametrize(("spring", "stop", "chosen"), [(5.6e7, 3.9e7, ["joint_stop"]), (5.6e7, 2.0e7, ["parallel_spring"]),
@@ -66,7 +67,7 @@ def test_a_stop_that_recordings_show_goes_before_a_stiff_spring_that_imitates_it
     trials = [
         CandidateFit(c, np.ones(1), {"fit": 2 * g, "choose": g}, "one", closed=0.6) for c, g in ((stiff, spring), (at_stop, stop))
     ]
-    choices = selection._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
+    choices = forward._accepted(sorted(trials, key=lambda t: -t.gain["choose"]))
     assert [[t.candidate.name for t in c] for c in choices] == [chosen]
 
 
@@ -80,7 +81,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
     shifted = Candidate.of(known["com_shift"], ("body",), (0.0, 0.0, 0.0))
     trials = [CandidateFit(c, np.ones(c.size), {"fit": 2 * g, "choose": g}, None, closed=share)
               for c, g, share in zip((soft, shifted), (565.0, gain), closed)]
-    assert [[t.candidate.name for t in c] for c in selection._accepted(trials)] == [[name] for name in chosen]
+    assert [[t.candidate.name for t in c] for c in forward._accepted(trials)] == [[name] for name in chosen]
 
 
 @pytest.mark.parametrize(("base", "shares", "of_all"), [
@@ -90,11 +91,11 @@ def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_
     """Beside another clock rate, play in one joint kept joints and sets of effects being asked until the limit of work."""
     joints = [f"joint{n}" for n in range(len(shares))]
     search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
-    monkeypatch.setattr(selection, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
+    monkeypatch.setattr(forward, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
     for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
         trial = CandidateFit(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
         beyond = dict.fromkeys([*joints, "heading"], 9.0)
-        assert selection._is_of_all(search, None, trial, (0,), beyond) is expected
+        assert forward._is_of_all(search, None, trial, (0,), beyond) is expected
 
 
 def test_beside_a_pull_no_tilt_is_asked(worn):
@@ -103,21 +104,21 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
     pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
     for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
-        asked_of = [asked.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.held, tier)[0]
-                    for tier in range(asked.TIERS)]
+        asked_of = [scheduling.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.held, tier)[0]
+                    for tier in range(SCHEDULING.tiers)]
         assert [g for g in asked_of if g] == groups
 
 
 def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while_held(worn, monkeypatch):
     """A stop may lie beyond what was moved then, and gravity may have left a loose mount on one side."""
     _, search, nominal = worn
-    well = next(iter(asked._when_held(search, nominal)[0]))
+    well = next(iter(scheduling.well_on_fixed_base(search, nominal)[0]))
     monkeypatch.setattr(search, "floating_base", lambda takes: takes)
     mount = Candidate.of(known_effects()["loose_mount"], (well,), (0.0, 1.0, 0.0, 0.0), (1.0, 1.0, 0.0, 0.0),
                          (False, True, True, True))
     band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
-    groups = [g for tier in range(asked.TIERS)
-              for g in asked.asked(search, [mount, band], nominal, {well: 3.0}, search.held, tier)[0]]
+    groups = [g for tier in range(SCHEDULING.tiers)
+              for g in scheduling.asked(search, [mount, band], nominal, {well: 3.0}, search.held, tier)[0]]
     assert groups == [[mount]]
 
 
@@ -126,8 +127,8 @@ def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn
     pool = candidates(session.model, search.evaluator.evidence)
 
     def asked_of(*joints):
-        return [[c for g in asked.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
-                for tier in range(asked.TIERS)]
+        return [[c for g in scheduling.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
+                for tier in range(SCHEDULING.tiers)]
 
     of_all, at_joints, *others = asked_of("one", "two", "three")[1:]
     assert {c.name for c in of_all} >= {"supply_voltage", "timing_drift"}
@@ -146,26 +147,27 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
     seen = replace(e, take=replace(e.take, recorded=replace(e.take.recorded, zeroed=zeroed)))
     search = Search(search.evaluator.on([seen]), session.model)
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
-    groups = [g for tier in range(asked.TIERS) for g in asked.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
+    groups = [g for tier in range(SCHEDULING.tiers)
+              for g in scheduling.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
 
 
 def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_carried_it_well(worn, monkeypatch):
     """A load on a rear body's axis moves nothing that its joint would feel, and all feet."""
     session, search, nominal = worn
-    well = next(iter(asked._when_held(search, nominal)[0]))
+    well = next(iter(scheduling.well_on_fixed_base(search, nominal)[0]))
     link = next(f.child for f in session.model.kinematics.frames.values() if f.name == well)
     shift = Candidate.of(known_effects()["com_shift"], (link,), (0.0, 0.0, 0.0))
     trunk = Candidate.of(known_effects()["com_shift"], (session.model.base,), (0.0, 0.0, 0.0))
     monkeypatch.setattr(search, "floating_base", lambda takes: takes)
 
     def tiers(heavy):
-        monkeypatch.setattr(asked, "heavy_links", lambda model: heavy)
-        return [tier for tier in range(asked.TIERS)
-                for g in asked.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.held, tier)[0]
+        monkeypatch.setattr(scheduling, "heavy_links", lambda model: heavy)
+        return [tier for tier in range(SCHEDULING.tiers)
+                for g in scheduling.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.held, tier)[0]
                 for c in g if c is shift]
 
-    assert tiers([link]) == [asked.TIERS_OF_ALL - 1]
+    assert tiers([link]) == [SCHEDULING.tiers_of_all - 1]
     assert tiers([]) == []
 
 

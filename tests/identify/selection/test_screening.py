@@ -8,15 +8,17 @@ import pytest
 
 from tests.gap_worn import CONFIG, gathered
 from workbench.effects.registry import known_effects
-from workbench.identify.fitting.covariance import _scattered
+from workbench.identify.fitting.covariance import clustered
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, lowest, together
 from workbench.identify.fitting.responses import linearised_estimate, scan, scan_sizes
-from workbench.identify.options import FIT
+from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import STRETCHES, RolloutEvaluator, RolloutRequest
-from workbench.identify.selection.scheduling import _when_held
-from workbench.identify.selection.screening import FAR_WALKING, LOOKED_SHARE, CandidateEvaluation, Race, _best, _tell
+from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.selection.candidate_fit import Race, best_at, note_best
+from workbench.identify.selection.options import SCREENING
+from workbench.identify.selection.scheduling import well_on_fixed_base
+from workbench.identify.selection.screening import CandidateEvaluation
 from workbench.robot import EffectSpec
 from workbench.simulation.batch import simulate_stream
 
@@ -46,11 +48,11 @@ def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
     r0 = np.ones(20)
     probes = scan(c, (0.7, 2.0), True)
     weak = [r0 - 0.01 * p[0] for p in probes]  # a line would say: a hundred times that
-    x, gain = linearised_estimate(c, r0, probes, weak, FAR_WALKING)
-    assert x[0] == pytest.approx(FAR_WALKING * 2.0)
+    x, gain = linearised_estimate(c, r0, probes, weak, SCREENING.far_walking)
+    assert x[0] == pytest.approx(SCREENING.far_walking * 2.0)
     assert 0 < gain < 20
     slips = [r0, r0 - 1.0]  # nothing at the first size, all at the second
-    assert linearised_estimate(c, r0, probes, slips, FAR_WALKING)[0] == pytest.approx([2.0])
+    assert linearised_estimate(c, r0, probes, slips, SCREENING.far_walking)[0] == pytest.approx([2.0])
 
 
 def test_between_sizes_that_were_seen_a_guess_stays_where_these_lead():
@@ -82,9 +84,9 @@ def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_n
 
 def test_rivals_know_the_best_at_their_joint_and_of_all():
     race = Race()
-    _tell(race.reached, ["flm", None], [3.0, 8.0])
-    _tell(race.reached, ["flm", "frm"], [5.0, -1.0])
-    assert (_best(race.reached, "flm"), _best(race.reached, "frm"), _best(race.reached, None)) == (5.0, 0.0, 8.0)
+    note_best(race.reached, ["flm", None], [3.0, 8.0])
+    note_best(race.reached, ["flm", "frm"], [5.0, -1.0])
+    assert (best_at(race.reached, "flm"), best_at(race.reached, "frm"), best_at(race.reached, None)) == (5.0, 0.0, 8.0)
 
 
 @pytest.mark.parametrize(("screened_out", "fitted"),
@@ -183,13 +185,14 @@ def test_a_walk_is_looked_at_until_a_share_of_what_is_missing_shows(quiet, monke
     evaluator = Walking(evidence, CONFIG, n_jobs=1)
     since = evidence[0].since
     c = Candidate.of(known_effects()["viscous_friction"], ("three",), (0.0,))
-    monkeypatch.setattr("workbench.identify.selection.screening.LOOKED", 0.8)  # these takes are short
+    brief = replace(SCREENING, looked=0.8)
+    monkeypatch.setattr("workbench.identify.selection.screening.SCREENING", brief)  # these takes are short
     for begins, most in ((0.0, 0.8), (1.2, 2.0)):
         missing = np.where(since[:, None] >= begins, 5.0, 0.1) * np.isfinite(evidence[0].recorded)
         t = CandidateEvaluation(evaluator, session.model, [], {0: missing}, [c], Race(), False, {})
         assert begins < t.until <= most
         shown = evaluator.cost(evaluator.early({0: missing}, t.until), "fit") / evaluator.cost({0: missing}, "fit")
-        assert shown >= LOOKED_SHARE
+        assert shown >= SCREENING.looked_share
 
 
 def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_again():
@@ -247,11 +250,11 @@ def test_an_interval_is_as_wide_as_stretches_differ_where_their_frames_err_toget
     J = -np.ones((2000, 1))
     means = [np.mean(np.repeat(rng.normal(size=40), 50)) for _ in range(200)]  # of what is the same over a stretch
     r = np.repeat(rng.normal(size=40), 50)
-    told = np.sqrt(_scattered(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
+    told = np.sqrt(clustered(Solved(np.zeros(1), r - r.mean(), J), stretches)[0, 0])
     assert told == pytest.approx(np.std(means), rel=0.3)
     white = rng.normal(size=2000)
-    assert np.sqrt(_scattered(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
-    assert np.isinf(_scattered(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
+    assert np.sqrt(clustered(Solved(np.zeros(1), white, J), stretches)[0, 0]) == pytest.approx(1 / np.sqrt(2000), rel=0.35)
+    assert np.isinf(clustered(Solved(np.zeros(1), white, np.zeros((2000, 1))), stretches)[0, 0])
 
 
 def test_what_is_held_feels_no_floor_and_nothing_is_rolled_out_for_it(quiet):
@@ -276,7 +279,7 @@ def test_every_number_of_a_vector_has_its_stretch(quiet):
 def test_joints_that_moved_as_the_model_has_it_are_well(quiet):
     session, evidence = quiet
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
-    well, ill = _when_held(search, search.evaluated([]))
+    well, ill = well_on_fixed_base(search, search.evaluated([]))
     assert (well, ill) == (set(session.model.joints), set())
 
 
@@ -305,11 +308,11 @@ def test_numbers_of_a_vector_are_guessed_from_lines_and_parabolas_and_stay_near_
 
     r0 = -shown(truth)
     seen = [r0 + shown(p) for p in probes]
-    x, gain = linearised_estimate(c, r0, probes, seen, FAR_WALKING)
+    x, gain = linearised_estimate(c, r0, probes, seen, SCREENING.far_walking)
     assert x == pytest.approx(truth, abs=1e-3)
     assert gain == pytest.approx(r0 @ r0, rel=1e-6)
-    far, _ = linearised_estimate(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], FAR_WALKING)
-    assert np.abs(far).max() <= 4 * FAR_WALKING
+    far, _ = linearised_estimate(c, 100 * r0, probes, [100 * r0 + shown(p) for p in probes], SCREENING.far_walking)
+    assert np.abs(far).max() <= 4 * SCREENING.far_walking
 
 
 def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
@@ -324,7 +327,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
     def calmest(explained, least=0.0):
         trying = CandidateEvaluation.__new__(CandidateEvaluation)
         trying.evaluator = SimpleNamespace(expected=lambda takes, use: 60.0,
-                                      stretches=lambda takes, use: np.repeat([0, STRETCHES], 60))
+                                      stretches=lambda takes, use: np.repeat([0, PROBLEM.most_stretches], 60))
         trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
         trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
         return trying._calmest(probes, signatures, explained)

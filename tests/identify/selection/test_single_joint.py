@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.gap_linear import COUNT, LinearSearch, candidate
-from workbench.identify.selection import single_joint as sets
+from workbench.identify.selection import single_joint
+from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.screening import CandidateFit
 
 RNG = np.random.default_rng(5)
 SLOW, HEAVY = RNG.normal(size=(2, COUNT))
@@ -48,12 +48,12 @@ def fitted(search, current, chosen, *a):
 def test_effects_that_share_the_work_are_named_where_one_alone_leaves_more_than_noise(monkeypatch, hidden, named):
     search = Search(**hidden)
     search.recorded = search.recorded + RNG.normal(size=COUNT)
-    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
-    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
+    monkeypatch.setattr(single_joint, "_looked_at", lambda *a: [])
+    monkeypatch.setattr(single_joint, "exchanges", lambda *a, **k: [])
     begun = []
-    monkeypatch.setattr(sets, "_fitted", lambda of, fit, chosen, *a: begun.extend(chosen) or fitted(of, fit, chosen))
+    monkeypatch.setattr(single_joint, "_fitted", lambda of, fit, chosen, *a: begun.extend(chosen) or fitted(of, fit, chosen))
     fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
-    after, seats = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
+    after, seats = single_joint.set_right(search, [], fit, rounds, (0,), lambda share: None)
     assert {c.name for c in after.effects} == set(hidden)
     assert len(seats) == (3 if named else 0)
     assert [{t.candidate.name: float(t.x[0]) for t in s} for s in begun] == (
@@ -64,29 +64,29 @@ def test_effects_that_share_the_work_are_named_where_one_alone_leaves_more_than_
 def test_a_set_that_is_not_right_replaces_what_leaves_twenty_times_more(monkeypatch, found_so_far, replaced):
     search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
     search.recorded = search.recorded + 1.3 * RNG.normal(size=COUNT)
-    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
+    monkeypatch.setattr(single_joint, "_looked_at", lambda *a: [])
     other = [CandidateFit(candidate(name), np.array([1.0]), {}, None) for name in ("supply_voltage", "parallel_spring")]
-    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [other])
-    monkeypatch.setattr(sets, "_shared", lambda *a: [])
-    monkeypatch.setattr(sets, "_fitted", fitted)
+    monkeypatch.setattr(single_joint, "exchanges", lambda *a, **k: [other])
+    monkeypatch.setattr(single_joint, "_shared", lambda *a: [])
+    monkeypatch.setattr(single_joint, "_fitted", fitted)
     fit, rounds = found(search, supply_voltage=found_so_far, parallel_spring=[5.0])
-    after, _ = sets.set_right(search, [], fit, rounds, (0,), lambda share: None)
+    after, _ = single_joint.set_right(search, [], fit, rounds, (0,), lambda share: None)
     assert (after is not fit) is replaced
 
 
 def test_a_set_that_is_not_right_either_does_not_replace_what_was_found(monkeypatch):
     search = Search(supply_voltage=[40.0], parallel_spring=[5.0])
     search.recorded = search.recorded + 3.0 * RNG.normal(size=COUNT)
-    monkeypatch.setattr(sets, "_looked_at", lambda *a: [])
-    monkeypatch.setattr(sets, "exchanges", lambda *a, **k: [])
-    monkeypatch.setattr(sets, "_fitted", fitted)
+    monkeypatch.setattr(single_joint, "_looked_at", lambda *a: [])
+    monkeypatch.setattr(single_joint, "exchanges", lambda *a, **k: [])
+    monkeypatch.setattr(single_joint, "_fitted", fitted)
     fit, rounds = found(search, supply_voltage=[40.0], parallel_spring=[5.0])
-    assert sets.set_right(search, [], fit, rounds, (0,), lambda share: None) == (fit, [])
+    assert single_joint.set_right(search, [], fit, rounds, (0,), lambda share: None) == (fit, [])
 
 
 def test_a_shape_that_came_to_its_end_begins_in_the_middle():
     c = next(c for c in (candidate("stribeck_friction"),) if c.shapes.any())
     _, high = c.bounds()
-    assert sets._free(c, high)[c.shapes] == 0
+    assert single_joint._free(c, high)[c.shapes] == 0
     inside = np.where(c.shapes, high / 2, 1.0)
-    np.testing.assert_array_equal(sets._free(replace(c), inside), inside)
+    np.testing.assert_array_equal(single_joint._free(replace(c), inside), inside)

@@ -1,5 +1,6 @@
 """One of several effects in a joint replaced by another: what lines around their fit foretell."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 
 from tests.gap_linear import names, trial
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.selection import single_joint as sets_
-from workbench.identify.selection import swap as exchange
+from workbench.identify.selection import single_joint, swap
 from workbench.identify.selection.best_subsets import worst_joint
+from workbench.identify.selection.options import SINGLE_JOINT
 
 RNG = np.random.default_rng(8)
 FRICTION, PLAY, OTHER = RNG.normal(size=(3, 600))
@@ -36,7 +37,7 @@ class LinearJury:
 
 @pytest.fixture
 def search(monkeypatch):
-    monkeypatch.setattr(exchange, "with_effects", lambda nominal, sizes: list(sizes))
+    monkeypatch.setattr(swap, "with_effects", lambda nominal, sizes: list(sizes))
     return SimpleNamespace(evaluator=LinearJury(), nominal=None)
 
 
@@ -51,7 +52,7 @@ def fit_of(search, **sizes):
 def test_in_ones_place_another_is_offered_with_the_sizes_that_all_then_have(search):
     fit = fit_of(search, viscous_friction=1.2, backlash=2.0)
     asked = [trial(name) for name in DOES]
-    sets = exchange.exchanges(search, fit, asked, (0,), "knee", list(fit.effects))
+    sets = swap.exchanges(search, fit, asked, (0,), "knee", list(fit.effects))
     assert {"viscous_friction", "dead_band"} in names(sets)
     best = next(s for s in sets if {t.candidate.name for t in s} == {"viscous_friction", "dead_band"})
     assert {t.candidate.name: float(t.x[0]) for t in best} == pytest.approx({"viscous_friction": 1.5, "dead_band": 2.0}, rel=1e-3)
@@ -63,26 +64,26 @@ def test_only_what_was_found_together_is_replaced_and_by_nothing_that_is_there(s
     fit = fit_of(search, viscous_friction=1.2, backlash=2.0)
     asked = [trial(name) for name in DOES]
     kept, *_ = fit.effects
-    for chosen in exchange.exchanges(search, fit, asked, (0,), "knee", list(fit.effects)[1:]):
+    for chosen in swap.exchanges(search, fit, asked, (0,), "knee", list(fit.effects)[1:]):
         assert kept.key not in {t.candidate.key for t in chosen}
-    assert exchange.exchanges(search, fit, asked[:2], (0,), "knee", list(fit.effects)) == []
-    assert exchange.exchanges(search, fit, [trial("servo_gain", joint="hip")], (0,), "knee", list(fit.effects)) == []
+    assert swap.exchanges(search, fit, asked[:2], (0,), "knee", list(fit.effects)) == []
+    assert swap.exchanges(search, fit, [trial("servo_gain", joint="hip")], (0,), "knee", list(fit.effects)) == []
 
 
 @pytest.mark.parametrize(("right", "replaced"), [(0.5, True), (1e9, False)])
 def test_sets_are_replaced_until_none_is_better_unless_the_first_leaves_no_more_than_a_right_model(search, monkeypatch, right,
                                                                                                  replaced):
     first = [trial("viscous_friction"), trial("backlash")]
-    monkeypatch.setattr(sets_, "several", lambda *a: [first])
-    monkeypatch.setattr(sets_, "RIGHT", right)
+    monkeypatch.setattr(single_joint, "several", lambda *a: [first])
+    monkeypatch.setattr(single_joint, "SINGLE_JOINT", replace(SINGLE_JOINT, right=right))
 
     def fitted(search, current, sets, takes):
         fits = [fit_of(search, **{t.candidate.name: {"viscous_friction": 1.5, "dead_band": 2.0}.get(t.candidate.name, 1.0)
                                   for t in s}) for s in sets]
         return sorted(zip(fits, sets), key=lambda f: f[0].cost["choose"])
 
-    monkeypatch.setattr(sets_, "_fitted", fitted)
-    (fit, chosen), *rest = sets_.together(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
+    monkeypatch.setattr(single_joint, "_fitted", fitted)
+    (fit, chosen), *rest = single_joint.together(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
     assert {t.candidate.name for t in chosen} == {"viscous_friction", "dead_band" if replaced else "backlash"}
     assert bool(rest) is replaced
     assert fit.cost["choose"] <= min((f.cost["choose"] for f, _ in rest), default=np.inf)

@@ -11,9 +11,9 @@ from scipy.stats import beta
 
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, end_of, played_without, steps
-from workbench.identify.findings import Change, Estimate, Finding
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence, joint_error
+from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
 
@@ -85,12 +85,12 @@ def with_dropped_commands(
     moving = dropped_in_motion(evaluator, nominal, residuals)
     for joint in dict.fromkeys(j for e in evaluator.evidence for j in e.joints):
         here = [i for i, e in enumerate(evaluator.evidence) if joint in e.joints and e.take.commands]
-        lost, after = _lost(evaluator, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
+        lost, after = poses_lost(evaluator, nominal, joint, {i: moving.get((i, joint), ()) for i in here}, residuals)
         count, of = sum(map(len, lost.values())), sum(_telling(evaluator.evidence[i], joint, k) for i, k in lost.items())
-        least = _least_closed(evaluator, {i: len(k) for i, k in lost.items()})
+        least = least_explained(evaluator, {i: len(k) for i, k in lost.items()})
         if least is None or count > READ_OFF.most_dropped * of:
             continue
-        if all(_stands_at_an_end(evaluator.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
+        if all(stands_at_an_end(evaluator.evidence, i, joint, k) for i, poses in lost.items() for k in poses):
             continue
         here = [i for i, k in lost.items() if k]
         was, now = (float(sum(np.nansum(np.square(r[i][:, evaluator.evidence[i].columns(joint)])) for i in here))
@@ -104,7 +104,7 @@ def with_dropped_commands(
     return evaluator, tuple(found)
 
 
-def _lost(
+def poses_lost(
     evaluator: RolloutEvaluator,
     nominal: RobotModel,
     joint: str,
@@ -126,7 +126,7 @@ def _lost(
     return lost, now
 
 
-def _least_closed(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> float | None:
+def least_explained(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> float | None:
     """Share of the joint's gap that so many missed poses, by take, must explain; None: not believed. On the ground a joint may be
     kept from going, once."""
     held = [n for i, n in missed.items() if evaluator.evidence[i].take.spec.base == "fixed"]
@@ -135,7 +135,7 @@ def _least_closed(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> flo
     return (READ_OFF.dropped_explains_free if held else READ_OFF.dropped_explains) if sum(missed.values()) > 1 else None
 
 
-def _stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
+def stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:
     """Whether a pose that seems missed asks for more than the joint ever went, and the joint stands there: it may be stopped."""
     e = evidence[i]
     assert e.take.commands is not None

@@ -47,7 +47,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
     cleared: set[tuple[int, str, int]] = set()
     now = dict(residuals)
     for _ in range(READ_OFF.turns):
-        new = _suspects(evaluator, now, lost, cleared)
+        new = suspects(evaluator, now, lost, cleared)
         if not new:
             break
         after = _played(evaluator, nominal, {at: (*lost.get(at, ()), *new.get(at, ())) for at in {*lost, *new}}, residuals)
@@ -70,7 +70,7 @@ def _played(
     return dict(residuals) | played_without(evaluator, lost).residuals([RolloutRequest(nominal, takes)])[0]
 
 
-def _suspects(
+def suspects(
     evaluator: RolloutEvaluator, now: Mapping[int, Array], lost: DroppedPoses, cleared: set[tuple[int, str, int]]
 ) -> DroppedPoses:
     """Poses with which joints that were well begin to stay behind; of several in a row the first, as what one does shows with the

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.effects.sdf import SdfRobot
-from workbench.identify.findings import Change, Estimate, Finding
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import CONCLUSIONS, READ_OFF
 from workbench.identify.parameters import Candidate, Key
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, channel_gaps
+from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.joint_centers import PARALLEL, Span, across, spans
 from workbench.recording.mocap.mending import mend

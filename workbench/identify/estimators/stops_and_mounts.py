@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Effect
 from workbench.effects.registry import estimated_by
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, smoothed
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -27,13 +26,13 @@ def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], res
     out: list[Candidate] = []
     for joint in dict.fromkeys(j for e in evidence for j in e.joints):
         for stop in estimated_by("end of travel"):
-            out += _stop(stop, joint, evidence, residuals)
+            out += stops(stop, joint, evidence, residuals)
         for mount in estimated_by("play across the axis"):
             out += _mount(mount, joint, model, evidence, residuals, ill)
     return out + [c for turned in estimated_by("turn of an asset at rest") for c in _frames(turned, model, evidence)]
 
 
-def _stop(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
+def stops(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
     """A stop at either side where the recording stands at its end while the model goes on."""
     ends: dict[int, list[tuple[float, float]]] = {1: [], -1: []}
     went: dict[int, float] = {1: -np.inf, -1: -np.inf}

@@ -3,7 +3,8 @@ others."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,19 +15,28 @@ from workbench.identify.conclusions import Residuals, change, estimates, value_s
 from workbench.identify.evidence.fit import Asks, Fitted, fitting
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
-from workbench.identify.evidence.nuisance import as_mapping, turned_horn, uncertain_numbers, what_changed
+from workbench.identify.evidence.nuisance import (
+    UNITS,
+    ZERO,
+    Uncertain,
+    as_mapping,
+    nominal_value,
+    turned_horn,
+    uncertain_numbers,
+)
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
-from workbench.identify.evidence.region import Region, Rollouts, region_of
+from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
+from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import Found, lockstep, search, standing, without_names
-from workbench.identify.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.reasons import LessLikely, SpokenAgainst
+from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected
+from workbench.identify.results.reasons import LessLikely, SpokenAgainst
+from workbench.identify.results.ties import Tie
 from workbench.identify.rollouts import RolloutEvaluator
-from workbench.identify.ties import Tie
 from workbench.robot import RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
@@ -210,3 +220,12 @@ def _acting(pool: Sequence[Candidate], joint: str, model: RobotModel) -> list[Ca
     link = model.kinematics.frames[joint].child
     return [c for c in pool if c.where in ((joint,), (link,))]
 
+
+def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
+    """Nominal and recalibrated values, those that went furthest first."""
+    out = []
+    for number, by in z.items():
+        nominal = 0.0 if number.name == ZERO else nominal_value(model.servo(number.joint), number.name)
+        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
+        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
+    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

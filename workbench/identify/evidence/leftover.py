@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.conclusions import Residuals, unexplained
-from workbench.identify.findings import Unexplained
 from workbench.identify.ledger import in_file_units
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.reasons import Dependence
+from workbench.identify.results.findings import Unexplained
+from workbench.identify.results.reasons import Dependence
 
 Array = NDArray[np.float64]
 EVENT = 0.5

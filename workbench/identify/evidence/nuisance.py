@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from workbench.effects.registry import estimated_by
-from workbench.identify.findings import Recalibrated
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -43,7 +42,7 @@ def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncer
         "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),
         "back_emf": servo.share_known("no_load_speed"), "coulomb_friction": servo.share_known("coulomb_friction"),
         "viscous_friction": servo.share_known("viscous_friction"), "reflected_inertia": servo.share_known("reflected_inertia")}
-    out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and _nominal(servo, name) > 0]
+    out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and nominal_value(servo, name) > 0]
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 
 
@@ -66,17 +65,8 @@ def turned_horn(joint: str, angle: float) -> EffectSpec:
     return EffectSpec(effect.name, (joint,), {p.name: angle / p.si})
 
 
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
-    """Nominal and recalibrated values, those that went furthest first."""
-    out = []
-    for number, by in z.items():
-        nominal = 0.0 if number.name == ZERO else _nominal(model.servo(number.joint), number.name)
-        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
-    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
-
-
-def _nominal(servo: ServoConstants, name: str) -> float:
+def nominal_value(servo: ServoConstants, name: str) -> float:
+    """One of UNITS but ZERO, as the nominal law has it."""
     return float(getattr(servo, name))
 
 

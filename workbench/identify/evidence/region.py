@@ -1,4 +1,4 @@
-"""A region: what is judged together, with what could be wrong there; and its rollouts, several regions' at once."""
+"""A region: what is judged together, with what could be wrong there."""
 
 from __future__ import annotations
 
@@ -8,20 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.likelihood import Likelihood, correlation_time
-from workbench.identify.evidence.logs import residuals_of
-from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
+from workbench.identify.evidence.nuisance import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
-from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Wants = tuple[int, Hypothesis]
-"""A region, by its index, and what it wants rolled out."""
 SPAN = 0.02
 """Between the frames that are looked at [s]: neighbours closer than that tell the same."""
 LOST = 1.0
@@ -118,41 +112,3 @@ def region_of(joints: Sequence[str], evidence: Sequence[TakeEvidence], numbers: 
     between = (options.least_discrepancy, options.most_discrepancy)
     likelihood = Likelihood(np.concatenate(known), span, float(np.median(span)) / 2, options.tails, between)
     return Region(tuple(joints), tuple(parts), tuple(numbers), tuple(candidates), likelihood)
-
-
-@dataclass(frozen=True)
-class Rollouts:
-    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
-    step: in steps of the search."""
-
-    evaluator: RolloutEvaluator
-    nominal: RobotModel
-    regions: tuple[Region, ...]
-    standing: tuple[Hypothesis, ...]
-    step: float = 1.0
-
-    def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
-        """One robot with a hypothesis for each region."""
-        z: dict[Uncertain, float] = {}
-        for h in hypotheses:
-            z |= as_mapping(h.numbers, h.z)
-        model = recalibrated(self.nominal, z)
-        return replace(model, effects=(*model.effects, *(spec for h in hypotheses for spec in h.specs())))
-
-    def answers(self, wants: Sequence[Wants]) -> list[Array]:
-        """Residuals (n,) of each want's region. Wants of different regions share rollouts."""
-        queues: dict[int, list[int]] = {}
-        for k, (region, _) in enumerate(wants):
-            queues.setdefault(region, []).append(k)
-        questions, shared = [], []
-        for row in range(max(map(len, queues.values()), default=0)):
-            here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
-            hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
-            takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
-            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
-            shared.append(here)
-        out: list[Array] = [np.empty(0)] * len(wants)
-        for here, residuals in zip(shared, residuals_of(self.evaluator, questions)):
-            for region, k in here.items():
-                out[k] = self.regions[region].vector(residuals)
-        return out

@@ -10,9 +10,9 @@ import numpy as np
 from workbench.compare.session_takes import ReadTake
 from workbench.effects.base import Registers
 from workbench.identify.evidence.options import EvidenceOptions
-from workbench.identify.findings import Rejected
 from workbench.identify.parameters import Candidate
-from workbench.identify.reasons import RefutedByRegister
+from workbench.identify.results.findings import Rejected
+from workbench.identify.results.reasons import RefutedByRegister
 
 
 def registers_of(takes: Sequence[ReadTake]) -> list[Registers]:

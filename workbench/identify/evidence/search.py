@@ -13,7 +13,8 @@ from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polis
 from workbench.identify.evidence.hypothesis import Term, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, slopes_for
 from workbench.identify.evidence.options import EvidenceOptions
-from workbench.identify.evidence.region import Region, Rollouts
+from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.parameters import Candidate
 

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.findings import Unexplained
 from workbench.identify.fitting.fit import Fit, Slopes
 from workbench.identify.fitting.fits import Search
 from workbench.identify.ledger import in_file_units
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.reasons import ParameterDrift
+from workbench.identify.results.findings import Unexplained
+from workbench.identify.results.reasons import ParameterDrift
 from workbench.identify.rollouts import RolloutEvaluator
 
 Array = NDArray[np.float64]

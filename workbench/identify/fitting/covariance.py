@@ -23,7 +23,7 @@ def covariance_of(
     engines = bent * FIT.contact_error * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)
     temper = FIT.overdispersion_free if bent and evaluator.walks(takes) else 1.0
-    return np.asarray(_scattered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
+    return np.asarray(clustered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 
 def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
@@ -41,7 +41,7 @@ def _bent_by_contact(evaluator: RolloutEvaluator, solved: Solved, takes: Sequenc
     return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
 
-def _scattered(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
+def clustered(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
     """Of a block's sizes: what the scatter between stretches says, as neighbouring frames and joints err together (clustered
     sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), at least what that between frames does and what chi squared over
     temper says; infinite where nothing depends on them."""

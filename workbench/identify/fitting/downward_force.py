@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import si_values
-from workbench.identify.findings import Unexplained
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS, FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.reasons import DownwardPull
+from workbench.identify.results.findings import Unexplained
+from workbench.identify.results.reasons import DownwardPull
 from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]

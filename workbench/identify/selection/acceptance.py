@@ -10,42 +10,26 @@ from numpy.typing import NDArray
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence
-from workbench.identify.selection.best_subsets import NEARLY_ALL
+from workbench.identify.problem import TakeEvidence, channel_gaps
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
-from workbench.identify.selection.scheduling import STANDS_OUT, standing_out
-from workbench.identify.selection.screening import CandidateFit
+from workbench.identify.selection.scheduling import standing_out
 
 Array = NDArray[np.float64]
-LEAST_WALKING = 300.0
-"""LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
-ALL_CLOSED = 0.5
-"""Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
-LEAST_SHARE, WALKING_SHARE = 0.01, 0.02
-"""Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of a
-held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect does, and
-a second effect must not live on that."""
-ALONE = 0.25
-"""Of LEAST_SHARE, for a held joint that nothing was given to and of which much more than of any other is left: what engines
-play differently of an effect that all joints show, they do in all."""
-ROUGH_SHARE, LEFT_SHARE = 0.04, 0.02
-"""The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
-LEAST_CLOSED, LAST_CLOSED = 0.15, 0.5
-"""Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
-several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
 
 
-def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = LEAST_SHARE
+def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = ACCEPTANCE.least_share
                ) -> dict[str, float]:
     """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
     evidence = search.evaluator.evidence
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, share if i in search.held else ROUGH_SHARE)))
+        allowed = share if i in search.held else ACCEPTANCE.rough_share
+        least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, allowed)))
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least[c] * (was.get(c, 0.0)**2 - 1)}
     return out
 
@@ -57,8 +41,9 @@ def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> 
     if not search.evaluator.walks((take,)):
         was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
         parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > PROBLEM.gap_ratio**2 - 1)
-        if len(parts) > 1 and parts[-1][0] > STANDS_OUT * parts[-2][0] and parts[-1][1] not in {c.joint for c in now.effects}:
-            shares[e.columns(parts[-1][1])] *= ALONE
+        given = {c.joint for c in now.effects}
+        if len(parts) > 1 and parts[-1][0] > SCHEDULING.stands_out * parts[-2][0] and parts[-1][1] not in given:
+            shares[e.columns(parts[-1][1])] *= ACCEPTANCE.alone
     return shares
 
 
@@ -72,8 +57,8 @@ def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
     """Share that an effect on the ground must take away, beside what held takes told. More, where a joint that was given an
     effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray."""
     given = {c.joint for c in current.effects}
-    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ROUGH_SHARE))
-    return LAST_CLOSED if part else LEAST_CLOSED
+    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ACCEPTANCE.rough_share))
+    return ACCEPTANCE.last_closed if part else ACCEPTANCE.least_closed
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep], everywhere: bool = True
@@ -83,19 +68,19 @@ def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds
     channels with a gap alone."""
     evaluator, left = search.evaluator, 0.0
     walks = evaluator.walks(takes)
-    before, share = current if walks else before_rough(rounds, current), LEAST_SHARE
+    before, share = current if walks else before_rough(rounds, current), ACCEPTANCE.least_share
     settled = _settling(search, rounds)
     if walks and search.settled is not None and settled:
-        before, share = settled[0].before, ROUGH_SHARE
+        before, share = settled[0].before, ACCEPTANCE.rough_share
     for i in takes:
         if channel_gaps(evaluator.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
             may_err = _may_err(search, before, current, i, share)
             left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
     if not walks:
-        return left < ALL_CLOSED * FIT.least_gain
+        return left < ACCEPTANCE.all_closed * FIT.least_gain
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
-    return left < max(LEAST_WALKING, LEFT_SHARE * brought)
+    return left < max(ACCEPTANCE.least_walking, ACCEPTANCE.left_share * brought)
 
 
 def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
@@ -108,20 +93,20 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
     if t.screened_out:
         return False
     walks = search.evaluator.walks(takes)
-    least = LEAST_WALKING if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
-    if t.joint is not None and t.closed > NEARLY_ALL:
-        least *= ALL_CLOSED
+    least = ACCEPTANCE.least_walking if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
+    if t.joint is not None and t.closed > SUBSETS.nearly_all:
+        least *= ACCEPTANCE.all_closed
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
     if not walks:
-        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, LEAST_SHARE)) > least
+        return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, ACCEPTANCE.least_share)) > least
     walked = [(r, a) for r in rounds for a in taken([r])
               if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate)]
     brought = sum(a.gain["choose"] for _, a in walked)
     settled = _settling(search, rounds)
     if search.settled is not None and settled:
-        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ROUGH_SHARE))
-    if walked and gain <= WALKING_SHARE * brought:  # which may have been in other channels
-        gain = min(gain, _beyond_error(search, t, takes, walked[0][0].before, current, WALKING_SHARE))
+        gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ACCEPTANCE.rough_share))
+    if walked and gain <= ACCEPTANCE.walking_share * brought:  # which may have been in other channels
+        gain = min(gain, _beyond_error(search, t, takes, walked[0][0].before, current, ACCEPTANCE.walking_share))
     return gain > least
 
 
@@ -161,4 +146,4 @@ def idle(search: Search, fit: Fit) -> list[Candidate]:
     for x, (_, own) in zip(points, walked):
         x[own] = 0.0
     without = search.finely(fit, search.takes, *points)
-    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - fit.cost["choose"] < LEAST_WALKING]
+    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - fit.cost["choose"] < ACCEPTANCE.least_walking]

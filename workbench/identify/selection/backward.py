@@ -7,19 +7,16 @@ from collections.abc import Sequence
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search, contradicted_by_fixed_base
 from workbench.identify.options import FIT
-from workbench.identify.selection.acceptance import ALL_CLOSED, LAST_CLOSED, explained_at_the_end
-from workbench.identify.selection.best_subsets import HALF, TOGETHER_STEPS
+from workbench.identify.selection.acceptance import explained_at_the_end
+from workbench.identify.selection.options import ACCEPTANCE, BACKWARD, SUBSETS
 from workbench.identify.selection.record import SelectionStep
-
-CLEARLY = 5.0
-"""Times that gain, from which on an effect is missed whatever the others do in its place."""
 
 
 def without_part_answers(search: Search, current: Fit, rounds: Sequence[SelectionStep]) -> Fit:
     """Without effects, from the last one back, that left half of what was there and that no other completed."""
     for r in reversed(rounds):
         for t in r.accepted:
-            if explained_at_the_end(search, r, t, current) < LAST_CLOSED:
+            if explained_at_the_end(search, r, t, current) < ACCEPTANCE.last_closed:
                 current = search.evaluated(current.sizes_without(t.candidate.key))
     return current
 
@@ -32,15 +29,15 @@ def without_idle(search: Search, current: Fit) -> Fit:
         if len(current.effects) < 2:
             break
         c, settled = current.effects[i], search.is_settled(current.effects[i])
-        least = FIT.least_gain * max(1, c.size) * (ALL_CLOSED if settled else 1.0)
+        least = FIT.least_gain * max(1, c.size) * (ACCEPTANCE.all_closed if settled else 1.0)
         rest = search.evaluated(current.sizes_without(c.key))
         before = rest.cost["choose"]
-        if search.single_joint or before - current.cost["choose"] < CLEARLY * least:
+        if search.single_joint or before - current.cost["choose"] < BACKWARD.clearly * least:
             rest = search.refitted(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
-        if (search.single_joint and rest.cost["choose"] < HALF * before) or (
+        if (search.single_joint and rest.cost["choose"] < SUBSETS.half * before) or (
             not settled and contradicted_by_fixed_base(search, current, rest)
         ):
-            rest = search.refitted(rest, search.fitted, TOGETHER_STEPS)
+            rest = search.refitted(rest, search.fitted, SUBSETS.together_steps)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
             if search.single_joint:

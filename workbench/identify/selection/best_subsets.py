@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +18,11 @@ from workbench.identify.fitting.fit import Fit, Sizes
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.responses import Part
 from workbench.identify.options import FIT
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import SUBSETS
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.screening import CandidateFit
 
 Array = NDArray[np.float64]
-NEARLY_ALL = 0.9
-"""Share of a gap from which on less likely effects are not asked for with the base held, as what a hand carries looks like a weak
-shoulder, nor sets of them."""
-HALF = 0.5
-"""Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
-SIZES, FITTED, AS_GOOD = (2, 3), 6, 2.0
-"""Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does, as
-lines foretell roughly."""
-AGAIN = tuple(product((0.75, 1.33), (-0.7, 0.7)))
-"""Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
-MOST_STEPS, TOGETHER_STEPS = 5, 12
-"""Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines foretell them, and
-where others must take one's place. It ends where little changes."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +58,7 @@ def subsets_for(
     rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
     r0 = search.evaluator.vector(base, "fit", joint)[rows[joint]]
     seen = [s for t, (points, did, _) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
-    return _best_sets(seen, r0) if seen else []
+    return best_sets(seen, r0) if seen else []
 
 
 def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
@@ -105,11 +93,11 @@ def variants(t: CandidateFit, points: Sequence[Array], signatures: Sequence[Arra
         yield Seen(t, v[:, None], p[None])
 
 
-def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
+def best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
     lines = _NormalEquations(seen, r0)
     best = lines.whole
     out: list[list[CandidateFit]] = []
-    for size in (1, *SIZES):
+    for size in (1, *SUBSETS.sizes):
         sets: dict[frozenset[object], tuple[float, list[CandidateFit]]] = {}
         for which in combinations(range(len(seen)), size):
             name = frozenset(seen[k].trial.candidate.key for k in which)
@@ -119,10 +107,10 @@ def _best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
             if (name not in sets or left < sets[name][0]) and all(possible(seen[k], there) for k, there in zip(which, x)):
                 sets[name] = left, [replace(seen[k].trial, x=there, screened_out=False) for k, there in zip(which, x)]
         ranked = sorted(sets.values(), key=lambda s: s[0])
-        if not ranked or (size == 1 and ranked[0][0] < (1 - NEARLY_ALL) * best):
+        if not ranked or (size == 1 and ranked[0][0] < (1 - SUBSETS.nearly_all) * best):
             break
-        if size > 1 and ranked[0][0] < HALF * best:
-            out += [trials for left, trials in ranked[:FITTED] if left < AS_GOOD * ranked[0][0]]
+        if size > 1 and ranked[0][0] < SUBSETS.half * best:
+            out += [trials for left, trials in ranked[:SUBSETS.fitted] if left < SUBSETS.as_good * ranked[0][0]]
         best = min(best, ranked[0][0])
     return out
 
@@ -165,7 +153,7 @@ def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes:
     joint = worst_joint(beyond)
     if joint is None or search.evaluator.walks(takes):
         return []
-    if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > NEARLY_ALL:
+    if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > SUBSETS.nearly_all:
         return []
     return subsets_for(search, current, trials, takes, joint)
 
@@ -184,11 +172,12 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
     """A fit, or a far better end that it comes to from elsewhere: numbers that shape an effect bend what it does, and a fit may
     end beside the valley. steps: of the last fit."""
     starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))
-              for c, x in fit.sizes() if c.shapes.any() for share, doublings in AGAIN]
+              for c, x in fit.sizes() if c.shapes.any() for share, doublings in SUBSETS.again]
     if not starts:
         return fit
-    best = min(search.side_by_side([_fitted_from(search, sizes, takes, MOST_STEPS) for sizes in starts]), key=penalised_cost)
-    return search.refitted(best, takes, steps) if penalised_cost(best) < HALF * penalised_cost(fit) else fit
+    fits = search.side_by_side([_fitted_from(search, sizes, takes, SUBSETS.most_steps) for sizes in starts])
+    best = min(fits, key=penalised_cost)
+    return search.refitted(best, takes, steps) if penalised_cost(best) < SUBSETS.half * penalised_cost(fit) else fit
 
 
 def penalised_cost(fit: Fit) -> float:

@@ -14,29 +14,10 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
-from workbench.identify.selection.model_comparison import LEAST, NamePosterior
-from workbench.identify.selection.scheduling import FEW
+from workbench.identify.selection.model_comparison import NamePosterior
+from workbench.identify.selection.options import CALIBRATION, COMPARISON, SCHEDULING
 
 Array = NDArray[np.float64]
-LEFT = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
-"""RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A large
-gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
-RATTLES = 0.7
-"""At least that factor for a link that cameras saw rock across its servo's axis: which way it lies is chance, each moment as far
-from a right model as it has play."""
-CHANGING = 0.5
-"""The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
-ABOUT_AS_LIKELY = 0.5
-"""Of a finding's probability, what a rival that pulls straight down has at least where a load is not told from what hangs: of
-true loads it is up to 0.4."""
-ALIKE_FLOOR, HARDLY = 0.15, 0.5
-"""By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less: of
-robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more. The
-same for a number that would go further if it might, or may be nothing, and for a pull straight down: it makes up for something
-else."""
-NOTHING = 3.0
-"""Standard deviations from neutral within which a number may be nothing: a mass that swings below a body looked like a load of
-2.7, true ones come to 3.3 and more."""
 
 
 def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
@@ -50,14 +31,14 @@ def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], fl
     out, theirs = [], set() if search.single_joint else {c.joint for c in fit.effects}
     for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), posteriors):
         worst = _left_at(c, left, theirs) if search.told_by_fixed_base(c) else 0.0
-        factor = next((factor for most, factor in LEFT if worst <= most), LEAST)
+        factor = next((factor for most, factor in CALIBRATION.left if worst <= most), COMPARISON.least)
         if c.read_off and c.effect.free_play:
-            factor = max(factor, RATTLES)
-        factor *= CHANGING if c in changing else 1.0
+            factor = max(factor, CALIBRATION.rattles)
+        factor *= CALIBRATION.changing if c in changing else 1.0
         makes = ~c.shapes if _becomes(c, s) else c.makes
         slight = (_hardly_another_floor(c, x) or _at_its_limit(c, x)
                   or _may_be_nothing(c, x, fit.covariance[own_x, own_x], makes) or _may_hang(c, x, s))
-        factor *= LEAST if c in idle else HARDLY if slight else 1.0
+        factor *= COMPARISON.least if c in idle else CALIBRATION.hardly if slight else 1.0
         out.append(NamePosterior(factor * s.probability, tuple(replace(r, probability=factor * r.probability) for r in s.rivals)))
     return out
 
@@ -70,7 +51,7 @@ def _left_at(c: Candidate, left: Sequence[tuple[str, float]], theirs: Collection
         if r == r and (joint == c.joint or (c.joint is None and joint not in theirs)):
             by_joint[joint] = max(r, by_joint.get(joint, 0.0))
     ranked = sorted(by_joint.values(), reverse=True)
-    own = not c.where and len(ranked) > FEW
+    own = not c.where and len(ranked) > SCHEDULING.few
     return ranked[1] if own else max(ranked, default=0.0)
 
 
@@ -78,12 +59,12 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
     """Whether an effect only changes a friction of feet and floor, by less than engines differ there."""
     if c.effect.layer != "ground" or not c.parameters[0].replaces:
         return False
-    return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < ALIKE_FLOOR)
+    return bool(abs(np.log(c.values(x)[0] / c.neutral[0])) < CALIBRATION.alike_floor)
 
 
 def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np.bool_]) -> bool:
-    """Whether all numbers that make an effect are within NOTHING of what it vanishes at."""
-    half = NOTHING * np.sqrt(np.diag(covariance))
+    """Whether all numbers that make an effect are within CALIBRATION.nothing of what it vanishes at."""
+    half = CALIBRATION.nothing * np.sqrt(np.diag(covariance))
     makes = makes & np.isfinite(half)
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
 
@@ -91,7 +72,7 @@ def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np
 def _may_hang(c: Candidate, x: Array, s: NamePosterior) -> bool:
     """Whether an effect, or a rival about as likely, pulls straight down."""
     return pulls_down(c, x) or any(
-        pulls_down(r.candidate, r.x) for r in s.rivals if r.probability > ABOUT_AS_LIKELY * s.probability
+        pulls_down(r.candidate, r.x) for r in s.rivals if r.probability > CALIBRATION.about_as_likely * s.probability
     )
 
 

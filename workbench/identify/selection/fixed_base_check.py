@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search, contradicted_by_fixed_base, gained
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.best_subsets import NEARLY_ALL
+from workbench.identify.selection.options import SUBSETS
 
 
 def checked_on_fixed_base(search: Search, current: Fit, told: Sequence[Candidate]) -> tuple[Search, Fit]:
@@ -29,6 +29,6 @@ def _checked(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
         return search, current
     settled, fit = search.resettled(current, c)
     walking = [gained(search.evaluator, without, there, walks, "fit") for there in (fit, current)]
-    if gained(search.evaluator, without, fit, held, "fit") > 0 and walking[0] > NEARLY_ALL * walking[1]:
+    if gained(search.evaluator, without, fit, held, "fit") > 0 and walking[0] > SUBSETS.nearly_all * walking[1]:
         return settled, fit
     return search, current

@@ -15,58 +15,21 @@ from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Report, Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.selection.acceptance import (
-    ALL_CLOSED,
-    LAST_CLOSED,
-    LEAST_CLOSED,
-    LEAST_WALKING,
-    is_acceptable,
-    least_closed,
-    remaining,
-    too_little_left,
-)
+from workbench.identify.problem import channel_gaps
+from workbench.identify.selection.acceptance import is_acceptable, least_closed, remaining, too_little_left
 from workbench.identify.selection.backward import without_idle, without_part_answers
-from workbench.identify.selection.best_subsets import (
-    HALF,
-    MOST_STEPS,
-    NEARLY_ALL,
-    fitted_beside,
-    penalised_cost,
-    selection_steps,
-)
+from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
+from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
+from workbench.identify.selection.options import ACCEPTANCE, FORWARD, SCHEDULING, SUBSETS
 from workbench.identify.selection.pair_move import with_pair
 from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
 from workbench.identify.selection.reevaluation import reevaluated
-from workbench.identify.selection.scheduling import FEW, TIERS, TIERS_OF_ALL, asked, standing_out
-from workbench.identify.selection.screening import CandidateFit, tried
+from workbench.identify.selection.scheduling import asked, standing_out
+from workbench.identify.selection.screening import tried
 from workbench.identify.selection.single_joint import set_right, single_joint_step, together
-
-MOST_ROUNDS = 6
-"""With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
-MOST_WORK, MOST_WORK_LONE, MOST_ROLLOUTS = 3200.0, 6400.0, 60.0
-"""Seconds of rollouts, of a lone joint, of which sets are fitted, and rollouts of all takes if that is more, after which nothing
-more is tried: minutes, of half a minute of recording."""
-ENOUGH = 0.6
-"""Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
-before joints are asked, as a joint's effect can look like one of the whole robot's."""
-OWN_GAP = 0.9
-"""The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play closes three quarters."""
-NEARLY_ALL_WALKING = 0.97
-"""NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
-back, which closes up to 0.93; true effects close more."""
-REPLAYED_STEPS = 4
-"""Of a fit to takes that are played otherwise."""
-LAST_STEPS = 3
-"""Of a fit of all effects when one was dropped at the end; it ends where little changes."""
-MOST_RIVALS, CLOSE, HALFWAY = 2, 0.15, 0.5
-"""Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at a
-joint, where the best leaves more than a tenth: there some fit has not come to its end."""
-ALIKE = 0.25
-"""Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
 
 
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
@@ -75,8 +38,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     left out of what is played; read anew by what held takes told."""
     current = nominal = search.evaluated([])
     rounds: list[SelectionStep] = []
-    work = MOST_WORK_LONE if search.single_joint else MOST_WORK
-    most = np.inf if thorough else max(work, MOST_ROLLOUTS * search.evaluator.seconds)
+    work = FORWARD.most_work_lone if search.single_joint else FORWARD.most_work
+    most = np.inf if thorough else max(work, FORWARD.most_rollouts * search.evaluator.seconds)
     if search.held:
         search, current, rounds = _phase(search, pool, current, search.held, rounds, report, most)
     if current.effects and played is not None:
@@ -85,7 +48,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         search, played = reestimated(search, current, played)
         if search is not begun:
             rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
-            current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, REPLAYED_STEPS)
+            current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, FORWARD.replayed_steps)
         nominal = search.evaluated([])
     if search.held != search.fitted:
         current = search.with_timing_refitted(current)
@@ -100,7 +63,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
         if {c.key for c in current.effects if search.is_settled(c)} - {c.key for c in kept.effects}:
             search, kept = search.resettled(kept)
         if kept is not current or _may_go_on(search, kept):
-            kept = search.refitted(kept, search.fitted, LAST_STEPS)
+            kept = search.refitted(kept, search.fitted, FORWARD.last_steps)
     return SelectionResult(search, kept, tuple(rounds), played.missed if played else ())
 
 
@@ -113,12 +76,12 @@ def _may_go_on(search: Search, fit: Fit) -> bool:
 
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep],
-           report: Report, most_work: float, closed: float = LEAST_CLOSED) -> tuple[Search, Fit, list[SelectionStep]]:
+           report: Report, most_work: float, closed: float = ACCEPTANCE.least_closed) -> tuple[Search, Fit, list[SelectionStep]]:
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, rounds = False, list(rounds)
-    least = LEAST_WALKING if search.evaluator.walks(takes) else ALL_CLOSED * FIT.least_gain
-    for _ in range(MOST_ROUNDS):
+    least = ACCEPTANCE.least_walking if search.evaluator.walks(takes) else ACCEPTANCE.all_closed * FIT.least_gain
+    for _ in range(FORWARD.most_rounds):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
         if stopped or not beyond or too_little_left(search, current, takes, rounds):
             break
@@ -131,7 +94,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
                 continue
         trials: list[CandidateFit] = []
         likely = pool
-        for tier in range(TIERS_OF_ALL if closed > LEAST_CLOSED else TIERS):
+        for tier in range(SCHEDULING.tiers_of_all if closed > ACCEPTANCE.least_closed else SCHEDULING.tiers):
             stopped = search.evaluator.work > most_work
             if stopped:
                 break
@@ -142,13 +105,13 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             # what closes all but brings too little is no answer: the rest of what moves the robot as a whole is asked, too
             said = bool(trials) and (_says_it(search, current, trials[0], takes, tier)
                                      or _is_of_all(search, current, trials[0], takes, beyond))
-            if said and (tier + 1 >= TIERS_OF_ALL or is_acceptable(search, trials[0], takes, rounds, current)):
+            if said and (tier + 1 >= SCHEDULING.tiers_of_all or is_acceptable(search, trials[0], takes, rounds, current)):
                 if not _tips(search, trials[0], takes, tier):
                     break
                 likely = [c for c in pool if c.effect.moves_center]
         worth = [t for t in trials if t.closed > closed and is_acceptable(search, t, takes, rounds, current)]
         choices = _accepted(worth)
-        fits = search.side_by_side([fitted_beside(search, current, accepted, takes, MOST_STEPS) for accepted in choices])
+        fits = search.side_by_side([fitted_beside(search, current, accepted, takes, SUBSETS.most_steps) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: penalised_cost(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
         seats = [
@@ -157,7 +120,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
         of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
         sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
-        if sets and penalised_cost(sets[0][0]) < HALF * penalised_cost(after):
+        if sets and penalised_cost(sets[0][0]) < SUBSETS.half * penalised_cost(after):
             after = sets[0][0]
             seats = [replace(seats[0], accepted=()), *selection_steps(search, current, sets)]
         rounds += seats
@@ -178,27 +141,28 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
 
 def _says_it(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
-    surely = tier < TIERS_OF_ALL or not search.evaluator.walks(takes)
+    surely = tier < SCHEDULING.tiers_of_all or not search.evaluator.walks(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
-        return t.gain["choose"] > LEAST_WALKING and _closed_at(search, current, t, takes, t.candidate.joint) > OWN_GAP
+        closed = _closed_at(search, current, t, takes, t.candidate.joint)
+        return t.gain["choose"] > ACCEPTANCE.least_walking and closed > FORWARD.own_gap
     if not surely:
-        return t.closed > ENOUGH
-    return t.closed > (NEARLY_ALL_WALKING if search.evaluator.walks(takes) else NEARLY_ALL)
+        return t.closed > FORWARD.enough
+    return t.closed > (FORWARD.nearly_all_walking if search.evaluator.walks(takes) else SUBSETS.nearly_all)
 
 
 def _tips(search: Search, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether centres of mass of links that are asked last are not to be passed over: they tip a robot on the ground as the best
     so far does. A load there, with a number more, does so wherever it hangs, which tells nothing."""
-    return search.evaluator.walks(takes) and tier + 1 < TIERS_OF_ALL and t.candidate.effect.layer == "inertia"
+    return search.evaluator.walks(takes) and tier + 1 < SCHEDULING.tiers_of_all and t.candidate.effect.layer == "inertia"
 
 
 def _is_of_all(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
     """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
     common, whatever more one of them lacks."""
     joints = {joint_of(c) for c in beyond if c not in BODY}
-    if t.candidate.where or len(joints) <= FEW or search.evaluator.walks(takes):
+    if t.candidate.where or len(joints) <= SCHEDULING.few or search.evaluator.walks(takes):
         return False
-    return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > NEARLY_ALL
+    return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > SUBSETS.nearly_all
 
 
 def _closed_at(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], joint: str | None) -> float:
@@ -219,18 +183,18 @@ def _accepted(worth: Sequence[CandidateFit]) -> list[list[CandidateFit]]:
         return []
     best = worth[0]
     if best.joint is None:
-        close = [t for t in worth if t.joint is None and t.gain["choose"] > (1 - CLOSE) * best.gain["choose"]]
-        whole = [t for t in close if t.closed > NEARLY_ALL] if best.closed < LAST_CLOSED else []
-        return [[t] for t in (whole or close)[:MOST_RIVALS + 1]]
+        close = [t for t in worth if t.joint is None and t.gain["choose"] > (1 - FORWARD.close) * best.gain["choose"]]
+        whole = [t for t in close if t.closed > SUBSETS.nearly_all] if best.closed < ACCEPTANCE.last_closed else []
+        return [[t] for t in (whole or close)[:FORWARD.most_rivals + 1]]
     # recordings that end at a stop show it, whatever else keeps a stiff spring ahead of it for now
     shown = next((t for t in worth if t.candidate.read_off and t.joint == best.joint
-                  and t.gain["choose"] > HALFWAY * best.gain["choose"]), None)
+                  and t.gain["choose"] > FORWARD.halfway * best.gain["choose"]), None)
     best = shown or best
     elsewhere: list[CandidateFit] = []
     for t in worth:
-        alike = t.gain["choose"] > ALIKE * best.gain["choose"] or t.closed > NEARLY_ALL
+        alike = t.gain["choose"] > FORWARD.alike * best.gain["choose"] or t.closed > SUBSETS.nearly_all
         if alike and t.joint not in {None, best.joint, *(o.joint for o in elsewhere)}:
             elsewhere.append(t)
-    rivals = [] if shown else [t for t in worth[1:] if t.joint == best.joint and best.closed < NEARLY_ALL
-                               and t.gain["choose"] > HALFWAY * best.gain["choose"]]
-    return [[t, *elsewhere] for t in (best, *rivals[:MOST_RIVALS])]
+    rivals = [] if shown else [t for t in worth[1:] if t.joint == best.joint and best.closed < SUBSETS.nearly_all
+                               and t.gain["choose"] > FORWARD.halfway * best.gain["choose"]]
+    return [[t, *elsewhere] for t in (best, *rivals[:FORWARD.most_rivals])]

@@ -21,14 +21,12 @@ from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.identify.rollouts import RolloutRequest
 from workbench.identify.selection.acceptance import is_acceptable, too_little_left
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
-from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
-from workbench.identify.selection.screening import CandidateFit
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import PAIR_MOVE, RECORD
+from workbench.identify.selection.record import SelectionStep, judged_by_all
 from workbench.identify.selection.swap import NOTHING, in_place
 
 Array = NDArray[np.float64]
-NEAR, ONES, PAIRS, STEPS = 0.3, 3, 3, 5
-"""Share of the best one's gain from which on another is given company; how many are, how many pairs are fitted, and steps of
-that."""
 
 
 def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Report
@@ -37,7 +35,7 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
     told = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
-    if not told or told[-1][1].closed > COMPLETE or told[-1][1].candidate.effect.point_mass:
+    if not told or told[-1][1].closed > RECORD.complete or told[-1][1].candidate.effect.point_mass:
         return current, list(rounds)
     if too_little_left(search, current, search.fitted, rounds):
         return current, list(rounds)
@@ -47,9 +45,9 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
     free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
     known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
     known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and judged_by_all(search, t)
-              and t.candidate.key != found.candidate.key and t.gain["choose"] >= NEAR * found.gain["choose"]}
-    pairs = _foretold(search, rest, list(known.values())[:ONES], free)
-    fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, STEPS) for pair in pairs])
+              and t.candidate.key != found.candidate.key and t.gain["choose"] >= PAIR_MOVE.near * found.gain["choose"]}
+    pairs = _foretold(search, rest, list(known.values())[:PAIR_MOVE.ones], free)
+    fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, PAIR_MOVE.steps) for pair in pairs])
     ranked = sorted(zip(fits, pairs), key=lambda f: penalised_cost(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
@@ -122,7 +120,7 @@ def _foretold(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: S
         for cost, pair in a.screened_out(search.evaluator.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
             name = frozenset(t.candidate.key for t in pair)
             best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
-    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIRS]]
+    return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIR_MOVE.pairs]]
 
 
 def _enough(search: Search, fit: Fit, pair: Sequence[CandidateFit], current: Fit, rounds: Sequence[SelectionStep]) -> bool:

@@ -8,10 +8,7 @@ from dataclasses import dataclass
 from workbench.identify.estimators.dropped_commands import DroppedCommands
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.selection.screening import CandidateFit
-
-COMPLETE = 0.97
-"""Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
+from workbench.identify.selection.candidate_fit import CandidateFit
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,10 @@ from dataclasses import replace
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
-from workbench.identify.selection.best_subsets import MOST_STEPS, fitted_beside
-from workbench.identify.selection.record import COMPLETE, SelectionStep, judged_by_all
-from workbench.identify.selection.screening import CandidateFit
-
-NEAR, MOST = 0.5, 2
-"""Share of its gain that a rival had when it was taken, and how many are fitted."""
+from workbench.identify.selection.best_subsets import fitted_beside
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import RECORD, REEVALUATION, SUBSETS
+from workbench.identify.selection.record import SelectionStep, judged_by_all
 
 
 def reevaluated(
@@ -28,7 +26,7 @@ def reevaluated(
     out = list(rounds)
     for n, r in enumerate(rounds):
         for t in r.accepted if any(later.accepted for later in rounds[n + 1:]) else ():
-            if _weighable(search, t) and t.closed < COMPLETE and t.candidate.key in current.sizes_by_key():
+            if _weighable(search, t) and t.closed < RECORD.complete and t.candidate.key in current.sizes_by_key():
                 current, out[n] = _reevaluated(search, current, out[n], t, takes)
     return current, out
 
@@ -37,11 +35,11 @@ def _reevaluated(
     search: Search, current: Fit, r: SelectionStep, t: CandidateFit, takes: tuple[int, ...]
 ) -> tuple[Fit, SelectionStep]:
     rivals = [o for o in r.trials if _weighable(search, o) and o.candidate.key not in current.sizes_by_key()
-              and o.gain["choose"] > NEAR * t.gain["choose"]][:MOST]
+              and o.gain["choose"] > REEVALUATION.near * t.gain["choose"]][:REEVALUATION.most]
     if not rivals:
         return current, r
     rest = search.evaluated(current.sizes_without(t.candidate.key))
-    fits = search.side_by_side([fitted_beside(search, rest, [o], takes, MOST_STEPS) for o in rivals])
+    fits = search.side_by_side([fitted_beside(search, rest, [o], takes, SUBSETS.most_steps) for o in rivals])
 
     def left(fit: Fit) -> dict[str, float]:
         return {use: search.evaluator.cost({i: fit.residuals[i] for i in takes}, use) for use in t.gain}

@@ -3,30 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.ledger import channel_gaps
 from workbench.identify.parameters import Candidate
+from workbench.identify.problem import channel_gaps
 from workbench.identify.proposals import heavy_links
-
-TIERS, TIERS_OF_ALL = 8, 6
-"""On the ground the first are what moves the robot as a whole, and joints that stand out."""
-LONE = 2
-"""The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
-STANDS_OUT = 4.0
-"""Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on it
-lacks something, not the robot as a whole."""
-ILL = 0.25
-"""Joints whose gap is this share of the worst joint's are asked about."""
-FEW = 2
-"""Joints that may be ill without the robot as a whole being asked about before them and, on the ground, with the body as the
-model has it, without zero offsets of others being asked about."""
-MOVED = 0.1
-"""Angle [rad] beyond which a joint has moved enough to show what it lacks."""
+from workbench.identify.selection.options import SCHEDULING
 
 
 def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
@@ -34,41 +21,21 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     """Groups to try, and on which takes each: effects of joints at the joints with a gap, with the base held all joints at once,
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
-    joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= ILL * worst}
+    joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= SCHEDULING.ill * worst}
     floating_base = search.floating_base(takes)
-    many = len(joints) > FEW
+    many = len(joints) > SCHEDULING.few
     moves_all = bool(floating_base) and (many or any(c in BODY for c in beyond))
-    well, ill = _when_held(search, current)
+    well, ill = well_on_fixed_base(search, current)
     outstanding = standing_out(search, current, takes)
 
-    def settled(c: Candidate) -> bool:
-        """What servos lack at any load, and what hangs on their links, would show with the base held, too; not a stop that is not
-        reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings; nor what a heavy
-        link carries on its axis."""
-        if c.read_off:
-            return False
-        if c.effect.layer == "inertia":
-            return c.where[0] not in heavy and carried(c) in well
-        if c.effect.under_load or c.effect.hidden_by_zeroing or c.effect.layer == "ground":
-            return False
-        if not c.where:
-            return bool(well) and not ill
-        return c.joint in well
-
-    def carried(c: Candidate) -> str | None:
-        return search.nominal.kinematics.joint_of(c.where[0]) if c.effect.layer == "inertia" else None
-
+    stand = _Stand(search, well, ill, heavy_links(search.nominal))
     zeroed = all(search.evaluator.evidence[i].take.recorded.zeroed for i in takes)
-    used, heavy = {c.key for c in current.effects}, heavy_links(search.nominal)
+    used = {c.key for c in current.effects}
     single_joint = search.single_joint and not floating_base
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
-        if any(c.where == e.where and c.name in e.effect.includes for e in current.effects):
-            continue
-        if c.effect.steady_pull and any(e.effect.steady_pull for e in current.effects):
-            continue
-        likely = _tier(c, bool(floating_base), many, heavy, outstanding, carried(c) in well)
-        if c.key in used or (min(likely, LONE) if single_joint else likely) != tier:
+        likely = _tier(c, bool(floating_base), many, stand.heavy, outstanding, stand.carried_by(c) in well)
+        if c.key in used or _is_covered(c, current.effects) or (min(likely, SCHEDULING.lone) if single_joint else likely) != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
@@ -76,12 +43,46 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
             if c.effect.hidden_by_zeroing:
                 if moves_all or (c.joint in joints and (floating_base or not zeroed)):
                     groups[c.key] = [c]
-            elif c.joint in joints and not (floating_base and settled(c)):
+            elif c.joint in joints and not (floating_base and stand.shows(c)):
                 groups.setdefault(c.key if c.read_off or floating_base else (c.name, "joint"), []).append(c)
-        elif (not settled(c)) if floating_base else _could_show(search, c, joints):
+        elif (not stand.shows(c)) if floating_base else _could_show(search, c, joints):
             groups[c.key] = [c]
 
     return list(groups.values()), {n: search.telling(group, takes) for n, group in enumerate(groups.values())}
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """What fixed-base takes showed: joints that went as the model has it, those that did not; heavy: links that are."""
+
+    search: Search
+    well: Collection[str]
+    ill: Collection[str]
+    heavy: Sequence[str]
+
+    def shows(self, c: Candidate) -> bool:
+        """Whether an effect would have shown there: what servos lack at any load, and what hangs on their links; not a stop that
+        is not reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings; nor what a
+        heavy link carries on its axis."""
+        if c.read_off:
+            return False
+        if c.effect.layer == "inertia":
+            return c.where[0] not in self.heavy and self.carried_by(c) in self.well
+        if c.effect.under_load or c.effect.hidden_by_zeroing or c.effect.layer == "ground":
+            return False
+        if not c.where:
+            return bool(self.well) and not self.ill
+        return c.joint in self.well
+
+    def carried_by(self, c: Candidate) -> str | None:
+        """The joint that carries the link of a mass."""
+        return self.search.nominal.kinematics.joint_of(c.where[0]) if c.effect.layer == "inertia" else None
+
+
+def _is_covered(c: Candidate, there: Sequence[Candidate]) -> bool:
+    """Whether an effect that is there has a candidate's freedom, or pulls the base as it would."""
+    return any((c.where == e.where and c.name in e.effect.includes) or (c.effect.steady_pull and e.effect.steady_pull)
+               for e in there)
 
 
 def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[str]:
@@ -92,17 +93,17 @@ def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[st
         for channel, size in channel_gaps(search.evaluator.evidence[i], current.residuals[i]).items():
             beyond[joint_of(channel)] = max(beyond.get(joint_of(channel), 0.0), size**2 - 1)
         *others, worst = sorted(beyond.items(), key=lambda b: b[1]) or [("", 0.0)]
-        if worst[0] in search.nominal.joints and worst[1] > STANDS_OUT * max((b for _, b in others), default=0.0):
+        if worst[0] in search.nominal.joints and worst[1] > SCHEDULING.stands_out * max((b for _, b in others), default=0.0):
             out.add(worst[0])
     return out
 
 
-def _when_held(search: Search, current: Fit) -> tuple[set[str], set[str]]:
+def well_on_fixed_base(search: Search, current: Fit) -> tuple[set[str], set[str]]:
     """Joints that moved while the base was held and went as the model has it; those that did not go so."""
     evidence = search.evaluator.evidence
     ill = {joint_of(c) for i in search.held for c in channel_gaps(evidence[i], current.residuals[i])}
     moved = {j for i in search.held for j in evidence[i].joints
-             if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > MOVED}
+             if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > SCHEDULING.moved}
     return moved - ill, ill
 
 

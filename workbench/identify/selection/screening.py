@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,69 +15,14 @@ from workbench.identify.fitting.responses import Part, ResponseBank, linearised_
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
+from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
+from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
-FAR, FAR_WALKING = 5.0, 1.6
-"""Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line tells."""
-LOOKED, LOOKED_SHARE, LOOKED_SHARE_HELD = 2.5, 0.3, 0.5
-"""How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on the
-ground and with the base held; else longer. Late in walks small differences have grown into others."""
-CALM = 0.5
-"""Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one of
-them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one may.
-"""
-WORTH, WORTH_WALKING = 0.3, 0.5
-"""Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
-where that is cheap, and on a walk."""
-DOUBTED = 0.6
-"""Share of the least gain from which on the best are fitted where none is foretold all of it: signatures say too little where
-only a part of a walk was looked at."""
-BEHIND = 0.6
-"""Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
-REMEMBERED, REMEMBERED_LEAST = 0.15, 0.25
-"""Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect is
-looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
-MOST_FITTED = 3
-"""Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
-STEPS, STEPS_WALKING = 3, 2
-"""Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
-
-
-@dataclass(frozen=True)
-class CandidateFit:
-    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
-    `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
-    choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
-    much less of it than of a rival that no fit was made."""
-
-    candidate: Candidate
-    x: Array
-    gain: Mapping[str, float]
-    joint: str | None
-    screened_out: bool = False
-    closed: float = 0.0
-    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
 
 Asking = Part[list[CandidateFit]]
-
-
-@dataclass(frozen=True)
-class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
-    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
-    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
-    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
-    and how long these are looked at."""
-
-    remembered: dict[str | None, float] = field(default_factory=dict)
-    screened_out: dict[str | None, float] = field(default_factory=dict)
-    reached: dict[str | None, float] = field(default_factory=dict)
-    wide: dict[bool, list[float]] = field(default_factory=dict)
-    least: float = 0.0
-    unheld: bool = False
-    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
 
 def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
@@ -147,7 +92,8 @@ class CandidateEvaluation:
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
             return out
-        sizes = yield from self._fitted([starts[b] for b in alive], alive, STEPS_WALKING if self.walking else STEPS)
+        steps = SCREENING.steps_walking if self.walking else SCREENING.steps
+        sizes = yield from self._fitted([starts[b] for b in alive], alive, steps)
         finely = self.coarse and self.walking  # coarse steps say where to go, not what a walk makes of small differences
         question = self._question(alive, sizes)
         (final,) = yield [replace(question, step=1.0) if finely else question]
@@ -159,9 +105,9 @@ class CandidateEvaluation:
         known = self.signatures.get(self._name) if self.walking else None
         guesses = None if known is None else self._guessed(*known)
         if guesses is not None:
-            _tell(self.race.remembered, self.joints, guesses[1])
+            note_best(self.race.remembered, self.joints, guesses[1])
         yield []  # until all have said what they remember
-        enough = max(REMEMBERED_LEAST * self.race.least, REMEMBERED * _best(self.race.remembered, None))
+        enough = max(SCREENING.remembered_least * self.race.least, SCREENING.remembered * best_at(self.race.remembered, None))
         return None if guesses is None or guesses[1][0] >= enough else guesses
 
     def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
@@ -191,21 +137,21 @@ class CandidateEvaluation:
             return [self.evaluator.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
-        (solved,) = yield from through(self._stepping([x], tell(answer), [0], STEPS_WALKING), ask, tell)
+        (solved,) = yield from through(self._stepping([x], tell(answer), [0], SCREENING.steps_walking), ask, tell)
         return solved.x
 
     def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
         """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
         beyond = {i: self.power[i] - self.evaluator.expected((i,), "fit") for i in self.takes}
-        if gain > CALM * sum(beyond.values()):
+        if gain > SCREENING.calm * sum(beyond.values()):
             return None
         take = take_of(self.evaluator.stretches(self.takes, "fit"))
         best: tuple[int, Array] | None = None
-        most = CALM
+        most = SCREENING.calm
         for i in self.takes:
             here = take == i
             r0 = self.r0[0][here]
-            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], FAR_WALKING)
+            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], SCREENING.far_walking)
             share = gain / max(beyond[i], self.race.least, 1.0)
             if share > most:
                 best, most = (i, x), share
@@ -216,7 +162,7 @@ class CandidateEvaluation:
         """Sizes to start from and what they gain, on all takes as on what was looked at."""
         looked_at = self._early(until)
         r0 = self._left(looked_at)
-        far = FAR_WALKING if self.walking else FAR
+        far = SCREENING.far_walking if self.walking else SCREENING.far
         guesses = [
             linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)
         ]
@@ -225,11 +171,11 @@ class CandidateEvaluation:
 
     def _shown(self) -> float:
         """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
-        seen, until = {i: self.base[i] for i in self.looked_at}, LOOKED
-        share = LOOKED_SHARE if self.walking else LOOKED_SHARE_HELD
+        seen, until = {i: self.base[i] for i in self.looked_at}, SCREENING.looked
+        share = SCREENING.looked_share if self.walking else SCREENING.looked_share_held
         least = {j: share * self.evaluator.cost(seen, "fit", j) for j in self.joints}
         while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
-            until += LOOKED / 2
+            until += SCREENING.looked / 2
         return until
 
     def _early(self, until: float) -> dict[int, Array]:
@@ -244,13 +190,13 @@ class CandidateEvaluation:
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
-        _tell(race.screened_out, self.joints, gains)
+        note_best(race.screened_out, self.joints, gains)
         yield []  # until all have said what they foretell
-        last = sorted(alike, reverse=True)[:MOST_FITTED][-1] if alike else 0.0
-        worth = WORTH_WALKING if self.walking else WORTH
-        least = race.least * (1.0 if _best(race.screened_out, None) > race.least else DOUBTED)
+        last = sorted(alike, reverse=True)[:SCREENING.most_fitted][-1] if alike else 0.0
+        worth = SCREENING.worth_walking if self.walking else SCREENING.worth
+        least = race.least * (1.0 if best_at(race.screened_out, None) > race.least else SCREENING.doubted)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > least and g >= worth * _best(race.screened_out, j) and (j is not None or g >= last)]
+                if g > least and g >= worth * best_at(race.screened_out, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""
@@ -263,9 +209,10 @@ class CandidateEvaluation:
 
         solved = yield from improved(starts, [first[b] for b in alive], 1)
         gains = [float(self.r0[b] @ self.r0[b]) - s.cost for b, s in zip(alive, solved)]
-        _tell(self.race.reached, [self.joints[b] for b in alive], gains)
+        note_best(self.race.reached, [self.joints[b] for b in alive], gains)
         yield []  # until all have come as far
-        if iterations > 1 and any(g > BEHIND * _best(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)):
+        ahead = [g > SCREENING.behind * best_at(self.race.reached, self.joints[b]) for b, g in zip(alive, gains)]
+        if iterations > 1 and any(ahead):
             solved = yield from improved([s.x for s in solved], [s.r for s in solved], iterations - 1, solved)
         return [s.x for s in solved]
 
@@ -297,13 +244,3 @@ class CandidateEvaluation:
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:
         return [self.evaluator.vector(answer, "fit", j) for j in self.joints]
-
-
-def _tell(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
-    for j, gain in zip(joints, gains):
-        best[j] = max(best.get(j, 0.0), gain)
-
-
-def _best(best: dict[str | None, float], joint: str | None) -> float:
-    """At a joint; of all, for what concerns all."""
-    return max(best.values()) if joint is None else best[joint]

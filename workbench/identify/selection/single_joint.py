@@ -11,9 +11,6 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.best_subsets import (
-    MOST_STEPS,
-    NEARLY_ALL,
-    TOGETHER_STEPS,
     begun_again,
     fitted_beside,
     penalised_cost,
@@ -21,19 +18,14 @@ from workbench.identify.selection.best_subsets import (
     several,
     worst_joint,
 )
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import REEVALUATION, SCHEDULING, SINGLE_JOINT, SUBSETS
 from workbench.identify.selection.record import SelectionStep
-from workbench.identify.selection.reevaluation import MOST, NEAR
-from workbench.identify.selection.scheduling import LONE, asked
-from workbench.identify.selection.screening import CandidateFit, tried
+from workbench.identify.selection.scheduling import asked
+from workbench.identify.selection.screening import tried
 from workbench.identify.selection.swap import NOTHING, exchanges
 
 Array = NDArray[np.float64]
-
-AHEAD, EXCHANGES, RIGHT = 2, 3, 1.2
-"""Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in
-shares of what a right model does, for which none is replaced."""
-ALL_THE_REST = 0.95
-"""Share of what is beyond noise that a set closes, too, where it is right but for what engines do otherwise, as at a stop."""
 
 
 def single_joint_step(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
@@ -45,7 +37,7 @@ def single_joint_step(search: Search, pool: Sequence[Candidate], current: Fit, b
         return current, []
     best = sets[0][0]
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (current, best))
-    if search.evaluator.closed(before, after, "choose") <= NEARLY_ALL:
+    if search.evaluator.closed(before, after, "choose") <= SUBSETS.nearly_all:
         return current, []
     return best, selection_steps(search, current, sets)
 
@@ -74,8 +66,8 @@ def _shared(current: Fit, rounds: Sequence[SelectionStep], joint: str) -> list[l
     there = current.sizes_by_key()
     out = []
     for t, rivals in ((t, r.rivals(t)) for r in rounds for t in r.accepted if t.candidate.key in there):
-        near = [o for o in rivals if o.candidate.key not in there and o.gain["choose"] > NEAR * t.gain["choose"]]
-        for o in near[:MOST]:
+        near = [o for o in rivals if o.candidate.key not in there and o.gain["choose"] > REEVALUATION.near * t.gain["choose"]]
+        for o in near[:REEVALUATION.most]:
             halves = (t.candidate.key, o.candidate.key)
             sizes = [(c, np.where(c.shapes, x, x / 2) if c.key in halves else x)
                      for c, x in [*((c, _free(c, x)) for c, x in current.sizes()), (o.candidate, o.x)]]
@@ -94,7 +86,7 @@ def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: 
     """What signatures say of all that acts in the one joint, nothing fitted."""
     groups: list[list[Candidate]] = []
     on: dict[int, tuple[int, ...]] = {}
-    for tier in range(LONE + 1):
+    for tier in range(SCHEDULING.lone + 1):
         more, takes_of = asked(search, pool, current, beyond, takes, tier)
         on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
         groups += more
@@ -109,11 +101,11 @@ def together(search: Search, current: Fit, trials: Sequence[CandidateFit], takes
     sets = _fitted(search, current, several(search, current, trials, takes, beyond), takes)
     if joint is None or not sets:
         return []
-    for _ in range(EXCHANGES):
+    for _ in range(SINGLE_JOINT.exchanges):
         fit, chosen = sets[0]
         if _is_right(search, fit, takes, joint):
             break
-        if (again := begun_again(search, fit, takes, TOGETHER_STEPS)) is not fit:
+        if (again := begun_again(search, fit, takes, SUBSETS.together_steps)) is not fit:
             sets[0] = again, chosen
             continue
         known = {frozenset(t.candidate.key for t in others) for _, others in sets}
@@ -128,20 +120,20 @@ def together(search: Search, current: Fit, trials: Sequence[CandidateFit], takes
 def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
     """Whether a fit leaves in a joint about what a right model does."""
     left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
-    return bool(left.sum() < RIGHT * expected.sum())
+    return bool(left.sum() < SINGLE_JOINT.right * expected.sum())
 
 
 def _ends(search: Search, before: Fit, after: Fit, takes: tuple[int, ...], joint: str) -> bool:
     """Whether nearly all that a fit leaves in a joint beyond noise is gone in another."""
     both = ({i: fit.residuals[i] for i in takes} for fit in (before, after))
     (was, expected), (left, _) = (search.evaluator.by_channel(residuals, "choose", joint) for residuals in both)
-    return bool(left.sum() - expected.sum() < (1 - ALL_THE_REST) * (was.sum() - expected.sum()))
+    return bool(left.sum() - expected.sum() < (1 - SINGLE_JOINT.all_the_rest) * (was.sum() - expected.sum()))
 
 
-def _fitted(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...], ahead: int = AHEAD
-            ) -> list[tuple[Fit, list[CandidateFit]]]:
+def _fitted(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...],
+            ahead: int = SINGLE_JOINT.ahead) -> list[tuple[Fit, list[CandidateFit]]]:
     """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
-    begun = search.side_by_side([fitted_beside(search, current, chosen, takes, MOST_STEPS) for chosen in sets])
+    begun = search.side_by_side([fitted_beside(search, current, chosen, takes, SUBSETS.most_steps) for chosen in sets])
     ranked = sorted(zip(begun, sets), key=lambda f: penalised_cost(f[0]))
-    ended = search.side_by_side([search.refitting(fit, takes, TOGETHER_STEPS) for fit, _ in ranked[:ahead]])
+    ended = search.side_by_side([search.refitting(fit, takes, SUBSETS.together_steps) for fit, _ in ranked[:ahead]])
     return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[ahead:]], key=lambda f: penalised_cost(f[0]))

@@ -21,12 +21,11 @@ from workbench.identify.fitting.responses import scan
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import RolloutRequest
-from workbench.identify.selection.best_subsets import AS_GOOD, Seen, possible, variants
-from workbench.identify.selection.screening import CandidateFit
+from workbench.identify.selection.best_subsets import Seen, possible, variants
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import SUBSETS, SWAP
 
 Array = NDArray[np.float64]
-FITTED = 2
-"""Others that are fitted in each one's place."""
 NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only foretell."""
 
@@ -66,7 +65,7 @@ def exchanges(
         sets = [s for t, points, did in zip(others, probes, signatures)
                 for s in in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
         sets.sort(key=lambda s: s[0])
-        out += [chosen for cost, chosen in sets[:FITTED] if cost < AS_GOOD * sets[0][0]]
+        out += [chosen for cost, chosen in sets[:SWAP.fitted] if cost < SUBSETS.as_good * sets[0][0]]
     return out
 
 

@@ -48,9 +48,10 @@ def save_figure(figure: Figure, path: str | Path) -> Path:
 
 def _settle(figure: Figure) -> None:
     """Lays the figure out once and for all; the layout engine would move things a little at each drawing."""
-    if figure.get_layout_engine() is not None:
-        figure.draw_without_rendering()
-        figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        engine.execute(figure)
         figure.set_layout_engine("none")
 
 

@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from workbench.identify.take_report import TakeReport
+from workbench.identify.results.take_report import TakeReport
 from workbench.robot import RobotModel
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.heat import BIN, DARKEST, HEAT, SCALE, cells

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 from workbench.compare.results import Comparison
 from workbench.gait.optimize import Optimized
-from workbench.identify.findings import Diagnosis
+from workbench.identify.results.findings import Diagnosis
 from workbench.view.report.comparison import headline
 
 SHOWN = 5

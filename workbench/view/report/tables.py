@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from workbench.identify.findings import Finding, Rejected
+from workbench.identify.results.findings import Finding, Rejected
 from workbench.view.report.page import Details, Part, Table, Text
 from workbench.view.report.words import change, in_words, listed, name_of, unbroken
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from workbench.compare.channels import ACROSS
 from workbench.effects.base import Layer
 from workbench.effects.registry import effect_named, known_effects
-from workbench.identify.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
-from workbench.identify.reasons import Dependence, Statement
+from workbench.identify.results.findings import Alternative, Change, Diagnosis, Estimate, Finding, NextExperiment, Unexplained
+from workbench.identify.results.reasons import Dependence, Statement
 from workbench.robot import EffectSpec
 
 NAMED = 0.1

@@ -64,7 +64,7 @@ def write_replay(
     time = first + np.arange(int((last - first) * rate) + 1) / rate
     played = play(simulated, model, time)
     ghost = None if recorded is None else play(recorded, model, time, like=(simulated, played))
-    scene = _Scene(model, robot_shapes(model), [played] if ghost is None else [played, ghost], rate)
+    scene = Scene(model, robot_shapes(model), [played] if ghost is None else [played, ghost], rate)
     prefix, seen, at = "simulated", played, scene.add_robot("simulated", played, SIMULATED, 1.0, own_colours=ghost is None)
     newtons_per_metre = scene.add_forces("forces", simulated, played)
     if ghost is not None:
@@ -81,7 +81,7 @@ def write_replay(
     return ReplayFile(written, written.stat().st_size, len(time), rate)
 
 
-class _Scene:
+class Scene:
     """What stands and moves in one replay."""
 
     def __init__(self, model: RobotModel, shapes: RobotShapes, played: list[Playback], rate: float) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
 from workbench.identify.options import CONCLUSIONS
-from workbench.identify.reasons import Description, Reason
+from workbench.identify.results.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.files import write_together
 from workbench.robot.model_file import model_text

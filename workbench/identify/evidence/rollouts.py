@@ -1,14 +1,17 @@
-"""Residuals of servo logs of a held robot, straight from the compiled station where it covers them."""
+"""Rollouts of several regions at once; of servo logs on a fixed base straight from the compiled station where it covers them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.evidence.hypothesis import Hypothesis
+from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
+from workbench.identify.evidence.region import Region
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
@@ -17,6 +20,8 @@ from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
 
 Array = NDArray[np.float64]
+Wants = tuple[int, Hypothesis]
+"""A region, by its index, and what it wants rolled out."""
 SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
 
@@ -64,3 +69,41 @@ def _job(evaluator: RolloutEvaluator, i: int, model: RobotModel, held: Simulatio
 def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
     e = evaluator.evidence[i]
     return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints
+
+
+@dataclass(frozen=True)
+class Rollouts:
+    """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
+    step: in steps of the search."""
+
+    evaluator: RolloutEvaluator
+    nominal: RobotModel
+    regions: tuple[Region, ...]
+    standing: tuple[Hypothesis, ...]
+    step: float = 1.0
+
+    def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
+        """One robot with a hypothesis for each region."""
+        z: dict[Uncertain, float] = {}
+        for h in hypotheses:
+            z |= as_mapping(h.numbers, h.z)
+        model = recalibrated(self.nominal, z)
+        return replace(model, effects=(*model.effects, *(spec for h in hypotheses for spec in h.specs())))
+
+    def answers(self, wants: Sequence[Wants]) -> list[Array]:
+        """Residuals (n,) of each want's region. Wants of different regions share rollouts."""
+        queues: dict[int, list[int]] = {}
+        for k, (region, _) in enumerate(wants):
+            queues.setdefault(region, []).append(k)
+        questions, shared = [], []
+        for row in range(max(map(len, queues.values()), default=0)):
+            here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
+            hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
+            takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
+            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
+            shared.append(here)
+        out: list[Array] = [np.empty(0)] * len(wants)
+        for here, residuals in zip(shared, residuals_of(self.evaluator, questions)):
+            for region, k in here.items():
+                out[k] = self.regions[region].vector(residuals)
+        return out

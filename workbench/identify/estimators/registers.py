@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from workbench.compare.session import Session
 from workbench.identify.estimators.geometry import Measured
-
-EXACT = 0.005
-"""Standard deviation of what a register sets, as a share: it is a number that the servo itself calculates with."""
+from workbench.identify.options import READ_OFF
 
 
 def read_off_registers(session: Session) -> tuple[Measured, ...]:
@@ -20,5 +18,5 @@ def read_off_registers(session: Session) -> tuple[Measured, ...]:
             assert isinstance(value, float)
             seen = (f" The servo's own register says so, without any recording: {departure.key} is {departure.found:g}, the "
                     f"model has {departure.nominal:g}.")
-            out.append(Measured(departure.effect.effect, departure.joint, value, EXACT * abs(value), seen))
+            out.append(Measured(departure.effect.effect, departure.joint, value, READ_OFF.register_exact * abs(value), seen))
     return tuple(out)

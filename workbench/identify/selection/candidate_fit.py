@@ -1,0 +1,56 @@
+"""A candidate that was fitted or screened out, and what rivals that are evaluated side by side know of each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.parameters import Candidate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
+    `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
+    choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
+    much less of it than of a rival that no fit was made."""
+
+    candidate: Candidate
+    x: Array
+    gain: Mapping[str, float]
+    joint: str | None
+    screened_out: bool = False
+    closed: float = 0.0
+    by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
+
+
+@dataclass(frozen=True)
+class Race:
+    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
+    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
+    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
+    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
+    and how long these are looked at."""
+
+    remembered: dict[str | None, float] = field(default_factory=dict)
+    screened_out: dict[str | None, float] = field(default_factory=dict)
+    reached: dict[str | None, float] = field(default_factory=dict)
+    wide: dict[bool, list[float]] = field(default_factory=dict)
+    least: float = 0.0
+    unheld: bool = False
+    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
+
+
+def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    for j, gain in zip(joints, gains):
+        best[j] = max(best.get(j, 0.0), gain)
+
+
+def best_at(best: dict[str | None, float], joint: str | None) -> float:
+    """At a joint; of all, for what concerns all."""
+    return max(best.values()) if joint is None else best[joint]

@@ -1,0 +1,96 @@
+"""By how much one model is better than another, and what such a lead is worth: log odds from differences of chi squared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.fitting.fit import Fit
+from workbench.identify.fitting.fits import Search, gained
+from workbench.identify.options import FIT
+from workbench.identify.parameters import Candidate
+from workbench.identify.selection.candidate_fit import CandidateFit
+from workbench.identify.selection.options import ODDS
+
+Array = NDArray[np.float64]
+
+
+def is_equivalent(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
+    """Whether a rival moves the robot as effect i does, and held takes do not tell which it is."""
+    if rival.effects[-1].name not in fit.effects[i].effect.equivalent_to:
+        return False
+    return -_better(search, fit, rival, search.held) < ODDS.better * misfit(search, fit)
+
+
+def is_by_floating_base(search: Search, c: Candidate, taken: CandidateFit) -> bool:
+    """Whether walks tell an effect."""
+    return taken.joint is None and search.evaluator.walks(search.fitted) and not search.is_settled(c)
+
+
+def dispersion(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> float:
+    """What leads of an effect's rivals are divided by when they become probabilities."""
+    if is_by_floating_base(search, c, taken):
+        return max(FIT.overdispersion_free, ODDS.rough * taken.gain["choose"]) * misfit(search, fit)
+    return ODDS.temper * misfit(search, fit, taken.joint)
+
+
+def misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
+    """What a fit leaves on the choosing stretches in shares of what a right model does, at least 1: by how much more than noise
+    alone would have them chi squared differences are left to chance. joint: that was judged alone with the base held, and does
+    not feel what goes wrong elsewhere."""
+    if joint is None:
+        return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected(search.fitted, "choose")))
+    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.held}, "choose", joint)
+    return max(1.0, float(left.sum()) / max(1.0, float(expected.sum())))
+
+
+def chi_squared_lead(search: Search, fit: Fit, rival: Fit, taken: CandidateFit) -> float:
+    """By how much a fit with a rival in an effect's place is better, of chi squared, numbers priced."""
+    price = max(ODDS.number, ODDS.number_share * taken.gain["choose"])
+    own = [c.key for c in rival.effects]
+    (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
+    fewer = numbers_identified(fit, replaced) - numbers_identified(rival, len(own) - 1)
+    return _ahead(search, fit, rival, replaced) + price * fewer
+
+
+def _ahead(search: Search, fit: Fit, rival: Fit, replaced: int) -> float:
+    """The same, whatever numbers cost."""
+    return better_on_fixed_base(search, fit, rival) if search.is_settled(fit.effects[replaced]) else better_by_both(fit, rival)
+
+
+def is_outpriced(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
+    """Whether only the price of more numbers keeps a rival from effect i's place: a load that swings little is nearly a spring.
+    Not one that is effect i with something added."""
+    more = numbers_identified(rival, len(rival.effects) - 1) > numbers_identified(fit, i)
+    return more and rival.effects[-1].effect.reduces_to != fit.effects[i].name and _ahead(search, fit, rival, i) > 0
+
+
+def better_by_both(fit: Fit, rival: Fit) -> float:
+    """By how much a rival is better of an effect that all takes tell, of chi squared on the choosing stretches: twice as many are
+    fitted, and say as much of each; what more numbers make of these is in their price."""
+    return by_both({use: fit.cost[use] - rival.cost[use] for use in ("choose", "fit")})
+
+
+def by_both(of: Mapping[str, float]) -> float:
+    """Of chi squared, what both the fitted and the choosing stretches say, as much as the latter would."""
+    return (of["choose"] + of["fit"] / 2) / 2
+
+
+def better_on_fixed_base(search: Search, fit: Fit, rival: Fit) -> float:
+    """By how much a rival of an effect that held takes told is better: these take the word first."""
+    walks = _better(search, fit, rival, search.floating_base(search.fitted)) * ODDS.temper / FIT.overdispersion_free
+    return _better(search, fit, rival, search.held) + float(np.clip(walks, -ODDS.walks_say, ODDS.walks_say))
+
+
+def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
+    """How much less chi squared a rival leaves on these takes."""
+    return gained(search.evaluator, fit, rival, takes, "choose")
+
+
+def numbers_identified(fit: Fit, i: int) -> int:
+    """Numbers of an effect that the data tell: where along its axis a joint carries a mass makes no name better. All of one that
+    was too far behind to be fitted."""
+    told = int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
+    return told or fit.effects[i].size
