@@ -22,7 +22,7 @@ from workbench.gait.certificate import CLAIM
 from workbench.gait.feet import feet_measure
 from workbench.gait.legs import legs_of
 from workbench.gait.measure import fallen, measure
-from workbench.gait.rollouts import rollouts
+from workbench.gait.rollouts import Rollouts
 from workbench.motion import Commands, Motion, load_motion
 from workbench.robot import GRAVITY, EffectSpec, RobotModel, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -32,6 +32,9 @@ from workbench.view.report.page import Details, Picture, Provenance, Report, Sec
 
 GAITS = ROOT / "runs/gaits"
 SECONDS = 6.0
+BOXES, FIELDS = (0.0, 2.5, 5.0, 7.5, 10.0), 2
+"""Tallest boxes [mm], and how many random fields of each; Drake's runs, of BOX_SECONDS."""
+BOX_SECONDS = 4.0
 FRICTIONS, SLOPES, SOFTNESS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0), (-10.0, -5.0, 0.0, 5.0, 10.0, 15.0), (1e3, 3e3, 1e4, 1e5)
 
 
@@ -73,8 +76,9 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         jobs = [Job(m, SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01), gait.commands, SECONDS)
                 for m in floors.values()]
         measures = [fallen(len(model.joints)) if t is None else measure(t, m, gait.begin, gait.period, electrical=False)
-                    for t, m in zip(rollouts(jobs), floors.values())]
+                    for t, m in zip(Rollouts().takes(jobs), floors.values())]
         speeds[gait.name] = {name: (math.nan if m.fell else m.speed) for name, m in zip(floors, measures)}
+        speeds[gait.name] |= _over_boxes(model, gait, quick)
         told[gait.name]["floors"] = {name: None if math.isnan(v) else v for name, v in speeds[gait.name].items()}
     figures["floors"] = _map(speeds)
     best = max(found[1:], key=lambda g: told[g.name]["speed"], default=None)
@@ -86,8 +90,9 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     header = ["gait", "speed [cm/s]", "slip [cm/s]", "tilt [deg]", "worst RMS torque [N m]", "of", "electrical cost of transport",
               "mechanical"]
     report.add(Section("Side by side", [Table(header, [_row(name, n) for name, n in told.items()])]))
-    report.add(Section("Floors", [Text("A run that fell has no bar. Boxes are not modelled: the floor is even."),
-                                  Picture(figures["floors"], "Speed over friction, slope (uphill positive) and softness.")]))
+    report.add(Section("Floors", [Text("A run that fell, or left the floor, has no mark."), Picture(
+        figures["floors"], "Speed over friction, slope (uphill positive), softness, and over boxes of random height: "
+        f"the mean of {FIELDS} fields.")]))
     for section in sections:
         report.add(section)
     return publish(out, model, report, told, figures)
@@ -124,6 +129,19 @@ def _row(name: str, n: Mapping[str, Any]) -> list[str]:
             f"{n['electrical cost of transport']:.1f}", f"{n['mechanical cost of transport']:.2f}"]
 
 
+def _over_boxes(model: RobotModel, gait: Played, quick: bool) -> dict[str, float]:
+    """Speed on boxes, the mean of some fields; NaN where it fell on one."""
+    fields = 1 if quick else FIELDS
+    wanted = [(h, seed) for h in BOXES[::len(BOXES) - 1 if quick else 1] for seed in range(fields if h else 1)]
+    jobs = [Job(model, SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01, boxes=h / 1000, boxes_seed=seed,
+                                        engine="drake"), gait.commands, BOX_SECONDS) for h, seed in wanted]
+    out: dict[str, list[float]] = {}
+    for (h, _), take in zip(wanted, simulate_batch(jobs)):
+        m = measure(take, model, gait.begin, gait.period, electrical=False)
+        out.setdefault(f"boxes {h:g}", []).append(math.nan if m.fell else m.speed)
+    return {name: float(np.mean(values)) for name, values in out.items()}
+
+
 def _floors(model: RobotModel, quick: bool) -> list[tuple[str, RobotModel]]:
     step = 3 if quick else 1
     out = [(f"friction {f:g}", replace(model, ground=replace(model.ground, friction=f))) for f in FRICTIONS[::step]]
@@ -134,9 +152,10 @@ def _floors(model: RobotModel, quick: bool) -> list[tuple[str, RobotModel]]:
 
 @styled
 def _map(speeds: Mapping[str, Mapping[str, float]]) -> Figure:
-    kinds = {"friction": "friction of the pair", "slope": "slope [deg]", "stiffness": "stiffness of a contact point [N/m]"}
-    figure = new_figure(11, 3.8)
-    for axes, (kind, label) in zip(figure.subplots(1, 3, sharey=True), kinds.items()):
+    kinds = {"friction": "friction of the pair", "slope": "slope [deg]", "stiffness": "stiffness of a contact point [N/m]",
+             "boxes": "tallest box [mm]"}
+    figure = new_figure(13, 3.8)
+    for axes, (kind, label) in zip(figure.subplots(1, 4, sharey=True), kinds.items()):
         for colour, (name, by_floor) in zip((OTHERS[0], SIMULATED, *OTHERS[1:]), speeds.items()):
             points = [(float(k.split()[1]), 100 * v) for k, v in by_floor.items() if k.startswith(kind)]
             axes.plot([x for x, _ in points], [y for _, y in points], "o-", color=colour, label=name)

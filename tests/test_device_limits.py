@@ -54,7 +54,7 @@ def test_the_thesis_walk_is_within_every_limit(model: RobotModel) -> None:
 
 
 def test_the_servo_law_agrees_with_the_warning(model: RobotModel) -> None:
-    """Unloaded at full duty the servo settles at the speed from which the warning counts (contract, section 4)."""
+    """Unloaded at full duty the servo settles at the speed from which the warning counts (docs/formats.md, section 4)."""
     servo, speed = ServoConstants(), 0.0
     for _ in range(2000):
         torque = servo.torque_at_full_duty - servo.back_emf * speed - servo.viscous_friction * speed - servo.coulomb_friction

@@ -254,6 +254,15 @@ def test_margins_follow_the_torque_speed_line() -> None:
     assert np.isnan(servo_load(servo, np.full(3, np.nan), np.full(3, np.nan), np.zeros(3)).rms)
 
 
+def test_a_margin_within_noise_is_not_exceeded() -> None:
+    servo, left, free = ServoConstants(), np.array([0.4, -0.2, 0.1]), np.ones(3)
+    exact = servo_load(servo, np.ones(3), left, free)
+    assert (exact.torque_sigma, exact.feasible, exact.exceeded) == (0.0, False, True)
+    noisy = servo_load(servo, np.ones(3), left, free, np.array([0.01, 0.1, 0.01]), np.zeros(3))
+    assert (noisy.torque_sigma, noisy.feasible, noisy.exceeded) == (0.1, False, False)
+    assert servo_load(servo, np.ones(3), left, free, np.full(3, 0.05), np.zeros(3)).exceeded
+
+
 def test_motor_torque_without_friction_is_torque_and_rotor() -> None:
     servo = ServoConstants(reflected_inertia=0.01)
     torque = motor_torque([servo], np.array([[0.2]]), np.array([[3.0]]), np.array([[5.0]]), friction=False)

@@ -25,6 +25,7 @@ from workbench.recording import Take, quaternions
 from workbench.robot import Ground, InputError, RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
+from workbench.view.report.forces import margin_table
 
 RATE = 120.0
 
@@ -231,6 +232,18 @@ def test_a_result_comes_back_from_its_file(model: RobotModel, tmp_path: Path) ->
     assert tuple(back.contact) == tuple(result.contact)
     for foot, force in result.contact.items():
         np.testing.assert_allclose(back.contact[foot], force, rtol=1e-7, atol=1e-12)
+
+
+def test_the_margins_have_the_uncertainty_of_noise(model: RobotModel) -> None:
+    """Ten times the noise, ten times the standard deviation; and the table shows it beside the margin."""
+    take, _ = waving(model, seconds=0.5)
+    results = [inverse_dynamics(model, replace(take, source="motive", q_sigma=np.full(take.q.shape, noise)), draws=8, window=0.1)
+               for noise in (1e-4, 1e-3)]
+    small, large = (np.array([load.torque_sigma for load in r.loads.values()]) for r in results)
+    assert np.median(large / small) == pytest.approx(10, rel=0.3)
+    assert f"(sd {large[0]:.2f})" in margin_table(results[1])
+    assert "noise" in margin_table(results[1])
+    assert "sd" not in margin_table(inverse_dynamics(model, take, draws=0))
 
 
 def test_files_speak_degrees(model: RobotModel, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the firmware sends for a motion table (the thesis's equations 3.1 to 3.4; contract, section 2)."""
+"""What the firmware sends for a motion table (the thesis's equations 3.1 to 3.4; docs/formats.md, section 2)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The nominal servo law (contract, section 4), for a row of servos at once."""
+"""The nominal servo law (docs/formats.md, section 4), for a row of servos at once."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from workbench.view.figures import style
 from workbench.view.report.page import Part, Table, Text
 
 BOUND = 1.3
-"""Sigma below which nothing is claimed (contract, section 6)."""
+"""Sigma below which nothing is claimed (docs/formats.md, section 6)."""
 LOOSE = tuple(f"loose {j} {a}" for j in LEG for a in ACROSS[j])
 RIVALS = (BACKLASH, BACKLASH_LEG, WEAK, TILT, SLIP, SHORT)
 SHOWN = f"loose {SOUGHT[0]} {SOUGHT[1]}"

@@ -115,5 +115,5 @@ def servo(jaw_range: float | None = None) -> ServoConstants:
 
 
 def servo_yaml(constants: ServoConstants) -> str:
-    """servo.yaml (contract, section 4)."""
+    """servo.yaml (docs/formats.md, section 4)."""
     return yaml_text(constants.written())

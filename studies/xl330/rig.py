@@ -75,7 +75,7 @@ def published(folder: Path, model: str) -> dict[str, float]:
 
 
 def nominal_servo(m1: Mapping[str, float], supply: float, gain: int = 400) -> dict[str, float | str]:
-    """M1 in the words of `servo.yaml` (contract, section 4). Its offset of the arm is not a servo's constant and stays out."""
+    """M1 in the words of `servo.yaml` (docs/formats.md, section 4). Its offset of the arm is no servo's constant."""
     return {
         "model": "XL-330", "stall_torque": m1["kt"] * supply / m1["R"], "no_load_speed": supply / m1["kt"],
         "rated_voltage": supply, "supply_voltage": supply, "coulomb_friction": m1["friction_base"],

@@ -42,7 +42,7 @@ def made(tmp_path_factory):
 def _again(model, commands, seconds):
     from workbench.simulation import Job, SimulationConfig, simulate_batch
 
-    return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
+    return simulate_batch([Job(model, SimulationConfig(time_step=2e-3, engine="drake"), commands, seconds, 0.3)])[0]
 
 
 def test_says_what_there_is_to_say(made):

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 
 from tests.command import refused
+from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of, out_of_reach
 from workbench.gait.request import Request
-from workbench.gait.search import Budget, search
+from workbench.gait.search import Budget, search, steered
+from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
+from workbench.gait.table import paths_of
 from workbench.robot import EffectSpec, InputError, data_file, puppy_model
 from workbench.robot.model_file import Posterior
 
@@ -65,15 +68,48 @@ def test_a_gait_that_breaks_a_limit_comes_after_all_that_keep_them(machine):
     assert broken == sorted(broken)
 
 
-def test_what_no_gait_can_do_is_told_at_once_with_the_limit_that_binds(machine, capsys, tmp_path):
+def test_what_no_gait_can_do_is_told_with_the_limit_that_binds_and_what_works(machine, capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("workbench.gait.optimize.FIRST_LOOK", replace(SMALL, robust=0, draws=0))
+    monkeypatch.setattr("workbench.gait.optimize.BRIEFLY", CertifyOptions(draws=0, checked=0, seconds=1.0, floor_seconds=0.3))
     assert out_of_reach(machine, Request(speed=0.3)) is None
     assert out_of_reach(machine, Request(speed=3.0)).name == "foot speed"
     assert out_of_reach(machine, Request(slope=np.radians(30))).name == "slope"
     result = optimize(machine, Request(slope=np.radians(30)), Ensemble(), OptimizeOptions(), quiet)
     assert not result.met
     assert "slope, friction 0.5: 30 of 26.6 deg" in result.problem
-    said = refused(capsys, "optimize", "--speed", "3", "--out", str(tmp_path / "out"))
-    assert "foot speed" in said
+    brief = replace(options_of(1).certify, step=2e-3, variants=("2 ms",))
+    lax = replace(Request().limits, drift=50.0, aside=50.0)
+    result = optimize(machine, Request(speed=3.0, limits=lax), Ensemble(), OptimizeOptions(SMALL, brief, planned=False), quiet)
+    assert "cannot be met by any gait: foot speed" in result.problem
+    assert "the nearest table that a first look found goes" in result.problem
+    assert result.table is not None
+    said = refused(capsys, "optimize", "--slope", "30", "--out", str(tmp_path / "out"))
+    assert "slope, friction 0.5" in said
+
+
+def test_a_gait_that_turns_is_steered_straight(machine):
+    request = Request()
+    space, evaluator = space_of(machine, request), Evaluator(machine, request, [])
+    trot = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
+    (crooked,) = evaluator.judged([replace(trot, turn=0.05)], 0)
+    (straight,) = steered(evaluator, space, [crooked])
+    assert abs(request.drift(crooked.nominal)) > request.limits.drift
+    assert abs(request.drift(straight.nominal)) < abs(request.drift(crooked.nominal)) / 3
+
+
+def test_every_seed_is_within_reach_and_ranges(machine):
+    space = space_of(machine, Request())
+    for paths in paths_of(machine, seeds(machine, Request(), space, 12, 2)):
+        assert paths.off.max() <= Request().limits.reach
+        assert np.degrees(np.abs(paths.q)).max() < 120
+
+
+def test_a_search_that_is_far_from_the_speed_asked_for_leaves_the_ensemble_out(machine, tmp_path):
+    draws = load_ensemble().draws(machine.model, 1, 0, tmp_path)
+    evaluator = Evaluator(machine, Request(speed=1.9), draws)
+    found = search(evaluator, SMALL, 3, quiet)
+    assert not found.best.draws
+    assert evaluator.rollouts > 0
 
 
 def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):

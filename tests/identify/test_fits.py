@@ -64,7 +64,7 @@ def test_work_is_counted_in_seconds_of_a_puppys_rollout(worn):
     assert evaluator.seconds == pytest.approx(float(e.take.recorded.time[-1]) * 20 / 32)
 
 
-def test_only_walks_tell_what_held_takes_were_asked_before(worn):
+def test_only_floating_base_takes_identify_what_fixed_base_takes_were_asked_before(worn):
     _, search, _ = worn
     effects = known_effects()
     friction = Candidate.of(effects["coulomb_friction"], ("three",), (0.0,))
@@ -137,7 +137,7 @@ def test_sizes_are_zero_where_an_effect_vanishes_and_one_where_it_is_typical(wor
         assert (high >= 1).all()
         if isinstance(c, PointMass):  # its numbers are never held
             continue
-        held = replace(c, held=(True,) * len(c.neutral))
+        held = replace(c, fixed=(True,) * len(c.neutral))
         assert held.size == 0
         assert held.values(np.empty(0)) == pytest.approx(c.typical)
 
@@ -196,7 +196,7 @@ def test_channels_across_an_axis_belong_to_their_joint():
     assert [joint_of(c) for c in ("flm", "flm~z", "roll")] == ["flm", "flm", "roll"]
 
 
-def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn):
+def test_what_fixed_base_takes_identified_keeps_its_numbers_beside_what_is_fitted_after(worn):
     session, evidence = worn[0], worn[1].evaluator.evidence
     search = Search(RolloutEvaluator(evidence, CONFIG, n_jobs=1), session.model)
     pool = {c.key: c for c in candidates(session.model, evidence)}
@@ -216,14 +216,14 @@ def test_what_held_takes_told_keeps_its_numbers_beside_what_is_fitted_after(worn
 
 
 @pytest.mark.parametrize(("left", "late"), [(60.0, 3.4), (500.0, 2.5)], ids=["held takes do not mind", "they speak against it"])
-def test_walks_say_when_commands_come_unless_held_takes_speak_against_it(left, late):
+def test_most_from_floating_when_commands_come_unless_fixed_base_takes_speak_against_it(left, late):
     delay = Candidate.of(known_effects()["command_delay"], ("three",), (0.0,))
 
     def fit(x, held):
         return Fit((delay,), np.array([x]), np.eye(1), {}, {0: np.array([[held]]), 1: np.zeros((1, 1))})
 
     search = SimpleNamespace(
-        held=(0,),
+        fixed_base=(0,),
         fitted=(0, 1),
         floating_base=lambda takes: (1,),
         refitted=lambda *_: fit(3.4, left),

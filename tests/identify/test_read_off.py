@@ -46,7 +46,7 @@ def quiet(tmp_path_factory):
 
 
 def recorded_with(quiet, model, commands=None):
-    """The jury's take as another robot, or other commands, would have made it, with the noise that it had."""
+    """The evaluator's take as another robot, or other commands, would have made it, with the noise that it had."""
     nominal, evaluator = quiet
     e = evaluator.evidence[0]
     noise = e.recorded - e.simulated(run_job(evaluator.job(nominal, 0, CONFIG)), nominal)
@@ -129,7 +129,7 @@ def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):
     assert np.nansum(np.square(after[0])) < 0.2 * np.nansum(np.square(before[0]))
 
 
-def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet):
+def test_what_was_taken_for_missed_is_read_anew_from_what_fixed_base_takes_identified(quiet):
     slow = Candidate.of(known_effects()["command_delay"], ("one",), (0.0,))
     x = np.array([6.0])
     evaluator = recorded_with(quiet, with_effects(quiet[0], [(slow, x)]))
@@ -143,7 +143,7 @@ def test_what_was_taken_for_missed_is_read_anew_from_what_held_takes_told(quiet)
 
 
 def quick_session(quiet, lost):
-    """The jury of the arm moved on before it comes to rest, recorded without some poses of joint one."""
+    """The evaluator of the arm moved on before it comes to rest, recorded without some poses of joint one."""
     e = quiet[1].evidence[0]
     times = np.arange(0.0, e.take.commands.end - 0.1, 0.15)
     swing = np.deg2rad(np.tile([18.0, 6.0, -9.0, -9.0, 15.0], 40)[:len(times)])

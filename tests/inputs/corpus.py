@@ -160,6 +160,42 @@ def rollout(folder: Path) -> bytes:
     return save_rollout(take, folder / "rollout.csv").read_bytes()
 
 
+SESSION = """format: 1
+robot: {model: robot.urdf, base: trunk, servos: servo.yaml}
+ground: {friction: 0.6, stiffness: 1.0e5, dissipation: 20.0}
+takes:
+- {name: swing, recording: legs.csv, base: fixed, starts_at: 0.0}
+predict:
+- {name: other, commands: commands.csv, servos: {supply_voltage: 10.0}, base: fixed}
+"""
+RAW = """type,timestamp,positions,velocities,torques
+state,1000000,"[0.0, 0.1]","[0.0, 0.0]","[0.1, 0.0]"
+state,1020000,"[0.01, 0.1]","[0.5, 0.0]","[0.1, 0.0]"
+state,1040000,"[0.03, 0.09]","[0.7, -0.5]","[0.2, 0.1]"
+"""
+COMPARISON = json.dumps({"format": 1, "joints_by_error": [["walk", "flm", 1.12]], "takes": [{
+    "name": "walk", "starts_at": 0.412, "joints": {"flm": {"error": 1.12, "noise": 0.12, "floor": 0.05, "unit": "deg"}},
+    "distance": {"recorded": 0.25, "simulated": 0.27}}]})
+
+
+def beside(folder: Path) -> None:
+    """Writes what a session and a folder of a programme name, beside the file that is damaged."""
+    time, goal, position = swing(60)
+    (folder / "robot.urdf").write_text(ROBOT)
+    (folder / "servo.yaml").write_text(SERVO)
+    rows = [f"{t:.6g},{g:.6g},{p:.6g},{g / 2:.6g},{p / 2:.6g}" for t, g, p in zip(time, goal, position)]
+    (folder / "legs.csv").write_text("\n".join(["time,goal.hip,position.hip,goal.knee,position.knee", *rows]) + "\n")
+    rows = [f"{t:.6g},{g:.6g},{g / 2:.6g},1,1,{'0,0,0,0' if not i else ',,,'}" for i, (t, g) in enumerate(zip(time, goal))]
+    (folder / "commands.csv").write_text(
+        "\n".join(["time,goal.hip,goal.knee,enabled.hip,enabled.knee,position.hip,velocity.hip,position.knee,velocity.knee",
+                   *rows]) + "\n")
+    (folder / "joint_list.txt").write_text("a\nb\n")
+    (folder / "speed.txt").write_text("# joints: blb flm\n2,\n60, 30,\n20, 30,\n")
+    (folder / "timeDiff.txt").write_text("# joints: blb flm\n2,\n400,\n400,\n")
+    (folder / "control.csv").write_text("".join(
+        ["type,timestamp,positions\n", *(f'control,{1_000_000 + 20_000 * k},"[0.0, 0.1]"\n' for k in range(3))]))
+
+
 @cache
 def corpus(folder: Path) -> dict[str, bytes]:
     """Sound files by name; `folder` for what has to be written to be made."""
@@ -168,4 +204,6 @@ def corpus(folder: Path) -> dict[str, bytes]:
         "ros.csv": ros_csv().encode(), "programmes.npz": sage(("one", "two")), "plain.npz": sage(compressed=False),
         "episode.parquet": lerobot(), "poses.csv": POSES.encode(), "page.mtn": MTN.encode(), "servo.yaml": SERVO.encode(),
         "model.yaml": MODEL.encode(), "robot.urdf": ROBOT.encode(), "robot.sdf": SDF.encode(), "rollout.csv": rollout(folder),
+        "session.yaml": SESSION.encode(), "state_motor.csv": RAW.encode(), "comparison.json": COMPARISON.encode(),
+        "pos.txt": b"# joints: blb flm\n2,\n512, 500,\n520, 490,\n",
     }

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import random
 import re
+import zipfile
 
 _TOKENS = [b"", b"0", b"-1", b"1e308", b"-1e308", b"1e-320", b"nan", b"inf", b"9" * 30, b"1_0", "\u0663".encode(), b"null", b"~",
            b'"', b"'", b"[", b"{", b"<", b">", b"&", b"\0", b"\r", b"\n", b"\xff\xfe", b"\xf6", b"!!int x", b"*a", b"&a", b"#",
@@ -12,13 +14,27 @@ _NUMBER = re.compile(rb"-?\d+\.?\d*(?:e-?\d+)?")
 
 
 def mutated(content: bytes, seed: int) -> bytes:
-    """`content` with one to four pieces of damage."""
+    """`content` with one to four pieces of damage; of an archive half the time in a file that it holds, packed anew."""
     rng = random.Random(seed)
+    if content.startswith(b"PK") and rng.random() < 0.5:
+        return _repacked(content, rng)
     out = bytearray(content)
     for _ in range(rng.choice([1, 1, 2, 4])):
         rng.choice(_WAYS)(out, rng)
         del out[1 << 20:]
     return bytes(out)
+
+
+def _repacked(content: bytes, rng: random.Random) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(out, "w") as new:
+        names = old.namelist()
+        for name, damaged in zip(names, rng.sample([True] + [False] * (len(names) - 1), len(names))):
+            part = bytearray(old.read(name))
+            if damaged:
+                rng.choice(_WAYS)(part, rng)
+            new.writestr(name, bytes(part))
+    return out.getvalue()
 
 
 def _flip(out: bytearray, rng: random.Random) -> None:

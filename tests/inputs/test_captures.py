@@ -12,6 +12,7 @@ import pytest
 from tests.inputs.corpus import as_csv, motive
 from tests.recording_robot import capture, write_robot
 from workbench.recording import BodyTrack, read_recording, survey
+from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import tracks_of
 from workbench.robot import InputError
@@ -92,6 +93,31 @@ def test_what_is_wrong_is_told(tmp_path: Path, change: Callable[[list[list[str]]
     assert any(said in p for p in _told(tmp_path, change))
 
 
+def _every_fourth(cells: list[list[str]]) -> None:
+    for row in range(HEADER, len(cells)):
+        if (row - HEADER) % 4:
+            cells[row][2:] = cells[row - 1][2:]
+
+
+def _coarse_and_frozen(cells: list[list[str]]) -> None:
+    """To a millimetre, which hides the noise, and held while the body goes on."""
+    for row in cells[HEADER:]:
+        row[2:6], row[6:9] = [f"{float(c):.4f}" for c in row[2:6]], [f"{float(c):.3f}" for c in row[6:9]]
+    _frozen(cells)
+
+
+def _backwards(cells: list[list[str]]) -> None:
+    for row in cells[HEADER:]:
+        row[1] = f"{-float(row[1]):.6f}"
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (_every_fourth, "poses change in only 30 of 120"), (_coarse_and_frozen, "40 frame(s) repeat"), (_backwards, "Time column"),
+])
+def test_siblings_are_told(tmp_path: Path, change: Callable[[list[list[str]]], None], said: str) -> None:
+    assert any(said in p for p in _told(tmp_path, change))
+
+
 def test_what_was_not_seen_is_a_gap(tmp_path: Path) -> None:
     for change in (_frozen, _lost):
         _told(tmp_path, change)
@@ -166,8 +192,17 @@ def test_lengths_of_another_unit_are_seen_and_mended(made, factor: float) -> Non
     np.testing.assert_allclose(told.p, mend(tracks_of(captured.recording), model).p, atol=1e-9)
 
 
-@pytest.mark.parametrize("header", ["Pos X,Pos Y,Pos Z,Rot X,Rot Y,Rot Z,Rot W", "time,x,y,z,qx,qy,qz,qw"])
+@pytest.mark.parametrize("header", [
+    "Pos X,Pos Y,Pos Z,Rot X,Rot Y,Rot Z,Rot W", "time,x,y,z,qx,qy,qz,qw", "time;x;y;z;qx;qy;qz;qw",
+    "#timestamp x y z qx qy qz qw",
+    "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []",
+    "Frame,Dog Pos X,Dog Pos Y,Dog Pos Z,Dog Rot X,Dog Rot Y,Dog Rot Z,Dog Rot W",
+    "%time,field.pose.position.x,field.pose.position.y,field.pose.position.z,field.pose.orientation.x,field.pose.orientation.y,"
+    "field.pose.orientation.z,field.pose.orientation.w",
+])
 def test_a_clients_pose_log_is_named_as_one(tmp_path: Path, header: str) -> None:
-    (tmp_path / "x.csv").write_text(header + "\n" + ",".join(["0.1"] * header.count(",")) + ",1\n")
+    between = next(mark for mark in (";", ",", " ") if mark in header)
+    (tmp_path / "x.csv").write_text(header + "\n" + between.join(["1"] * (header.count(between) + 1)) + "\n")
+    assert file_kind(tmp_path / "x.csv") == "recording"
     with pytest.raises(InputError, match="NatNet client's pose log"):
         read_recording(tmp_path / "x.csv")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tests.inputs.corpus import corpus
+from tests.inputs.corpus import beside, corpus
 from tests.inputs.mutate import mutated
 from workbench.compare.file_problems import recording_problems
 from workbench.motion import load_motion, load_mtn
@@ -19,9 +19,11 @@ from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.robot import InputError, RobotModel, load_model, load_servo_constants
 from workbench.robot.yaml_file import read_yaml
+from workbench.view.report.inspection import inspect_file
 
 NAMES = ("motive.csv", "log.csv", "bam.json", "ros.csv", "programmes.npz", "plain.npz", "episode.parquet", "poses.csv",
-         "page.mtn", "servo.yaml", "rollout.csv")
+         "page.mtn", "servo.yaml", "rollout.csv", "pos.txt", "state_motor.csv", "comparison.json", "session.yaml")
+INSPECTED = ("pos.txt", "state_motor.csv", "comparison.json", "session.yaml")
 MODELS = ("robot.urdf", "robot.sdf", "model.yaml")
 LONGEST = 10.0
 
@@ -29,7 +31,9 @@ LONGEST = 10.0
 def use(path: Path) -> None:
     """Reads a file with the reader that its kind has."""
     suffix = path.suffix
-    if suffix == ".mtn":
+    if path.name in INSPECTED:
+        inspect_file(path)
+    elif suffix == ".mtn":
         file = load_mtn(path)
         for page in file.used[:2]:
             load_motion(f"{path}#{page.number}").as_table()
@@ -52,11 +56,11 @@ def use(path: Path) -> None:
             recording_problems(path, read_recording(path))
 
 
-def survives(folder: Path, name: str, seed: int) -> None:
-    """Fails with the seed where a damaged file is neither read nor refused."""
-    content = mutated(corpus(folder)[name], seed)
-    path = folder / f"{Path(name).stem}_{seed}{Path(name).suffix}"
-    path.write_bytes(content)
+def survives(folder: Path, name: str, seed: int) -> str:
+    """What a damaged file is refused with, empty where it is read. Fails with the seed where it is neither; `folder` holds what
+    `beside` writes."""
+    path = folder / name
+    path.write_bytes(mutated(corpus(folder)[name], seed))
     began, line = time.monotonic(), ""
     try:
         with warnings.catch_warnings():
@@ -66,16 +70,17 @@ def survives(folder: Path, name: str, seed: int) -> None:
         line = str(e)
     except Exception as e:
         raise AssertionError(f"{name}, seed {seed}: {type(e).__name__}: {e}") from e
-    finally:
-        path.unlink()
     assert "\n" not in line, (name, seed)
     assert len(line) < 1500, (name, seed)
     assert time.monotonic() - began < LONGEST, (name, seed)
+    return line
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("fuzz")
+    folder = tmp_path_factory.mktemp("fuzz")
+    beside(folder)
+    return folder
 
 
 @pytest.mark.parametrize("name", [*NAMES, *MODELS])

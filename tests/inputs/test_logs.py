@@ -5,10 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from tests.inputs.corpus import bam_log, joint_log, lerobot, ros_csv, sage, swing
 from workbench.recording import Recording, read_recording
+from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.read import recording_of_take
 from workbench.recording.plausibility import beyond_range
 from workbench.robot import InputError
@@ -157,10 +160,51 @@ def test_a_ros_controllers_state(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.rad2deg(log.channels["position.knee"]), swing(60)[2], atol=1e-3)
 
 
+@pytest.mark.parametrize(("header", "time"), [
+    ("%time,field.joint_names0,field.desired.positions0,field.actual.positions0",
+     lambda t: f"{1.7e18 + round(t * 1e9):.0f},knee"),
+    ("__time,/c/reference/positions[0],/c/feedback/positions[0]", lambda t: f"{1.7e9 + t:.3f}"),
+    ("__time,/c/reference/positions[0],/c/feedback/positions[0]", lambda t: f"{1.7e15 + round(t * 1e6):.0f}"),
+    ("time;/c/reference/positions[0];/c/feedback/positions[0]", lambda t: f"{t:.3f}"),
+    ("time,reference.positions.0,feedback.positions.0", lambda t: f"{t:.3f}"),
+    ("header.stamp.sec,header.stamp.nanosec,reference.positions[0],feedback.positions[0]",
+     lambda t: f"{1_700_000_000 + int(t)},{round(1e9 * (t % 1))}"),
+])
+def test_ros_tables_of_other_tools(tmp_path: Path, header: str, time) -> None:
+    rows = [f"{time(t)},{np.deg2rad(g):.6g},{np.deg2rad(p):.6g}" for t, g, p in zip(*swing(60))]
+    text = "\n".join([header, *rows]) + "\n"
+    (tmp_path / "x.csv").write_text(text.replace(",", ";") if ";" in header else text)
+    assert file_kind(tmp_path / "x.csv") == "recording"
+    log = read_recording(tmp_path / "x.csv")
+    assert (log.kind, len(log.joints), log.problems) == ("ros_csv", 1, ())
+    np.testing.assert_allclose(log.time - log.time[0], swing(60)[0], atol=1e-3)
+
+
+@pytest.mark.parametrize(("columns", "said"), [
+    ({"timestamp": pa.array(["0", "1"])}, "'timestamp': expected numbers, found string"),
+    ({"action": pa.array([["1"], ["2"]])}, "'action': expected a vector of numbers"),
+    ({"action": pa.array([None, [1.0]])}, "'action': expected as many numbers"),
+    ({"episode_index": pa.array(["a", "b"])}, "'episode_index': expected whole numbers"),
+])
+def test_parquet_of_other_types(tmp_path: Path, columns: dict, said: str) -> None:
+    sound = {"timestamp": pa.array([0.0, 0.1]), "action": pa.array([[0.0], [1.0]]), "observation.state": pa.array([[0.0], [1.0]])}
+    parquet.write_table(pa.table(sound | columns), tmp_path / "x.parquet")
+    with pytest.raises(InputError, match=said):
+        read_recording(tmp_path / "x.parquet")
+
+
+def test_lerobot_in_radians_is_converted(tmp_path: Path) -> None:
+    (tmp_path / "a.parquet").write_bytes(lerobot((np.pi / 180, np.pi / 180)))
+    log = read_recording(tmp_path / "a.parquet")
+    assert "in radians" in log.problems[0]
+    np.testing.assert_allclose(np.rad2deg(log.channels["position.joint_1"]), swing(90, 30.0)[2], atol=0.02)
+
+
 @pytest.mark.parametrize(("old", "new", "said"), [
+    ('"mass": 0.5', '"mass": 1e400', "beyond all bounds"),
     ('"timestamp": 0.0', '"timestamp": ' + "9" * 400, "a whole number of 400 digits"),
     ('"entries": [', '"entries": ' + "[" * 100_000, "nested too deep|line 1"),
-    ('"position": 0.0', '"position": Infinity', "expected a number"),
+    ('"position": 0.0', '"position": Infinity', "beyond all bounds"),
     ('"entries"', '"rows"', "found one with motor, mass, rows"),
 ])
 def test_json_that_no_log_is(tmp_path: Path, old: str, new: str, said: str) -> None:

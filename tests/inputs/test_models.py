@@ -94,7 +94,8 @@ def test_effects_act_on_a_robot_with_meshes(tmp_path: Path, name: str) -> None:
     MakeStation(model.with_effect(EffectSpec("backlash", (joint,), {"gap": 3.0})))
 
 
-@pytest.mark.parametrize("uri", ["mesh/trunk.stl", "mesh\\trunk.stl", "package://dog/mesh/trunk.stl", "package:///mesh/trunk.stl",
+@pytest.mark.parametrize("uri", ["mesh/trunk.stl", "mesh\\trunk.stl", "package://dog/mesh/trunk.stl", "package://dog//mesh/trunk.stl",
+                                 "package:///mesh/trunk.stl",
                                  "file://{folder}/mesh/trunk.stl", "package://kit/trunk.stl", "mesh/trunk.dae"])
 def test_meshes_are_found_and_converted(tmp_path: Path, uri: str) -> None:
     folder = tmp_path / "dog"
@@ -129,6 +130,8 @@ def test_a_mesh_that_is_not_there_is_named_with_what_to_do(tmp_path: Path) -> No
     ('lower="-1.5" upper="1.5"', 'lower="-90" upper="90"', "are they in degrees"),
     ('<dynamics damping="0.01" friction="0.02"/>', '<mimic joint="hip"/>', "joint 'knee' mimics 'hip'"),
     ('value="0.03"', 'value="0"', "link 'shank' weighs nothing"),
+    ('ixx="4e-4" iyy="7e-4" izz="9e-4"', 'ixx="0" iyy="0" izz="0"', "link 'trunk' weighs 0.5 kg and has no rotational inertia"),
+    ('lower="-2" upper="2"', 'lower="0" upper="0"', "joint 'knee': its limits are equal"),
 ])
 def test_what_is_doubtful_is_told(tmp_path: Path, old: str, new: str, said: str) -> None:
     assert old in ROBOT

@@ -62,6 +62,8 @@ def test_poses_are_of_plain_numbers(tmp_path: Path, cell: str) -> None:
 def test_poses_that_are_no_degrees_or_seconds_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "radians.csv").write_text("time,blb\n0,0\n1,0.5\n2,0\n")
     assert "radians" in succeeds(capsys, "inspect", str(tmp_path / "radians.csv"))
+    (tmp_path / "counts.csv").write_text("time,blb\n0,512\n1,600\n2,512\n")
+    assert "counts" in succeeds(capsys, "inspect", str(tmp_path / "counts.csv"))
     (tmp_path / "ms.csv").write_text("time,blb\n0,0\n400,10\n800,0\n")
     assert "a slip" in succeeds(capsys, "inspect", str(tmp_path / "ms.csv"))
     assert "--yes" in refused(capsys, "simulate", str(tmp_path / "ms.csv"), "--out", str(tmp_path / "out"))

@@ -113,6 +113,9 @@ def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
     if np.abs(motion.angles).max() < FILES.smallest_motion and np.ptp(motion.angles) > 0:
         most = np.rad2deg(np.abs(motion.angles).max())
         out.append(f"no joint leaves {most:.2g} deg: are the angles in radians? (a table has degrees)")
+    if np.abs(motion.angles).max() > FILES.largest_angle:
+        most = np.rad2deg(np.abs(motion.angles).max())
+        out.append(f"a joint goes to {most:.4g} deg from its servo's centre: are the angles in counts? (a table has degrees)")
     try:
         motion.as_table()
     except InputError as e:

@@ -38,6 +38,8 @@ class FileLimits:
     """Of a prediction: hours at any camera's rate."""
     smallest_motion: float = radians(1.6)
     """No motion of a robot is as small [rad]; in radians, it is a right angle."""
+    largest_angle: float = radians(200.0)
+    """No servo's goal lies as far from its centre [rad]."""
     longest: float = 600.0
     """A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
     fewest_frames: int = 20

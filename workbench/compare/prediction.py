@@ -1,4 +1,4 @@
-"""A model foretells takes that nobody has shown it (contract, sections 1, 3 and 5)."""
+"""A model foretells takes that nobody has shown it (docs/formats.md, sections 1, 3 and 5)."""
 
 from __future__ import annotations
 

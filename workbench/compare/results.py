@@ -1,4 +1,4 @@
-"""What a comparison found, and the `comparison.json` of it (contract, section 6)."""
+"""What a comparison found, and the `comparison.json` of it (docs/formats.md, section 6)."""
 
 from __future__ import annotations
 

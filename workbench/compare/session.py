@@ -1,4 +1,4 @@
-"""The session file: one robot, one day of recordings (contract, section 1)."""
+"""The session file: one robot, one day of recordings (docs/formats.md, section 1)."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from workbench.robot.yaml_file import yaml_text
 
 
 def write_session(folder: Path, model: RobotModel, takes: Sequence[Mapping[str, Any]], registers: str | None = None) -> Path:
-    """Writes session.yaml (contract, section 1), whole or not at all. takes: as they stand there, files relative to the folder;
-    registers: the file's name. The model's effects are left out: the robot is taken for the nominal one."""
+    """Writes session.yaml (docs/formats.md, section 1), whole or not at all. takes: as they stand there, files relative to the
+    folder; registers: the file's name. The model's effects are left out: the robot is taken for the nominal one."""
     description = model.description if model.description.startswith("package://") else str(model.path)
     robot: dict[str, Any] = {"model": description, "base": model.base}
     if model.servos:

@@ -131,7 +131,7 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
 
 
 def _available(servo: ServoConstants, torque: Array, speed: Array) -> Array:
-    """Largest torque (N,) [N m] in the direction of `torque` at a joint speed [rad/s] (contract, section 4).
+    """Largest torque (N,) [N m] in the direction of `torque` at a joint speed [rad/s] (docs/formats.md, section 4).
 
     Full duty less back-EMF; where the load drives the joint backwards, the gearbox's friction helps to hold it.
     """

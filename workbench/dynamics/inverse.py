@@ -41,6 +41,16 @@ class _Solution:
     support: Array
 
 
+@dataclass(frozen=True)
+class _Spreads:
+    """Standard deviations from the measurement's noise: of link torque (N, n), residual (N, 6), and both margins (N, n)."""
+
+    torque: Array
+    residual: Array
+    torque_left: Array
+    speed_left: Array
+
+
 class InverseDynamics:
     """Inverse dynamics of one robot. Builds its plant once; not for several threads at a time.
 
@@ -70,7 +80,8 @@ class InverseDynamics:
         trajectory, problems = self._completed(trajectory)
         solution = self._solve(trajectory, self._dearness(trajectory, stance, floor))
         N, n = trajectory.q.shape
-        return self._result(name, trajectory, solution, np.zeros((N, n)), np.zeros((N, 6)), problems)
+        none = np.zeros((N, n))
+        return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
     def of_motion(self, motion: Motion, cycles: int = 1, step: float = 1 / 240) -> InverseDynamicsResult:
         """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled every `step` s) on a fixed base.
@@ -115,18 +126,22 @@ class InverseDynamics:
         if take.q_sigma is not None:
             given = self._columns(take.joints, take.q_sigma, np.nan)
             sigma = np.where(np.isfinite(given), given, sigma)
-        torque_spread, residual_spread = np.zeros_like(q), np.zeros((len(take), 6))
+        margins = self._margins(solution, trajectory)
+        torque, residual = np.zeros_like(q), np.zeros((len(take), 6))
+        torque_left, speed_left = np.zeros_like(q), np.zeros_like(q)
         random = np.random.default_rng(0)
         for _ in range(draws):
             turned = _turned(quat, _normal(random, np.full(p.shape, noise.rotation)))
             moved = p + _normal(random, np.tile(noise.p, (len(take), 1)))
             noisy = smoothed(take.time, self.model.joints, q + _normal(random, sigma), moved, turned, window)[0]
             other = self._solve(noisy, dear)
-            torque_spread += (other.torque - solution.torque) ** 2 / draws
-            residual_spread += (other.residual - solution.residual) ** 2 / draws
+            torque += (other.torque - solution.torque) ** 2 / draws
+            residual += (other.residual - solution.residual) ** 2 / draws
+            for sum_, here, there in zip((torque_left, speed_left), margins, self._margins(other, noisy)):
+                sum_ += (there - here) ** 2 / draws
         pool = max(1, round(window / float(np.median(np.diff(take.time))))) if len(take) > 1 else 1
-        spreads = _pooled(torque_spread, pool), _pooled(residual_spread, pool)
-        return self._result(take.name, trajectory, solution, *spreads, problems)
+        spreads = _Spreads(*(_pooled(variance, pool) for variance in (torque, residual, torque_left, speed_left)))
+        return self._result(take.name, trajectory, solution, spreads, problems)
 
     # ---- the equations -----------------------------------------------------------------------------------------------------
 
@@ -151,11 +166,20 @@ class InverseDynamics:
         floors = floor_under(places, points) if floor is None else np.full(len(points.feet), float(floor))
         return dearness(places, self.machine.velocities(trajectory, places), points, floors, stance)
 
-    def _result(self, name: str, trajectory: RobotTrajectory, solution: _Solution, torque_sigma: Array, residual_sigma: Array,
+    def _motor(self, solution: _Solution, trajectory: RobotTrajectory) -> Array:
+        return motor_torque(self._servos, solution.torque, trajectory.v, trajectory.a, self.servo_friction)
+
+    def _margins(self, solution: _Solution, trajectory: RobotTrajectory) -> tuple[Array, Array]:
+        """What is left of torque [N m] and speed [rad/s], (N, n) each."""
+        return (torque_margin(self._servos, self._motor(solution, trajectory), trajectory.v),
+                speed_margin(self._servos, trajectory.v))
+
+    def _result(self, name: str, trajectory: RobotTrajectory, solution: _Solution, sigma: _Spreads,
                 problems: list[str]) -> InverseDynamicsResult:
-        motor = motor_torque(self._servos, solution.torque, trajectory.v, trajectory.a, self.servo_friction)
-        torque_left, speed_left = torque_margin(self._servos, motor, trajectory.v), speed_margin(self._servos, trajectory.v)
-        loads = {j: servo_load(s, motor[:, i], torque_left[:, i], speed_left[:, i])
+        motor = self._motor(solution, trajectory)
+        torque_left, speed_left = self._margins(solution, trajectory)
+        columns = motor, torque_left, speed_left, sigma.torque_left, sigma.speed_left
+        loads = {j: servo_load(s, *(values[:, i] for values in columns))
                  for i, (j, s) in enumerate(zip(self.model.joints, self._servos))}
         if self.machine.left_out:
             problems.append(f"{', '.join(self.machine.left_out)}: not in the inverse dynamics; only effects on masses are")
@@ -165,7 +189,7 @@ class InverseDynamics:
             name=name, base=self.base, time=trajectory.time, joints=self.model.joints,
             q=trajectory.q, v=trajectory.v, a=trajectory.a, torque=solution.torque, motor_torque=motor,
             contact=contact, base_wrench_residual=solution.residual, support=solution.support,
-            torque_margin=torque_left, speed_margin=speed_left, torque_sigma=torque_sigma, residual_sigma=residual_sigma,
+            torque_margin=torque_left, speed_margin=speed_left, torque_sigma=sigma.torque, residual_sigma=sigma.residual,
             loads=loads, problems=tuple(problems))
 
     def _pair_friction(self, friction: float | None) -> Array:

@@ -18,7 +18,7 @@ from workbench.dynamics.trajectory import RobotTrajectory
 from workbench.effects.apply import physics_of, resolved
 from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, InputError, RobotModel
-from workbench.robot.kinematics import rotation_about
+from workbench.robot.kinematics import cross, rotation_about
 
 Array = NDArray[np.float64]
 
@@ -120,17 +120,17 @@ class Machine:
     def velocities(self, trajectory: RobotTrajectory, places: Array) -> Array:
         """Velocities in W (N, C, 3) [m/s] of the links' material at the feet's places (N, C, 3) [m]."""
         omega, v = trajectory.V_WB[:, None, :3], trajectory.V_WB[:, None, 3:]
-        out = v + np.cross(omega, places - trajectory.p_WB[:, None])
+        out = v + cross(omega, places - trajectory.p_WB[:, None])
         for k, carried, origin, axis in self._axes(trajectory):
             turning = (axis * trajectory.v[:, k, None])[:, None]
-            out[:, carried] += np.cross(turning, places[:, carried] - origin[:, None])
+            out[:, carried] += cross(turning, places[:, carried] - origin[:, None])
         return np.asarray(out)
 
     def torque_of(self, trajectory: RobotTrajectory, places: Array, forces: Array) -> Array:
         """Joint torques (N, n) [N m] that contact forces (N, C, 3) [N] in W at places (N, C, 3) [m] amount to: J' f."""
         out = np.zeros((len(trajectory.time), len(self.joints)))
         for k, carried, origin, axis in self._axes(trajectory):
-            moment = np.cross(places[:, carried] - origin[:, None], forces[:, carried]).sum(axis=1)
+            moment = cross(places[:, carried] - origin[:, None], forces[:, carried]).sum(axis=1)
             out[:, k] = np.sum(axis * moment, axis=1)
         return out
 

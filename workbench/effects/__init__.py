@@ -1,1 +1,1 @@
-"""Physics beyond the nominal model: one file for each effect of the contract, section 7."""
+"""Physics beyond the nominal model: one file for each effect of docs/formats.md, section 7."""

@@ -30,18 +30,19 @@ def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands
         return commands
     if len(columns) == len(commands.joints):
         return replace(commands, times=commands.times + late, end=commands.end + late)
-    times = np.union1d(commands.times, commands.times + late)
-    shift = np.zeros(len(commands.joints))
-    shift[columns] = late
-    row = np.array([np.searchsorted(commands.times, times - s + 1e-9, side="right") - 1 for s in shift]).T  # (times, joints)
-    column = np.arange(len(commands.joints))
-    waiting = row < 0  # still in neutral
-    held = np.maximum(row, 0)
-    goals, speeds, enabled = (np.where(waiting, neutral, rows[held, column]) for rows, neutral in (
-        (commands.goals, 0.0), (commands.speeds, 0.0), (commands.enabled, True)))
-    poses = commands.poses[np.maximum(np.searchsorted(commands.times, times + 1e-9, side="right") - 1, 0)]
-    told = np.isin(times, commands.times)  # else instants would double with each joint that is late by a delay of its own
-    for values in (goals, speeds, enabled):
-        told[1:] |= (values[1:] != values[:-1]).any(axis=1)
-    told[0] |= not waiting[0].all()
-    return Commands(times[told], commands.joints, goals[told], speeds[told], enabled[told], commands.end + late, poses[told])
+    own = [commands.goals[:, columns], commands.speeds[:, columns], commands.enabled[:, columns]]
+    changes = np.zeros(len(commands.times), dtype=bool)  # else instants double with each joint
+    for values, neutral in zip(own, (0.0, 0.0, True)):
+        changes |= (values != np.vstack([np.full_like(values[:1], neutral), values[:-1]])).any(axis=1)
+    changes[:1] |= late < 0
+    times = np.union1d(commands.times, commands.times[changes] + late)
+    now, before = (np.searchsorted(commands.times, times - s + 1e-9, side="right") - 1 for s in (0.0, late))
+    still, first, shifted = (now < 0)[:, None], np.maximum(now, 0), np.maximum(before, 0)  # still in neutral
+
+    def held(rows: np.ndarray, neutral: float) -> np.ndarray:
+        out = np.where(still, neutral, rows[first])
+        out[:, columns] = np.where(before[:, None] < 0, neutral, rows[shifted][:, columns])
+        return out
+
+    return Commands(times, commands.joints, held(commands.goals, 0.0), held(commands.speeds, 0.0),
+                    held(commands.enabled, True).astype(bool), commands.end + late, commands.poses[first])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,16 +15,19 @@ from workbench.gait.limits import Margin, allowed_rms, contact_margin, run_margi
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, as_plain, fallen, from_plain, measure
 from workbench.gait.request import Request
-from workbench.gait.rollouts import rollouts
+from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
-from workbench.gait.table import AT_ONCE, GaitTable, gait_table
+from workbench.gait.table import AT_ONCE, GaitTable, Paths, gait_table, paths_of, table_of
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import Job, SimulationConfig
 
 SECONDS, CYCLES = 2.0, 2
-"""A gait is measured over at least so long [s], and so many cycles."""
+"""A gait is measured over at least so long [s], and so many cycles, after the first: in that the heading settles, by up to 3 deg,
+which over half a metre would be told as drift."""
+LEAD = 0.03
+"""At rest before the first command [s], by which feet that stand are told from feet that do not."""
 SEARCH = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
 """While searching: 2 ms and 1 ms agree to a hundredth in speed."""
 
@@ -74,7 +77,8 @@ class Evaluator:
 
     def __init__(self, machine: GaitMachine, request: Request, draws: Sequence[RobotModel], memory: Path | None = None,
                  n_jobs: int = 2, config: SimulationConfig = SEARCH) -> None:
-        self.machine, self.request, self.n_jobs, self.config = machine, request, n_jobs, config
+        self.machine, self.request, self.config = machine, request, config
+        self._rollouts = Rollouts(n_jobs)
         self.nominal = request.on_slope(machine.model)
         self.draws = tuple(request.on_slope(d) for d in draws)
         self._memory, self._known = memory, _read(memory)
@@ -85,7 +89,7 @@ class Evaluator:
                ) -> list[Candidate]:
         """The shapes as candidates, in their order. draws: on how many of the ensemble's robots those are tried which `keep`
         (default: all that keep the limits so far) picks from what they do on the nominal robot."""
-        tables = [self._table(s) for s in shapes]
+        tables = [self._table(p) for p in paths_of(self.machine, shapes)]
         first = [t for t, margins in tables if t is not None and violation(margins) == 0.0]
         nominal = dict(zip(map(id, first), self._measures([(t, self.nominal) for t in first])))
         out = [self._candidate(t, margins, nominal.get(id(t))) for t, margins in tables]
@@ -98,14 +102,15 @@ class Evaluator:
                                                                             c.nominal, measures)
         return out
 
-    def _table(self, shape: GaitShape) -> tuple[GaitTable | None, list[Margin]]:
+    def _table(self, paths: Paths) -> tuple[GaitTable | None, list[Margin]]:
+        limits = self.request.limits
         try:
-            table = gait_table(self.machine, shape, ways=AT_ONCE)
+            table = table_of(self.machine, paths, ways=AT_ONCE, led=bool(paths.off.max() <= limits.reach))
         except InputError:
             return None, []
-        margins = table_margins(self.machine, table, self.request.limits)
+        margins = table_margins(self.machine, table, limits)
         if violation(margins) == 0.0:
-            margins.append(contact_margin(self.machine, table, self.request.limits))
+            margins.append(contact_margin(self.machine, table, limits))
         return table, margins
 
     def _candidate(self, table: GaitTable | None, margins: list[Margin], nominal: GaitMeasure | None) -> Candidate:
@@ -137,21 +142,25 @@ class Evaluator:
     def _measures(self, wanted: Sequence[tuple[GaitTable, RobotModel]]) -> list[GaitMeasure]:
         keys = [f"{table_sha256(t.start, t.cycle)[:24]} {m.sha256[:24]} {self._config}" for t, m in wanted]
         missing = {k: w for k, w in zip(keys, wanted) if k not in self._known}
-        jobs = []
-        for table, model in missing.values():
+        for as_seen in (True, False):
+            self._simulate({k: w for k, w in missing.items() if (w[1] is self.nominal) is as_seen}, as_seen)
+        return [self._known[k] for k in keys]
+
+    def _simulate(self, wanted: Mapping[str, tuple[GaitTable, RobotModel]], as_seen: bool) -> None:
+        """Into what is known, and into the memory."""
+        jobs, lines = [], []
+        for table, model in wanted.values():
             cycles = max(CYCLES, math.ceil(SECONDS / table.period))
-            end = table.start_seconds + cycles * table.period
-            jobs.append(Job(model, self.config, table.commands(cycles), end))
+            end = table.start_seconds + (1 + cycles) * table.period
+            jobs.append(Job(model, self.config, table.commands(1 + cycles), end, LEAD))
         self.rollouts += len(jobs)
-        lines = []
-        for (key, (table, model)), take in zip(missing.items(), rollouts(jobs, self.n_jobs)):
-            begin, period = table.start_seconds, table.period
+        for (key, (table, model)), take in zip(wanted.items(), self._rollouts.takes(jobs, as_seen)):
+            begin, period = table.start_seconds + table.period, table.period
             self._known[key] = fallen(len(model.joints)) if take is None else self._measured(take, model, begin, period)
             lines.append(json.dumps([key, as_plain(self._known[key])]) + "\n")
         if self._memory is not None and lines:
             with self._memory.open("a") as f:
                 f.writelines(lines)
-        return [self._known[k] for k in keys]
 
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.dynamics.machine import Machine
 from workbench.robot import InputError, RobotModel
-from workbench.robot.kinematics import Kinematics, rotation_about
+from workbench.robot.kinematics import Kinematics, cross, rotation_about
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,8 @@ _STEPS = 12
 """Of Newton's method; the guess is within a few degrees, so that four usually do."""
 _DAMPING = 1e-6
 """[m^2] of the least squares, so that a stretched leg gives the nearest angles and not huge ones."""
+_NEAR = 1e-7
+"""Within which a tip is where it should be [m]."""
 _STRIDE = 0.4
 """Longest step of one joint angle in one iteration [rad]."""
 
@@ -47,18 +49,22 @@ class Leg:
         """How the tip moves with the angles (N, 3, k) [m/rad]."""
         return self._place(q)[1]
 
-    def solve(self, targets: Array, bend: int) -> tuple[Array, Array]:
+    def solve(self, targets: Array, bend: Array | int) -> tuple[Array, Array]:
         """Angles (N, k) [rad] that put the tip at `targets` (N, 3) [m] in the base link's frame, other joints at zero, and how
-        far it stays from them (N,) [m]. bend: +1 the knee points back, -1 forward."""
+        far it stays from them (N,) [m]; of each target the same, whatever the others are. bend: +1 the knee points back, -1
+        forward, (N,) or for all."""
         targets = np.asarray(targets, dtype=float)
         q = self._guess(targets, bend)
+        off = np.arange(len(targets))
         for _ in range(_STEPS):
-            p, J = self._place(q)
-            error = targets - p
-            if np.abs(error).max() < 1e-7:
+            p, J = self._place(q[off])
+            error = targets[off] - p
+            far = np.abs(error).max(axis=1) >= _NEAR
+            off, error, J = off[far], error[far], J[far]
+            if not len(off):
                 break
             step = J.transpose(0, 2, 1) @ np.linalg.solve(J @ J.transpose(0, 2, 1) + _DAMPING * np.eye(3), error[..., None])
-            q = q + np.clip(step[..., 0], -_STRIDE, _STRIDE)
+            q[off] += np.clip(step[..., 0], -_STRIDE, _STRIDE)
         p, _ = self._place(q)
         return np.angle(np.exp(1j * q)), np.linalg.norm(targets - p, axis=1)
 
@@ -72,7 +78,7 @@ class Leg:
         N, k = q.shape
         p, R = np.zeros((N, 3)), np.broadcast_to(np.eye(3), (N, 3, 3))
         origins, axes = np.empty((N, k, 3)), np.empty((N, k, 3))
-        for joint in self.kinematics.chain(self.link):
+        for joint in self._chain:
             f = self.kinematics.frames[joint]
             p, R = p + R @ f.X_PF_p, R @ f.X_PF_R
             if joint in self.joints:
@@ -81,9 +87,9 @@ class Leg:
                 R = R @ rotation_about(f.axis, q[:, i])
             p, R = p + R @ f.X_MB_p, R @ f.X_MB_R
         p = p + R @ self.tip
-        return p, np.cross(axes, p[:, None] - origins).transpose(0, 2, 1)
+        return p, cross(axes, p[:, None] - origins).transpose(0, 2, 1)
 
-    def _guess(self, targets: Array, bend: int) -> Array:
+    def _guess(self, targets: Array, bend: Array | int) -> Array:
         """The last two joints as a planar pair of bones, the first turned to the side where the foot is."""
         k = len(self.joints)
         zero = np.zeros((1, k))
@@ -102,6 +108,10 @@ class Leg:
             slope = np.einsum("ni,ni->n", J[..., column], J[..., column])
             q[:, column] += np.einsum("ni,ni->n", J[..., column], targets - p) / np.maximum(slope, 1e-6)
         return q
+
+    @cached_property
+    def _chain(self) -> list[str]:
+        return self.kinematics.chain(self.link)
 
     @cached_property
     def _origins(self) -> list[Array]:

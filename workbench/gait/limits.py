@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -125,8 +126,9 @@ def binding(margins: Iterable[Margin]) -> Margin | None:
 
 
 def violation(margins: Iterable[Margin]) -> float:
-    """Sum of what limits are exceeded by, as shares of them; 0 where all are kept."""
-    return sum(max(min(m.use, 1e3) - 1.0, 0.0) for m in margins if not m.advice)
+    """Sum of how many times, as a logarithm, limits are exceeded; 0 where all are kept. Of logarithms, since a drift of ten times
+    the limit is not ten times as far from a good gait as one of twice the limit."""
+    return sum(math.log(min(m.use, 1e3)) for m in margins if m.use > 1.0 and not m.advice)
 
 
 def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False) -> Margin:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,6 +48,12 @@ class GaitMachine:
         return joint_ranges(self.model)
 
     @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """The ranges' ends (n,), (n,) [rad], in the model's order of joints."""
+        ranges = [self.ranges[j] for j in self.model.joints]
+        return np.array([r.lower for r in ranges]), np.array([r.upper for r in ranges])
+
+    @cached_property
     def law(self) -> ServoLaw:
         """The servos' law, effects included."""
         return physics_of(self.model).law
@@ -75,15 +82,24 @@ class GaitMachine:
     def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Joint angles (N, n) [rad] that put the feet on the shape's path at phases (N,), joints outside legs at zero; how far
         each foot stays from it (N, F) [m]; and which feet should stand (N, F)."""
-        path = foot_path(shape, self.legs, phases, size)
-        q = np.zeros((len(phases), len(self.model.joints)))
-        off = np.empty(path.stance.shape)
+        return self.angles_of([(shape, phases, size)])[0]
+
+    def angles_of(self, wanted: Sequence[tuple[GaitShape, Array, Array | float]]
+                  ) -> list[tuple[Array, Array, NDArray[np.bool_]]]:
+        """`angles` of many shapes at once: the same, in a fraction of the time."""
+        if not wanted:
+            return []
+        paths = [foot_path(shape, self.legs, phases, size) for shape, phases, size in wanted]
+        places = np.concatenate([path.p for path in paths])
+        q, off = np.zeros((len(places), len(self.model.joints))), np.empty(places.shape[:2])
         middle = float(np.mean([leg.neutral[0] for leg in self.legs]))
         for i, leg in enumerate(self.legs):
-            bend = shape.knees[0] if leg.neutral[0] > middle else shape.knees[1]
-            q_leg, off[:, i] = leg.solve(path.p[:, i], bend)
+            end = 0 if leg.neutral[0] > middle else 1
+            bend = np.repeat([shape.knees[end] for shape, _, _ in wanted], [len(path.p) for path in paths])
+            q_leg, off[:, i] = leg.solve(places[:, i], bend)
             q[:, [self.model.joints.index(j) for j in leg.joints]] = q_leg
-        return q, off, path.stance
+        ends = np.cumsum([len(path.p) for path in paths])
+        return [(q[b - len(path.p):b], off[b - len(path.p):b], path.stance) for path, b in zip(paths, ends)]
 
     def droop(self, shape: GaitShape, q: Array, stance: NDArray[np.bool_]) -> Array:
         """What the reference must be ahead of the joints (P, n) [rad], so that the servos' duty gives what the gait takes at its

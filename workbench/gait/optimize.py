@@ -37,6 +37,16 @@ MEMORY = ".rollouts.jsonl"
 """Where a folder remembers what its searches have simulated."""
 
 
+IN_HAND = 0.02
+"""By which a search goes beyond the speed asked for: twice what 2 ms and 1 ms differ by."""
+DRIFT_SHARE = 0.6
+"""Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
+FIRST_LOOK = Budget(seeds=80, generations=6, robust=0, draws=0)
+"""Beside a refusal: what works instead, in half a minute."""
+BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5)
+"""How the nearest table beside a refusal is examined at most, so that a refusal comes within a minute."""
+
+
 @dataclass(frozen=True)
 class OptimizeOptions:
     """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start from;
@@ -69,11 +79,11 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     ends in the same table."""
     impossible = out_of_reach(machine, request)
     if impossible is not None:
-        return Optimized(request, False, f"cannot be met by any gait: {impossible}", None, None, None)
+        return _instead(machine, request, impossible, ensemble, options, progress, other)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
         draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
-        evaluator = Evaluator(machine, request, draws, memory, options.n_jobs)
+        evaluator = Evaluator(machine, sought(request), draws, memory, options.n_jobs)
         if options.planned:
             progress("planning seeds", 0.0)
         planned = planned_seeds(machine, request) if options.planned else ()
@@ -87,9 +97,36 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
             "ensemble_sha256": ensemble.sha256, "generations": found.generations, "rollouts": found.rollouts,
             "searched in": round(time.monotonic() - began, 1)}
-        certified = certify(machine, request, table, fresh, options.certify, progress, provenance, other)
+        examined = options.certify if found.best.good else _briefly(options.certify)
+        certified = certify(machine, request, table, fresh, examined, progress, provenance, other)
     met = found.best.good and certified.certificate.kept
     return Optimized(request, met, "" if met else _unmet(request, found, certified), table, certified, found)
+
+
+def _briefly(options: CertifyOptions) -> CertifyOptions:
+    """No more than BRIEFLY."""
+    least = {f: min(getattr(options, f), getattr(BRIEFLY, f)) for f in ("draws", "checked", "seconds", "floor_seconds")}
+    return replace(options, **least)
+
+
+def sought(request: Request) -> Request:
+    """What a search is asked, so that its gait keeps the request in the certificate's longer and finer runs, too."""
+    speed = None if request.speed is None else request.speed * (1 + IN_HAND)
+    return replace(request, speed=speed, limits=replace(request.limits, drift=DRIFT_SHARE * request.limits.drift))
+
+
+def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
+             progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
+    """Of a speed that no gait has: the nearest table, after a first look for the fastest. Up a slope on which nothing stands
+    there is none."""
+    said = f"cannot be met by any gait: {impossible}"
+    if impossible.name == "slope":
+        return Optimized(request, False, said, None, None, None)
+    look = replace(options, budget=FIRST_LOOK, certify=_briefly(options.certify))
+    nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
+    if nearest.found is not None and nearest.found.best.good:
+        said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
+    return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
 
 
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:

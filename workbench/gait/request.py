@@ -18,6 +18,8 @@ Aim = Literal["speed", "gentleness", "energy", "smoothness"]
 
 STANDING = 0.03
 """Speed [m/s] that a turn in place may have."""
+SLOWEST = 0.02
+"""Speed [m/s] from which drift is told by distance: a gait that stands has none to tell."""
 ROBUST = 0.6
 """Share of the speed asked for that the worse half of the draws must keep on average."""
 SHARE_FALLEN = 0.1
@@ -85,8 +87,13 @@ class Request:
         """Change of heading by distance that was not asked for [rad/m]; of a turn, 0."""
         if self.way == "turn":
             return 0.0
-        path = max(abs(self.progress(m)), 0.02)
-        return m.turn_rate / path - (0.0 if self.radius is None else 1 / self.radius)
+        return self.excess_turning(m) / max(abs(self.progress(m)), SLOWEST)
+
+    def excess_turning(self, m: GaitMeasure) -> float:
+        """Turning that was not asked for [rad/s], to the left; of a turn, 0."""
+        if self.way == "turn":
+            return 0.0
+        return m.turn_rate - (0.0 if self.radius is None else max(abs(self.progress(m)), SLOWEST) / self.radius)
 
     def wanted(self, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:
         """Whether the speed is there, on the nominal robot and over draws; whether draws fall or wander."""

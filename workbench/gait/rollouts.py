@@ -2,28 +2,56 @@
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from workbench.recording.take import Take
 from workbench.simulation import Job, simulate_batch
-from workbench.simulation.compiled import NotCoveredError, covers, run_compiled
+from workbench.simulation.compiled import CompiledJob, NotCoveredError, covers
+
+KEPT = 64
+"""Robots whose arrays and pose at rest are kept: an ensemble and the nominal one, with room."""
 
 
-def rollouts(jobs: Sequence[Job], n_jobs: int = 2) -> Iterator[Take | None]:
-    """The take of each job, in their order; None where the compiled station gave up because something other than a foot touched
-    the floor, or two links each other. Jobs whose kind it does not cover are Drake's."""
-    if not jobs:
-        return
-    if covers(jobs[0]) is not None:  # the kind is the same for all: engine, contact, step
-        yield from simulate_batch(jobs, n_jobs)
-        return
-    with ThreadPoolExecutor(n_jobs) as threads:
-        yield from threads.map(_take, jobs)
+class Rollouts:
+    """Plays gaits on robots again and again; what does not depend on the gait is worked out once for each robot."""
+
+    def __init__(self, n_jobs: int = 2) -> None:
+        self.n_jobs = n_jobs
+        self._robots: OrderedDict[str, CompiledJob] = OrderedDict()
+
+    def takes(self, jobs: Sequence[Job], as_seen: bool = True) -> Iterator[Take | None]:
+        """The take of each job, in their order; None where the compiled station gave up because something other than a foot
+        touched the floor, or two links each other. Jobs whose kind it does not cover are Drake's. as_seen: as in
+        `CompiledJob.take`."""
+        if not jobs:
+            return
+        if covers(jobs[0]) is not None:  # the kind is the same for all: engine, contact, step
+            yield from simulate_batch(jobs, self.n_jobs)
+            return
+        prepared = [self._prepared(job) for job in jobs]
+        if self.n_jobs == 1:
+            yield from (_take(job, as_seen) for job in prepared)
+            return
+        with ThreadPoolExecutor(self.n_jobs) as threads:
+            yield from threads.map(lambda job: _take(job, as_seen), prepared)
+
+    def _prepared(self, job: Job) -> CompiledJob | None:
+        key = f"{job.model.sha256} {job.config!r}"
+        try:
+            if key not in self._robots:
+                self._robots[key] = CompiledJob(job)
+            self._robots.move_to_end(key)
+            while len(self._robots) > KEPT:
+                self._robots.popitem(last=False)
+            return self._robots[key].of(job)
+        except NotCoveredError:
+            return None
 
 
-def _take(job: Job) -> Take | None:
+def _take(job: CompiledJob | None, as_seen: bool) -> Take | None:
     try:
-        return run_compiled(job)
+        return None if job is None else job.take(as_seen)
     except NotCoveredError:
         return None

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cma
 import numpy as np
 
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
+from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
 
+STRAYING = ("drift", "curvature off the arc")
+"""Limits that steering can keep."""
+STEERED = 2
+"""How often a gait is steered before the next generation."""
 Progress = Callable[[str, float | None], None]
 
 
@@ -22,19 +27,21 @@ class Budget:
     """How much is tried, in numbers of gaits and not in seconds, so that the same seed ends in the same table.
 
     seeds: random gaits at first. starts: the best of them, of different families or knees, from which CMA-ES goes on. population,
-    generations: of each start, on the nominal robot; then `robust` generations of the better start over `draws` robots of the
-    ensemble. width: first standard deviation in the unit cube. enough: a search for a given speed ends after so many
-    generations in a row that kept every limit.
+    generations: of each start, on the nominal robot; then `robust` generations, over `draws` robots of the ensemble, of the
+    start whose best gait does best on them. width: first standard deviation in the unit cube. enough: a search for a given speed
+    ends after so many generations in a row that kept every limit. hopeless: it ends before the ensemble comes in if the best gait
+    has less than this share of the speed, which no robust generations have been seen to make up for.
     """
 
-    seeds: int = 160
-    starts: int = 2
+    seeds: int = 100
+    starts: int = 3
     population: int = 12
-    generations: int = 10
-    robust: int = 20
+    generations: int = 12
+    robust: int = 24
     draws: int = 16
     width: float = 0.15
     enough: int = 3
+    hopeless: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -60,16 +67,12 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
     shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]
     started = run.seeded(shapes)
     runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(started)]
-    for _ in range(budget.generations):
-        for refiner in runs:
-            refiner.generation(0)
-            if run.enough():
-                break
-    if budget.robust and evaluator.draws:
-        run.forget_streak()
-        top = run.best
-        assert top is not None
-        refiner = next((r for r in runs if r.is_of(top.shape)), runs[0])
+    for k in range(budget.generations * len(runs)):
+        runs[k % len(runs)].generation(0)
+        if run.enough():
+            break
+    if budget.robust and evaluator.draws and not run.hopeless():
+        refiner = run.most_robust(runs)
         for _ in range(budget.robust):
             refiner.generation(budget.draws)
             if run.enough():
@@ -96,7 +99,7 @@ class _Run:
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
             self.progress(f"seeds {k} of {len(shapes)}{self._told()}", 0.0)
-            judged += self.evaluator.judged(shapes[k:k + 40], 0)
+            judged += steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
             self._note(judged[k:])
         out: list[Candidate] = []
         for c in sorted(judged, key=Candidate.rank):
@@ -104,19 +107,30 @@ class _Run:
                 out.append(c)
         return out[:self.budget.starts]
 
-    def note_generation(self, candidates: list[Candidate], robust: bool) -> None:
+    def note_generation(self, candidates: list[Candidate]) -> None:
         """After a generation: keeps the best, tells it."""
-        if robust and not self._robust:
-            self._robust, self.best, self.nearest = True, None, None  # what was found on the nominal robot alone counts no more
         self._note(candidates)
         self.generation += 1
         assert self.best is not None
         self._streak = self._streak + 1 if self.best.good else 0
         self.progress(f"generation {self.generation} of {self._all}{self._told()}", self.generation / self._all)
 
-    def forget_streak(self) -> None:
-        """Before the ensemble comes in."""
-        self._streak = 0
+    def most_robust(self, runs: Sequence[_Refiner]) -> _Refiner:
+        """The refiner whose best gait so far does best on the ensemble; from here on only what was tried on it counts."""
+        self.progress(f"ensemble: {len(runs)} gaits on {self.budget.draws} robots{self._told()}", None)
+        self._streak, self._robust, self.best, self.nearest = 0, True, None, None
+        tried = self.evaluator.judged([r.best.shape for r in runs], self.budget.draws)
+        self._note(tried)
+        first = min(range(len(runs)), key=lambda k: (not tried[k].draws, *tried[k].rank()))
+        self.best = self.best or tried[first]
+        return runs[first]
+
+    def hopeless(self) -> bool:
+        """Whether the speed asked for is far from what was found."""
+        asked, found = self.evaluator.request.speed, self.nearest or self.best
+        if asked is None or found is None or found.nominal is None:
+            return False
+        return self._speed(found) < self.budget.hopeless * asked
 
     def enough(self) -> bool:
         """Whether a search for a given speed may stop."""
@@ -156,26 +170,62 @@ class _Refiner:
 
     def __init__(self, run: _Run, start: Candidate, seed: int) -> None:
         self._run, self._family, self._knees = run, start.shape.family, start.shape.knees
+        self.best = start
         options = {"popsize": run.budget.population, "seed": seed, "bounds": [0.0, 1.0], "verbose": -9, "verb_log": 0,
                    "integer_variables": [], "maxiter": 10**6, "tolstagnation": 10**6, "tolfun": 0, "tolx": 0, "tolfunhist": 0}
         x0 = np.clip(run.space.point(start.shape), 0.02, 0.98)
         self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
 
-    def is_of(self, shape: GaitShape) -> bool:
-        """Whether the shape is of this refiner's family and knees."""
-        return (shape.family, shape.knees) == (self._family, self._knees)
-
     def generation(self, draws: int) -> None:
         """One generation, on the nominal robot, and its better half on `draws` more."""
         run = self._run
-        points = self._strategy.ask()
-        shapes = [run.space.shape(np.asarray(x), self._family, self._knees) for x in points]
-        judged = run.evaluator.judged(shapes, draws, _better_half if draws else None)
+        points = [np.asarray(x) for x in self._strategy.ask()]
+        judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
+        judged = steered(run.evaluator, run.space, judged)
+        if draws:
+            judged = run.evaluator.judged([c.shape for c in judged], draws, _better_half)
         order = sorted(range(len(judged)), key=lambda k: (bool(draws) and not judged[k].draws, *judged[k].rank()))
         cost = np.empty(len(judged))
         cost[order] = np.arange(len(judged))
+        if "turn" in run.space.names:
+            for x, c in zip(points, judged):
+                x[run.space.names.index("turn")] = run.space.point(c.shape)[run.space.names.index("turn")]
         self._strategy.tell(points, cost.tolist())
-        run.note_generation(judged, bool(draws))
+        run.note_generation(judged)
+        self.best = min(self.best, *judged, key=Candidate.rank)
+
+
+def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> list[Candidate]:
+    """Those that drift too much steered against it where that makes them better: how much a gait turns is known from its run, and
+    need not be searched for. First by as much as it turns, then by the secant of two runs."""
+    request, out = evaluator.request, list(candidates)
+    if "turn" not in space.names or request.way == "turn":
+        return out
+    low, high = (float(end[space.names.index("turn")]) for end in (space.low, space.high))
+    before: dict[int, Candidate] = {}
+    last = dict(enumerate(candidates))
+    for _ in range(STEERED):
+        tried = {}
+        for k, c in last.items():
+            if c.nominal is not None and not c.nominal.fell and any(m.name in STRAYING and m.use > 1 for m in c.margins):
+                tried[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
+        before = last
+        last = dict(zip(tried, evaluator.judged(list(tried.values()), 0)))
+        for k, c in last.items():
+            out[k] = min(out[k], c, key=Candidate.rank)
+    return out
+
+
+def _straight(request: Request, c: Candidate, before: Candidate | None) -> float:
+    """The `turn` with which a gait should not turn more than asked, from one run of it or two."""
+    assert c.nominal is not None
+    excess = request.excess_turning(c.nominal)
+    if before is not None and before.nominal is not None and not before.nominal.fell:
+        change = excess - request.excess_turning(before.nominal)
+        turned = c.shape.turn - before.shape.turn
+        if change * turned > 0:
+            return c.shape.turn - excess * turned / change
+    return c.shape.turn - excess * c.table.period * c.shape.duty
 
 
 def _better_half(candidates: list[Candidate]) -> list[Candidate]:

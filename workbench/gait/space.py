@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.shape import FAMILIES, KNEES, GaitShape
+from workbench.gait.table import Paths, paths_of
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ LENGTHS: Mapping[str, tuple[float, float]] = {
 SHARES: Mapping[str, tuple[float, float]] = {
     "duty": (0.40, 0.80), "sway_phase": (0.0, 1.0), "apex": (-0.25, 0.25), "lag": (-0.12, 0.12), "lead": (0.0, 1.3),
     "hurry": (0.8, 2.0)}
+TRIM = 0.06
+"""Turn in a stance [rad] by which a straight gait steers against its own drift: robots are not quite alike left and right."""
 POSES = (2.0, 8.0)
 """Half the poses in a cycle."""
 FREQUENCY = (0.7, 4.6)
@@ -28,6 +31,8 @@ FREQUENCY = (0.7, 4.6)
 PUPPY_LEG = 0.1835
 WEIGHTS: Mapping[str, float] = {"trot": 0.5, "walk": 0.15, "crawl": 0.1, "bound": 0.125, "pace": 0.125}
 """How often a seed is of each family."""
+MOST_BATCHES = 10
+"""After so many batches of twice what is wanted, a robot whose legs reach next to nothing has to do with fewer seeds."""
 
 
 @dataclass(frozen=True)
@@ -74,29 +79,42 @@ def space_of(machine: GaitMachine, request: Request) -> Space:
 
 def _strides(request: Request, length: float) -> dict[str, tuple[float, float]]:
     """Ranges of stride, side [m] and turn [rad]."""
-    along = (0.08 * length, 0.95 * length)
+    along, trim = (0.08 * length, 0.95 * length), (-TRIM, TRIM)
     little = (-0.08 * length, 0.08 * length)
     if request.way == "backward":
-        return {"stride": (-along[1], -along[0])}
+        return {"stride": (-along[1], -along[0]), "turn": trim}
     if request.way == "sideways":
         return {"stride": little, "side": (0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
     if request.way == "turn":
         return {"stride": little, "turn": (0.1, 1.2)}
     if request.radius is not None:
         return {"stride": along, "turn": (0.0, min(1.2, 2 * along[1] / request.radius))}
-    return {"stride": along}
+    return {"stride": along, "turn": trim}
 
 
 def seeds(machine: GaitMachine, request: Request, space: Space, count: int, seed: int) -> list[GaitShape]:
-    """Random shapes of all families and ways of the knees, the same for the same seed."""
+    """Random shapes of all families and ways of the knees that legs can reach, the same for the same seed."""
     rng = np.random.default_rng([seed, 10])
+    out: list[GaitShape] = []
+    for _ in range(MOST_BATCHES):
+        drawn = [_random(rng, request, space) for _ in range(max(2 * count, 20))]
+        out += [p.shape for p in paths_of(machine, drawn) if p.off.max() <= request.limits.reach and in_range(machine, p)]
+        if len(out) >= count:
+            break
+    return out[:count]
+
+
+def in_range(machine: GaitMachine, paths: Paths) -> bool:
+    """Whether no joint of a path turns farther than it can."""
+    lower, upper = machine.bounds
+    return all(bool((q >= lower).all() and (q <= upper).all()) for q in (paths.q, paths.small, paths.stand))
+
+
+def _random(rng: np.random.Generator, request: Request, space: Space) -> GaitShape:
     families, weights = list(WEIGHTS), np.array(list(WEIGHTS.values()))
     assert set(families) == set(FAMILIES)
     knees = KNEES[:1] if request.built_knees else KNEES
-    out = []
-    for _ in range(count):
-        family = str(rng.choice(families, p=weights / weights.sum()))
-        x = rng.uniform(size=len(space.names))
-        x[space.names.index("poses")] = rng.choice([0.33, 0.5, 0.67])  # 4, 6 … 12: extremes come by search
-        out.append(replace(space.shape(x, family, knees[rng.integers(len(knees))])))
-    return out
+    family = str(rng.choice(families, p=weights / weights.sum()))
+    x = rng.uniform(size=len(space.names))
+    x[space.names.index("poses")] = rng.choice([0.33, 0.5, 0.67])  # 6, 8 and 12: extremes come by search
+    return space.shape(x, family, knees[rng.integers(len(knees))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,11 +57,39 @@ class GaitTable:
 def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait", ways: tuple[int, int] = GENTLY) -> GaitTable:
     """The table of a shape, rounded to counts and milliseconds. ways: dwells [ms] from neutral to the gait's stance, and in it.
     InputError where a goal is beyond the registers."""
-    P = shape.poses
-    sizes = np.repeat([1.0, HALF, 0.0], [P, P, 1])
-    every, off, stances = machine.angles(shape, np.concatenate([shape.phases, shape.phases, [0.0]]), sizes)
-    q, small, stand, off, stance = every[:P], every[P:2 * P], every[2 * P:], off[:P], stances[:P]
-    goals = q + shape.lead * machine.droop(shape, q, stance) if shape.lead else q
+    (paths,) = paths_of(machine, [shape])
+    return table_of(machine, paths, source, ways)
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """Where a shape puts the joints: q (P, n) [rad] in the cycle, small (P, n) in the first and the last one, stand (1, n)
+    between them and neutral; off (P, F) [m]: how far feet stay from the path; stance (P, F)."""
+
+    shape: GaitShape
+    q: Array
+    small: Array
+    stand: Array
+    off: Array
+    stance: NDArray[np.bool_]
+
+
+def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
+    """Of many shapes at once."""
+    wanted = []
+    for shape in shapes:
+        sizes = np.repeat([1.0, HALF, 0.0], [shape.poses, shape.poses, 1])
+        wanted.append((shape, np.concatenate([shape.phases, shape.phases, [0.0]]), sizes))
+    return [Paths(shape, every[:shape.poses], every[shape.poses:2 * shape.poses], every[2 * shape.poses:], off[:shape.poses],
+                  stances[:shape.poses]) for shape, (every, off, stances) in zip(shapes, machine.angles_of(wanted))]
+
+
+def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tuple[int, int] = GENTLY, led: bool = True
+             ) -> GaitTable:
+    """`gait_table` of paths that are known. led: whether goals are ahead of the angles by what the inverse servo law asks; that
+    takes most of the time, and no path that feet cannot reach is worth it."""
+    shape, q, small, stand = paths.shape, paths.q, paths.small, paths.stand
+    goals = _within(machine, q, q + shape.lead * machine.droop(shape, q, paths.stance)) if led and shape.lead else q
     dwells = _dwells(shape)
     cycle = _table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
     neutral = np.zeros_like(stand)
@@ -69,7 +98,13 @@ def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait", way
              _table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
     stop = [_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
             _table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
-    return GaitTable(shape, cycle, _joined(start, source), _joined(stop, source), off, q)
+    return GaitTable(shape, cycle, _joined(start, source), _joined(stop, source), paths.off, q)
+
+
+def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
+    """Goals no farther than joints turn, unless the path itself is: what is asked beyond the angles ends there."""
+    lower, upper = machine.bounds
+    return np.clip(goals, np.minimum(q, lower + COUNT / 2), np.maximum(q, upper - COUNT / 2))
 
 
 def _dwells(shape: GaitShape) -> NDArray[np.int64]:

@@ -48,29 +48,29 @@ def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplaine
     return "partly_explained" if left or not all(f.likely for f in findings) else "explained"
 
 
-def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, standing: NamePosterior, before: Residuals, after: Residuals
+def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NamePosterior, before: Residuals, after: Residuals
             ) -> Finding:
     """Effect i of a fit, at all places that the data cannot tell apart, the likeliest first. before, after: residuals by take of
     the nominal and the fitted model."""
     c, x = fit.sizes()[i]
-    elsewhere = _elsewhere(c, standing)
+    elsewhere = _elsewhere(c, posterior)
     where = (*c.where, *(place for r in elsewhere for place in r.candidate.where))
-    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in standing.rivals
+    alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in posterior.rivals
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
     numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
     return Finding(
-        effect=c.name, where=where, confidence=standing.probability + sum(r.probability for r in elsewhere), parameters=numbers,
+        effect=c.name, where=where, confidence=posterior.probability + sum(r.probability for r in elsewhere), parameters=numbers,
         alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
         validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
 
 
-def _elsewhere(c: Candidate, standing: NamePosterior) -> list[Rival]:
+def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
     """The same effect where the data cannot tell it from this place."""
     return [
         r
-        for r in standing.rivals
-        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * standing.probability
+        for r in posterior.rivals
+        if r.candidate.name == c.name and r.probability >= CONCLUSIONS.same_elsewhere * posterior.probability
     ]
 
 
@@ -87,7 +87,7 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
         ends = np.array([values - spread, values + spread])
         unknown = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     else:
-        unknown[[k for k, held in enumerate(c.held) if not held]] = np.isinf(half)
+        unknown[[k for k, fixed in enumerate(c.fixed) if not fixed]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = CONCLUSIONS.z90 * np.maximum(
@@ -125,8 +125,8 @@ def rejected(
     unseen = any(e.uses["validate"].any() for e in evidence)
     kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
-    for c, standing in zip(fit.effects, posteriors):
-        for rival in standing.rivals:
+    for c, posterior in zip(fit.effects, posteriors):
+        for rival in posterior.rivals:
             if rival.candidate.key not in kept and rival.fit is not None:
                 left = change(evidence, rival.candidate.where, before, rival.fit.residuals, "validate") if unseen else None
                 out[rival.candidate.key] = Rejected(rival.candidate.name, rival.candidate.where,
@@ -195,7 +195,7 @@ def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     """Of all numbers in the contract's units; variances by the local slope between a size and its value. read_off: effects of one
-    number that no fit told."""
+    number that no fit identified."""
     if not fit.effects and not read_off:
         return Posterior()
     names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))

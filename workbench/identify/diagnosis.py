@@ -160,24 +160,26 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
                  unreadable: LeftOut, progress: Progress, began: float) -> DiagnosisResult:
     """Steps 4 to 6 of servo logs, by evidence."""
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
-    told = explain(evaluator, known, pool, progress)
-    fitted = told.model
+    explained = explain(evaluator, known, pool, progress)
+    fitted = explained.model
     progress("rolling out the fitted model", None)
     steps = (2 * PROBLEM.fine, PROBLEM.fine)
     longer, after = evaluator.residuals([RolloutRequest(fitted, everywhere, step) for step in steps])
     floors = {i: np.nan_to_num(rms((longer[i] - after[i])[evidence[i].moving])) for i in everywhere}
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
-                  for m in build.measured), *(m.finding() for m in missed), *told.findings(evidence, nominal.residuals, after))
+                  for m in build.measured), *(m.finding() for m in missed),
+                *explained.findings(evidence, nominal.residuals, after))
     left = left_over(evidence, after, floors)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(findings or left), findings, left),
         model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
-        findings=findings, rejected=told.losers(), unexplained=left, posterior=Posterior() if missed else told.posterior(),
+        findings=findings, rejected=explained.losers(), unexplained=left,
+        posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - began)
         | {"seed": 0, "rollouts": evaluator.rollouts},
-        left_out=unreadable + seen.left_out, recalibrated=told.recalibrated)
+        left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
-    return DiagnosisResult(diagnosis, reports, told.ties(), observation_models(evidence))
+    return DiagnosisResult(diagnosis, reports, explained.ties(), observation_models(evidence))
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:

@@ -21,12 +21,12 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
     """The entries, the largest first.
 
     A joint is booked in the layer that its residual speaks of: timing where it goes with a lag that grows, or that most joints
-    share; structure where it lies across the servo's axis; ground where it is well with the base held; else actuator. The body is
+    share; structure where it lies across the servo's axis; ground where it is well on a fixed base; else actuator. The body is
     booked where no joint explains it: as inertia where it leans or sinks, as ground where it goes or turns another way.
     """
     ill = {i: channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)}
-    held = [i for i, e in enumerate(evidence) if e.take.spec.base == "fixed"]
-    ill_when_held = {joint_of(c) for i in held for c in ill[i]}
+    fixed = [i for i, e in enumerate(evidence) if e.take.spec.base == "fixed"]
+    ill_when_fixed = {joint_of(c) for i in fixed for c in ill[i]}
     rows: list[tuple[float, GapEntry]] = []
     for i, e in enumerate(evidence):
         joints = {c: s for c, s in ill[i].items() if c not in BODY}
@@ -35,12 +35,13 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
         for c, size in ill[i].items():
             if c in BODY and worst > size:
                 continue
-            if c not in BODY and held and i not in held and joint_of(c) not in ill_when_held and size < PROBLEM.follows * worst:
+            only_on_the_ground = bool(fixed) and i not in fixed and joint_of(c) not in ill_when_fixed
+            if c not in BODY and only_on_the_ground and size < PROBLEM.follows * worst:
                 continue
             column = e.channels.index(c)
             floor, unit = in_file_units(float(e.sigma[column]), c)
             raw = ratios(e, residuals[i])[c]
-            layer = layer_of(c, c in late, bool(held) and i not in held and joint_of(c) not in ill_when_held)
+            layer = layer_of(c, c in late, only_on_the_ground)
             rows.append((size, GapEntry(layer=layer, where=() if c in BODY else (joint_of(c),), take=e.name,
                                         when=_when(e, residuals[i][:, column]), error=raw * floor, floor=floor, unit=unit,
                                         phase=_phase(e, residuals[i][:, column], c))))
@@ -48,7 +49,7 @@ def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> 
 
 
 def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
-    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is held."""
+    """Of a channel's gap. late: a lag that most joints share; only_on_the_ground: the joint is well while the base is fixed."""
     if channel in BODY:
         return "inertia" if channel in ("height", "roll", "pitch") else "ground"
     if ACROSS in channel:
@@ -93,7 +94,7 @@ def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
 
 
 def _phase(e: TakeEvidence, residual: Array, channel: str) -> str:
-    """Stance or swing of the joint's leg on the ground, moving or holding with the base held: where the error is at least twice
+    """Stance or swing of the joint's leg on the ground, moving or holding on a fixed base: where the error is at least twice
     as strong; empty where both alike."""
     if channel in BODY:
         return ""

@@ -34,9 +34,9 @@ class ProblemOptions:
     uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")
     """What each of consecutive stretches is for: two are fitted, one decides, one validates."""
     part: float = 0.1
-    """Length of a part [s]: with the base held, a joint forgets within one."""
+    """Length of a part [s]: on a fixed base, a joint forgets within one."""
     parts: int = 3
-    """With the base held, every so many parts of what does not validate, one decides: a joint may meet its stop but once."""
+    """On a fixed base, every so many parts of what does not validate, one decides: a joint may meet its stop but once."""
     deciding_part: int = 1
     """Which of these."""
     least_body_sigma: tuple[float, ...] = (1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004)
@@ -62,7 +62,7 @@ class ProblemOptions:
     piece: float = 12 * 0.4
     """What that part grows by [s]: three times the stretches of all uses."""
     starved: float = 0.1
-    """Share of what a channel lacks with the base held below which the frames that decide show too little of it."""
+    """Share of what a channel lacks on a fixed base below which the frames that decide show too little of it."""
     heavy: float = 0.15
     """Share of the robot's mass from which on a link's centre of mass is a candidate: of lighter ones it hardly shows."""
     most_stretches: int = 10_000
@@ -111,7 +111,7 @@ class ReadOffOptions:
     dropped_explains: float = 0.5
     """Share of a joint's gap that its dropped commands must explain."""
     dropped_explains_free: float = 0.8
-    """The same where none was dropped with the base held: on the ground a joint may be kept from going."""
+    """The same where none was dropped on a fixed base: on the ground a joint may be kept from going."""
     dropped_probability: float = 0.95
     """Probability that commands were dropped where they explain that much."""
     least_step: float = math.radians(2.0)
@@ -175,23 +175,23 @@ class FitOptions:
     converged: float = 3e-3
     """A fit ends where a step takes less than this share off the sum of squares."""
     refit_steps: int = 3
-    """Steps of a fit of effects that fixed-base takes told before."""
+    """Steps of a fit of effects that fixed-base takes identified before."""
     against: float = 100.0
-    """Chi squared by which fixed-base takes must speak against what walks make of a number."""
+    """Chi squared by which fixed-base takes must speak against what floating-base takes make of a number."""
     least_gain: float = 150.0
     """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds
     that is half its noise: engines, and a robot and its model, differ by as much."""
     finer: float = 0.5
-    """Time step, in search steps, for the last slopes of several numbers that walks tell: what a load's height does is less than
-    what a coarse step makes of it."""
+    """Time step, in search steps, for the last slopes of several numbers that floating-base takes identify: what a load's height
+    does is less than what a coarse step makes of it."""
     finer_steps: int = 3
     """Steps of that fit."""
     overdispersion_free: float = 60.0
-    """What differences of chi squared are divided by where walks tell: neighbouring frames err alike, engines differ, and fits of
-    the same effect that begin elsewhere end some hundreds apart there."""
+    """What differences of chi squared are divided by where floating-base takes identify: neighbouring frames err alike, engines
+    differ, and fits of the same effect that begin elsewhere end some hundreds apart there."""
     contact_error: float = 0.06
-    """Standard deviation, as a share of a number, that contact adds where a walk tells it: engines, and robots, differ by
-    that."""
+    """Standard deviation, as a share of a number, that contact adds where a floating-base take identifies it: engines, and
+    robots, differ by that."""
     slope_step: float = 1e-3
     """Of a size, by which a slope of a known function is told."""
     drift: float = 0.25

@@ -31,17 +31,17 @@ class Candidate:
     where: tuple[str, ...]
     neutral: tuple[float, ...]
     typical: tuple[float, ...]
-    held: tuple[bool, ...]
+    fixed: tuple[bool, ...]
     reach: float = math.inf
     options: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,
-           held: Sequence[bool] | None = None, options: tuple[str, ...] = ()) -> Self:
+           fixed: Sequence[bool] | None = None, options: tuple[str, ...] = ()) -> Self:
         """neutral: of all the effect's numbers; typical: of those that it has here, default the effect's own."""
         given = [(p, n) for p, n in zip(_by_number(effect.parameters), neutral) if p.option in ("", *options)]
         own = tuple(p.typical_beside(n) for p, n in given)
-        return cls(effect, where, tuple(n for _, n in given), tuple(typical or own), tuple(held or (False,) * len(own)),
+        return cls(effect, where, tuple(n for _, n in given), tuple(typical or own), tuple(fixed or (False,) * len(own)),
                    options=options)
 
     @property
@@ -75,17 +75,17 @@ class Candidate:
     @property
     def size(self) -> int:
         """How many numbers are fitted."""
-        return self.held.count(False)
+        return self.fixed.count(False)
 
     @property
     def shapes(self) -> NDArray[np.bool_]:
         """Of the sizes, those of numbers that only shape the effect."""
-        return np.array([p.shapes for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
+        return np.array([p.shapes for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     @property
     def of_vector(self) -> NDArray[np.bool_]:
         """Of the sizes, those that are a vector's."""
-        return np.array([p.vector for p, held in zip(self.parameters, self.held) if not held], dtype=bool)
+        return np.array([p.vector for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     def magnitudes(self, x: Array) -> Array:
         """What each size is moved for a slope in shares of: a small number of a long vector, as how high a load sits, by as much
@@ -99,9 +99,9 @@ class Candidate:
         """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
-        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
-            size = 1.0 if held else next(sizes)
-            if held:
+        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+            size = 1.0 if fixed else next(sizes)
+            if fixed:
                 value = t
             elif math.isinf(n):
                 value = t / max(size, t / p.high)
@@ -112,14 +112,14 @@ class Candidate:
 
     def sizes(self, values: Sequence[float]) -> Array:
         """The sizes of finite neutral values at these numbers, in the contract's units, as far as they may go."""
-        x = [(v - n) / (t - n) for v, n, t, held in zip(values, self.neutral, self.typical, self.held) if not held]
+        x = [(v - n) / (t - n) for v, n, t, fixed in zip(values, self.neutral, self.typical, self.fixed) if not fixed]
         return np.asarray(np.clip(x, *self.bounds()))
 
     def bounds(self) -> tuple[Array, Array]:
         """Of the sizes x."""
         low, high = [], []
-        for p, n, t, held in zip(self.parameters, self.neutral, self.typical, self.held):
-            if held:
+        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+            if fixed:
                 continue
             if math.isinf(n):
                 ends = [0.0, t / p.low]
@@ -135,7 +135,7 @@ class Candidate:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
         that says where a scalar acts; one empty for an effect without numbers."""
         scalar = any(not p.vector for p in self.given)
-        fitted = [p for p, held in zip(self.parameters, self.held) if not held]
+        fitted = [p for p, fixed in zip(self.parameters, self.fixed) if not fixed]
         shown = [i for i, p in enumerate(fitted) if not p.shapes and not (scalar and p.vector)]
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
 

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:
-    """A payload of a link, from its centre of mass on; of one that only turns about an axis that is held, from that axis on."""
+    """A payload of a link, from its centre of mass on; of one that only turns about an axis that is fixed, from that axis on."""
     center = np.asarray(k.centers.get(link, np.zeros(3)), dtype=float)
     mass, position = (p.typical for p in payload.parameters)
     if not (base_is_held and len(k.chain(link)) == 1):
@@ -56,7 +56,7 @@ class PointMass(Candidate):
 
 @dataclass(frozen=True)
 class SwungMass(PointMass):
-    """A payload that swings about a held axis (in the link's frame). Gravity tells its moments about that axis, inertia how far
+    """A payload that swings about a fixed axis (in the link's frame). Gravity tells its moments about that axis, inertia how far
     away it is; nothing tells more. Sizes: doublings of that distance, and the two moments."""
 
     axis: tuple[float, float, float] = (0.0, 1.0, 0.0)

@@ -37,8 +37,8 @@ class Prepared:
 
 
 def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> Prepared:
-    """Rolls the session's model out beside each take, registers the takes against these rollouts, and puts walks back to the
-    recorded base at the beginning of each window."""
+    """Rolls the session's model out beside each take, registers the takes against these rollouts, and puts floating-base takes
+    back to the recorded base at the beginning of each window."""
     def rolled(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
         runs = [run_of(t, steadied.get(t.spec.name)) for t in these]
         return {r.name: of for r, of in zip(runs, roll_out(runs, config, progress=progress, n_jobs=n_jobs, floors=floors))}
@@ -49,7 +49,7 @@ def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConf
     registered, left_out = register_takes(session, takes, nominal, progress)
     walking = [t for t in registered if t.spec.base == "free"]
     steadied = {t.spec.name: base_states(t.recorded) for t in walking}
-    rollouts |= rolled(walking, steadied)  # held takes are judged by what they were registered with
+    rollouts |= rolled(walking, steadied)  # fixed-base takes are judged by what they were registered with
     return Prepared(gather(registered, rollouts, steadied), nominal, left_out)
 
 

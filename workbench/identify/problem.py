@@ -106,8 +106,8 @@ class TakeEvidence:
         return np.asarray(self.sigma * self.rough)
 
     def _lying_in_its_play(self, simulated: Array, model: RobotModel) -> Array:
-        """A link with play hangs free in it while the base is held: where it lay when the recording was zeroed no model knows, so
-        that it is put where the frames that are not kept for validation want it, within the play."""
+        """A link with play hangs free in it while the base is fixed: where it lay when the recording was zeroed no model knows,
+        so that it is put where the frames that are not kept for validation want it, within the play."""
         if not self.take.recorded.zeroed or self.take.spec.base != "fixed":
             return simulated
         out, used = simulated.copy(), ~self.uses["validate"]
@@ -132,12 +132,12 @@ class TakeEvidence:
             good = np.isfinite(r) & np.isfinite(slope) & used[:, None]
             s, r = np.where(good, slope, 0.0), np.where(good, r, 0.0)
             sharpness = np.sum(s * s, axis=0)
-            told = sharpness > 1.0
-            if not told.any():
+            sharp = sharpness > 1.0
+            if not sharp.any():
                 return shifted
-            by_joint = -np.sum(s * r, axis=0)[told] / sharpness[told]
+            by_joint = -np.sum(s * r, axis=0)[sharp] / sharpness[sharp]
             most = PROBLEM.late if self.start_is_free else LOOP
-            late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[told])), -most, most))
+            late = float(np.clip(late + weighted_median(by_joint, np.sqrt(sharpness[sharp])), -most, most))
             shifted = np.column_stack([np.interp(time - late, time, c) for c in simulated.T])
         return np.where(np.isfinite(simulated), shifted, np.nan)
 

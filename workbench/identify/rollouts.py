@@ -86,7 +86,7 @@ class RolloutEvaluator:
         """A rollout of every take is this much work."""
         return sum(self._length(i) for i in range(len(self.evidence)))
 
-    def walks(self, takes: Sequence[int]) -> bool:
+    def any_floating(self, takes: Sequence[int]) -> bool:
         """Whether the base is free in any of these takes."""
         return any(self.evidence[i].take.spec.base == "free" for i in takes)
 
@@ -127,13 +127,13 @@ class RolloutEvaluator:
     def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
                share: float | Array = 0.0, everywhere: bool = False) -> float:
         """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
-        has gone of it since `before`. everywhere: of walks beyond noise, as steps and contact models rarely make them as wrong as
-        they may, and of all channels, as what moves the robot shows a little in each."""
+        has gone of it since `before`. everywhere: of floating-base takes beyond noise, as steps and contact models rarely make
+        them as wrong as they may, and of all channels, as what moves the robot shows a little in each."""
         cost, expected = self.by_channel(residuals, use)
         was = cost if before is None else self.by_channel(before, use)[0]
         may_err = share * np.maximum(was - cost, 0.0)
         widths = [r.shape[1] for _, r in sorted(residuals.items())]
-        walking = np.repeat([everywhere and self.walks((i,)) for i in sorted(residuals)], widths)
+        walking = np.repeat([everywhere and self.any_floating((i,)) for i in sorted(residuals)], widths)
         noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, n) for i, n in zip(sorted(residuals), widths)])
         ill = walking | (cost > self._without_gap(residuals, cost, expected))
         return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
@@ -175,8 +175,8 @@ class RolloutEvaluator:
         return np.concatenate(cost), np.concatenate(expected)
 
     def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
-        """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a held robot no more than
-        expected, where running means alone show one."""
+        """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a robot on a fixed base no
+        more than expected, where running means alone show one."""
         most = PROBLEM.gap_ratio**2 * expected
         slight = [np.empty(0, dtype=bool)]
         for i, r in sorted(residuals.items()):
@@ -192,7 +192,7 @@ class RolloutEvaluator:
         return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
 
     def _felt(self, model: RobotModel, take: int) -> RobotModel:
-        """The model as this take can tell it: where the base is held, no floor and no mass of the base is felt."""
+        """The model as this take can tell it: where the base is fixed, no floor and no mass of the base is felt."""
         if self.evidence[take].take.spec.base != "fixed":
             return model
         felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))

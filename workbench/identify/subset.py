@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
-    """Takes of which, with the base held, another third of the frames judges where that which does shows next to nothing of what
+    """Takes of which, on a fixed base, another third of the frames judges where that which does shows next to nothing of what
     a channel lacks: a joint may meet its stop but once. residuals (N, c): of the nominal robot, by take."""
     return [_judged_fairly(e, residuals[i]) if e.take.spec.base == "fixed" and e.uses["fit"].any() else e
             for i, e in enumerate(evidence)]
@@ -99,11 +99,11 @@ def subset_used(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]
 
 def floors_everywhere(evidence: Sequence[TakeEvidence], floors: Mapping[int, Array]) -> dict[int, Array]:
     """Floors (c,) over sigma by take; of a take that was not looked at, the greatest of its channels' in others of its base."""
-    told = {i: f for i, f in floors.items() if evidence[i].until > 0}
-    out = dict(told)
-    for i in set(floors) - set(told):
+    known = {i: f for i, f in floors.items() if evidence[i].until > 0}
+    out = dict(known)
+    for i in set(floors) - set(known):
         e = evidence[i]
-        others = [dict(zip(evidence[k].channels, (f * evidence[k].sigma).tolist())) for k, f in told.items()
+        others = [dict(zip(evidence[k].channels, (f * evidence[k].sigma).tolist())) for k, f in known.items()
                   if evidence[k].take.spec.base == e.take.spec.base]
         out[i] = np.array([max((o.get(c, 0.0) for o in others), default=0.0) for c in e.channels]) / e.sigma
     return out

@@ -55,7 +55,7 @@ class Commands:
                         np.full(int(new.sum()), -1))
 
     def reference(self, t: Array) -> Array:
-        """The servos' ramped reference (N, n) [rad] at times t (N,), neutral before the first command (contract, 4)."""
+        """The servos' ramped reference (N, n) [rad] at times t (N,), at first neutral (docs/formats.md, section 4)."""
         t = np.asarray(t, dtype=float)
         reach = np.where(self.speeds > 0, self.speeds, np.inf)
         from_ = np.zeros((len(self.times), len(self.joints)))  # the reference when each command comes

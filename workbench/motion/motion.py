@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Poses at their arrival times; the first row is where the cycle closes, and is not sent (contract, section 2).
+    """Poses at their arrival times; the first row is where the cycle closes, and is not sent (docs/formats.md, section 2).
 
     times: (K,) [s], increasing, K at least 2. joints: (n,) names. angles: (K, n) [rad], zero = servo centre. speeds: (K, n)
     [rad/s] moving speeds, where they are not the travel over the dwell; the first row's count for nothing.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.leaps import without_leaps
-from workbench.recording.log_state import resolution
+from workbench.recording.log_units import UNITS, unit_problems
 from workbench.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -22,24 +22,21 @@ Array = NDArray[np.float64]
 class LogChecks:
     """When a log is doubted.
 
-    turns: servos of small robots turn less than so many times from their centre. radian_range: a robot's joints all move less
-    than so many degrees only in radians [deg]. fine: steps that no hobby servo's sensor resolves (16384 counts a turn) [deg].
-    moves: a joint that moves less tells nothing [deg]. slow: between rows of a servo's log [s]; more is another unit.
+    slow: between rows of a servo's log [s]; more is another unit.
     stands: as long as a position may repeat to the last digit while its goal goes on by `goes` [s, deg], if it then leaps by
-    more than `leaps` of its other steps; a joint that sticks sets out slowly. far: as far as a goal may go without it at the
-    end [deg].
+    more than `leaps` of its other steps; a joint that sticks sets out slowly. far: as far as a goal may be from it at the
+    end [deg]. same: share of rows in which goal and position are equal from
+    which the goal is no command; shift: by so many rows at most.
     pause: between rows, in medians of their steps. longest: a log may last [s].
     """
 
-    turns: float = 2.0
-    radian_range: float = 3.5
-    fine: float = 0.02
-    moves: float = 0.05
     slow: float = 0.5
     stands: float = 0.25
     goes: float = 5.0
     leaps: float = 3.0
-    far: float = 40.0
+    far: float = 20.0
+    same: float = 0.98
+    shift: int = 3
     pause: float = 8.0
     longest: float = 7200.0
 
@@ -56,12 +53,14 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     channels, problems = dict(recording.channels), list(recording.problems)
     for joint in recording.joints:
         name = f"position.{joint}"
-        if name in channels:
+        goal = channels.get(f"goal.{joint}")
+        if name in channels and not (goal is not None and _in_another_unit(goal)):
             channels[name], said = without_leaps(time, channels[name])
             problems += [f"{name}: {text}" for text in said]
     mended = replace(recording, channels=channels)
-    for check in (_clock, _units, _duty, _no_command, _standing):
+    for check in (_clock, _no_command, _standing):
         problems += check(mended, checks)
+    problems += unit_problems(mended)
     return replace(mended, problems=tuple(problems))
 
 
@@ -79,46 +78,23 @@ def beyond_range(recording: Recording, limits: dict[str, tuple[float, float]]) -
     return tuple(out)
 
 
+def _in_another_unit(goal: Array) -> bool:
+    """Whether goals (N,) [rad] are further than a servo goes: then the joint's leaps are none, and are told as a unit."""
+    return bool(np.isfinite(goal).any() and np.nanmax(np.abs(goal)) > 2 * np.pi * UNITS.turns)
+
+
 def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
     steps = np.diff(r.time)
     middle = float(np.median(steps))
     if middle > c.slow:
-        yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in milliseconds?"
+        unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
+        yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))
     if len(holes):
         worst = holes[np.argmax(steps[holes])]
         yield f"time: {len(holes)} pause(s) without rows, the longest {steps[worst]:.3g} s from {r.time[worst]:.3f} s"
-
-
-def _units(r: Recording, c: LogChecks) -> Iterator[str]:
-    found = {j: r.channels[f"position.{j}"] for j in r.joints if f"position.{j}" in r.channels}
-    ranges = {j: float(np.nanmax(np.abs(p))) for j, p in found.items() if np.isfinite(p).any()}
-    for joint, most in ranges.items():
-        if most > 2 * np.pi * c.turns:
-            other = "degrees" if r.units == "radians" and most < 2 * np.pi * 180 else "another unit"
-            yield f"position.{joint}: reaches {np.rad2deg(most):.0f} deg, more than {c.turns:g} turns; is it in {other}?"
-    if r.units != "degrees" or len(r.time) < 20:
-        return
-    goals = [r.channels[f"goal.{j}"] for j in r.joints if f"goal.{j}" in r.channels]
-    asked = [float(np.nanmax(np.abs(g))) for g in goals if np.isfinite(g).any()]
-    reach = np.rad2deg(max([*ranges.values(), *asked], default=0.0))
-    moving = {j: p for j, p in found.items() if np.rad2deg(np.ptp(p[np.isfinite(p)])) > c.moves} if ranges else {}
-    if moving and reach < c.radian_range and all(np.rad2deg(resolution(p)) < c.fine for p in moving.values()):
-        joint = next(iter(moving))
-        finest = np.rad2deg(resolution(moving[joint]))
-        yield (f"position.{joint}: no joint leaves {reach:.3g} deg, in steps down to {finest:.2g} deg, finer than a "
-               "servo's sensor: are the angles in radians? (a joint log has degrees)")
-
-
-def _duty(r: Recording, c: LogChecks) -> Iterator[str]:
-    for joint in r.joints:
-        duty = r.channels.get(f"duty.{joint}")
-        if duty is not None and np.isfinite(duty).any() and np.nanmax(np.abs(duty)) > 1.05:
-            most = float(np.nanmax(np.abs(duty)))
-            unit = "per cent" if most <= 100 else "a register's counts"
-            yield f"duty.{joint}: reaches {most:g}; expected -1 to 1: is it in {unit}?"
 
 
 def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
@@ -129,11 +105,23 @@ def _no_command(r: Recording, c: LogChecks) -> Iterator[str]:
         far = np.rad2deg(np.ptp(position[both]))
         if far < c.goes:
             continue
-        if np.mean(np.abs(goal - position)[both] < 1e-7) > 0.98:
-            yield f"goal.{joint}: equals position.{joint} in every row: this log holds no command, only what the joint did"
+        shift = _shift_of_equals(goal, position, c)
+        if shift is not None:
+            when = "in every row" if not shift else f"of {abs(shift)} row(s) {'before' if shift > 0 else 'later'}, throughout"
+            yield f"goal.{joint}: equals position.{joint} {when}: this log holds no command, only what the joint did"
         elif np.ptp(goal[both]) == 0 and not _comes_to(goal[both][0], position[both]):
             yield (f"goal.{joint}: stays at {np.rad2deg(goal[both][0]):.4g} deg in every row while the joint moves over "
                    f"{far:.3g} deg: was the command recorded?")
+
+
+def _shift_of_equals(goal: Array, position: Array, c: LogChecks) -> int | None:
+    """By how many rows the position comes before a goal that is equal to it to the last digit; None where it is another."""
+    for shift in sorted(range(-c.shift, c.shift + 1), key=abs):
+        a, b = goal[max(shift, 0):len(goal) + min(shift, 0)], position[max(-shift, 0):len(position) - max(shift, 0)]
+        both = np.isfinite(a) & np.isfinite(b)
+        if both.sum() >= 10 and np.mean(np.abs(a - b)[both] < 1e-7) > c.same:
+            return shift
+    return None
 
 
 def _comes_to(goal: float, position: Array) -> bool:
@@ -144,7 +132,7 @@ def _comes_to(goal: float, position: Array) -> bool:
 
 def _standing(r: Recording, c: LogChecks) -> Iterator[str]:
     for joint, goal, position, on in _commanded(r):
-        if np.mean(np.abs(goal - position) < 1e-7) > 0.98:
+        if _shift_of_equals(goal, position, c) is not None:
             continue
         for first, last in _repeats(position):
             span = slice(first, last + 1)
@@ -158,11 +146,19 @@ def _standing(r: Recording, c: LogChecks) -> Iterator[str]:
             others = np.concatenate([steps[:first], steps[last + 1:]])
             usual = float(np.nanpercentile(others, 99)) if np.isfinite(others).any() else 0.0
             leapt = last + 1 < len(position) and steps[last] > max(c.leaps * usual, np.deg2rad(2))
-            if leapt or (last + 1 == len(position) and np.rad2deg(np.ptp(inside)) > c.far):
+            if leapt or (last + 1 == len(position) and _left_behind(goal, position, first, c)):
                 yield (f"position.{joint}: repeats {np.rad2deg(position[first]):.4g} deg to the last digit for "
                        f"{r.time[last] - r.time[first]:.2f} s from {r.time[first]:.3f} s while its goal moves over "
                        f"{np.rad2deg(np.ptp(inside)):.3g} deg{', and then leaps' if leapt else ''}: the sensor stood still")
                 break
+
+
+def _left_behind(goal: Array, position: Array, first: int, c: LogChecks) -> bool:
+    """Whether a goal goes away from a joint that stands from row `first` to the end, by `far` and by `leaps` times as much as it
+    ever was before: not as of a weak servo, or one at its stop."""
+    away = np.abs(goal - position)
+    before = float(np.nanmax(away[:first], initial=0.0))
+    return bool(np.rad2deg(np.nanmax(away[first:])) > c.far and np.nanmax(away[first:]) > c.leaps * before)
 
 
 def _commanded(r: Recording) -> Iterator[tuple[str, Array, Array, NDArray[np.bool_]]]:

@@ -75,7 +75,7 @@ def read_json(path: str | Path) -> Any:
 def parse_json(path: str | Path, text: str, place: str = "") -> Any:
     """As `read_json`, of a text that stands at `place` in the file."""
     try:
-        return json.loads(text, parse_int=_bounded_int)
+        return json.loads(text, parse_int=_bounded_int, parse_float=_finite_float, parse_constant=_finite_float)
     except json.JSONDecodeError as e:
         at = place or f"line {e.lineno}, "
         raise InputError(path, f"{at}column {e.colno}: {e.msg}; expected whole JSON") from None
@@ -83,6 +83,13 @@ def parse_json(path: str | Path, text: str, place: str = "") -> Any:
         raise InputError(path, f"{place}nested too deep; expected JSON of a few levels") from None
     except OverflowError as e:
         raise InputError(path, f"{place}{e}") from None
+
+
+def _finite_float(digits: str) -> float:
+    value = float(digits)
+    if abs(value) == float("inf"):
+        raise OverflowError(f"a number beyond all bounds, '{digits[:40]}'; expected at most 1e308")
+    return value
 
 
 def _bounded_int(digits: str) -> int:

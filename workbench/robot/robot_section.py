@@ -1,4 +1,4 @@
-"""What `robot:` and `ground:` say in a YAML file (contract, section 1), of a session as of a fitted model."""
+"""What `robot:` and `ground:` say in a YAML file (docs/formats.md, section 1), of a session as of a fitted model."""
 
 from __future__ import annotations
 

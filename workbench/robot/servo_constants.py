@@ -1,4 +1,4 @@
-"""Nominal constants of a position servo (contract, section 4)."""
+"""Nominal constants of a position servo (docs/formats.md, section 4)."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ LAW_KEYS = ("compliance_slope", "compliance_margin", "punch", "proportional_gain
 
 @dataclass(frozen=True)
 class Uncertain:
-    """A number and how well it is known: value and standard deviation, in the number's own unit (contract, section 4)."""
+    """A number and how well it is known: value and standard deviation, in the number's own unit (docs/formats.md, section 4)."""
 
     value: float
     sd: float

@@ -30,7 +30,7 @@ class ServoReading:
 @dataclass(frozen=True)
 class Departure:
     """A register that is not as the model has it. nominal, found: in the unit of the law's key, or in counts. effect: the physics
-    beyond the nominal model that this is (contract, section 7), None where none says it."""
+    beyond the nominal model that this is (docs/formats.md, section 7), None where none says it."""
 
     joint: str
     key: str

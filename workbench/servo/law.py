@@ -1,4 +1,4 @@
-"""The nominal law of a position servo (contract, section 4; AX-12A manual, compliance figure), on plain arrays."""
+"""The nominal law of a position servo (docs/formats.md, section 4; AX-12A manual, compliance figure), on plain arrays."""
 
 from __future__ import annotations
 

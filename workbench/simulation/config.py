@@ -20,6 +20,7 @@ class SimulationConfig:
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
     hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
     written down; 0: 1 ms or the step, if longer. contact_period [s]: between samples of contact forces, in whole steps; 0: none.
+    boxes [m]: tallest of a field of random boxes on the floor, 0: none (`simulation.boxes`); boxes_seed: which field.
     engine: of jobs and batches: "compiled" (Drake's discrete step compiled; `simulation.compiled` says what it covers), "drake",
     or "auto", the compiled one for what it covers. A `Simulation` is always Drake's.
     """
@@ -35,6 +36,8 @@ class SimulationConfig:
     settle: float = 1.0
     log_period: float = 0.0
     contact_period: float = 1 / 120
+    boxes: float = 0.0
+    boxes_seed: int = 0
     engine: str = "auto"
 
     def __post_init__(self) -> None:

@@ -24,6 +24,7 @@ from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import ConfigureParser, InputError, RobotModel
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
+from workbench.simulation.boxes import AddBoxes
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.contact import AddGround, SelectFeet, SetFootContact
 from workbench.simulation.fast_servo import AddFastServos
@@ -62,6 +63,8 @@ def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> Ro
     if config.base == "free":
         AddGround(plant, builder.scene_graph(), instance, physics.ground)
         SetFootContact(plant, builder.scene_graph(), instance, _feet(model, physics.foot_friction), physics.foot_stiffness)
+        if config.boxes:
+            AddBoxes(plant, builder.scene_graph(), config.boxes, config.boxes_seed)
     elif config.base == "fixed" and not model.kinematics.fixed_to_world:
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(model.base, instance), RigidTransform([0, 0, 1.0]))
     elif config.base == "path":

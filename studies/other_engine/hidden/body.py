@@ -1,4 +1,4 @@
-"""The machine itself and the floor under it: effects on links, joints, feet and surroundings (contract, section 7)."""
+"""The machine itself and the floor under it: effects on links, joints, feet and surroundings (docs/formats.md, section 7)."""
 
 from __future__ import annotations
 

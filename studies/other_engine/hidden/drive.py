@@ -1,4 +1,4 @@
-"""Servos: effects on constants, and on what happens between error and joint at each instant (contract, section 7)."""
+"""Servos: effects on constants, and on what happens between error and joint at each instant (docs/formats.md, section 7)."""
 
 from __future__ import annotations
 

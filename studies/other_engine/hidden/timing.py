@@ -1,4 +1,4 @@
-"""What reaches the servos, and when: effects on commands (contract, section 7)."""
+"""What reaches the servos, and when: effects on commands (docs/formats.md, section 7)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def leaving(worn, **sizes):
 @pytest.mark.parametrize("walks", [False, True])
 def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing_elsewhere(worn, monkeypatch, walks):
     session, whole, nominal = worn
-    monkeypatch.setattr(whole.evaluator, "walks", lambda takes: walks)
+    monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: walks)
     search = Search(whole.evaluator, session.model)
     taken = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.key == ("coulomb_friction", ("three",)))
     names = whole.evaluator.evidence[0].channels
@@ -52,7 +52,7 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
 def test_on_the_ground_a_strong_effect_hides_nothing_in_channels_that_it_did_not_change(worn, monkeypatch):
     """A stop that walks told brought a million in its own joint: another effect is asked for hundredths of that there alone."""
     session, whole, nominal = worn
-    monkeypatch.setattr(whole.evaluator, "walks", lambda takes: True)
+    monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: True)
     search = Search(whole.evaluator, session.model)
     stop = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.key == ("coulomb_friction", ("three",)))
     names = whole.evaluator.evidence[0].channels
@@ -94,14 +94,14 @@ def test_of_what_all_joints_show_hundredths_may_be_left_in_all_but_not_in_one_al
     assert set(acceptance.remaining(search, now, leaving(worn, one=60.0, two=60.0, three=100.0), (0,))) == asked
 
 
-def test_on_the_ground_a_joint_is_not_too_little_beside_what_held_takes_told_of_others(worn, monkeypatch):
+def test_on_the_ground_a_joint_is_not_too_little_beside_what_fixed_base_takes_identified_of_others(worn, monkeypatch):
     session, whole, nominal = worn
     search = Search(whole.evaluator, session.model)
     fade = Candidate.of(known_effects()["thermal_fade"], (), (0.0,))
     fit = partial(leaving, worn)
     first = SelectionStep(fit(three=100.0, two=15.0), (), (CandidateFit(fade, np.ones(1), {"fit": 1e6, "choose": 1e6}, None),))
     search = search.with_settled(replace(search.evaluated([(fade, np.ones(1))]), residuals=nominal.residuals))
-    monkeypatch.setattr(whole.evaluator, "walks", lambda takes: True)
+    monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: True)
     assert not acceptance.too_little_left(search, fit(two=13.0), (0,), [first])
     assert acceptance.too_little_left(search, fit(three=13.0), (0,), [first])
     search = search.with_settled(None)
@@ -133,18 +133,18 @@ def test_what_is_well_hides_no_gap_and_closes_none(worn):
     assert evaluator.closed({0: quiet}, {0: ill}, "choose") == 0
 
 
-def test_what_held_takes_told_is_judged_on_them_alone(monkeypatch):
+def test_what_fixed_base_takes_identified_is_judged_on_them_alone(monkeypatch):
     monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
     c = Candidate.of(known_effects()["timing_drift"], (), (0.0,))
     fit = SimpleNamespace(residuals={0: np.ones(1), 1: np.ones(1)})
     for settled, looked_at in ((True, [0]), (False, [0, 1])):
-        search = SimpleNamespace(held=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
+        search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), is_settled=lambda _, s=settled: s, evaluator=SimpleNamespace(
             closed=lambda before, after, use, joint, takes=looked_at: 1.0 if list(before) == list(after) == takes else 0.0))
         r = SelectionStep(fit, (), ())
         assert acceptance.explained_at_the_end(search, r, CandidateFit(c, np.ones(1), {}, None), fit) == 1.0
 
 
-def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_not_others(monkeypatch):
+def test_what_floating_base_takes_identify_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_not_others(monkeypatch):
     monkeypatch.setattr(acceptance, "standing_out", lambda *_: set())
 
     def of(name, joint):
@@ -158,7 +158,7 @@ def test_what_walks_tell_of_a_joint_is_judged_by_its_own_gap_and_by_all_that_is_
         evaluator = SimpleNamespace(
             closed=lambda before, after, use, joint=None, without=(), of=shares: of[joint, tuple(without)]
         )
-        search = SimpleNamespace(held=(), fitted=(0,), is_settled=lambda _: False, evaluator=evaluator)
+        search = SimpleNamespace(fixed_base=(), fitted=(0,), is_settled=lambda _: False, evaluator=evaluator)
         assert acceptance.explained_at_the_end(search, SelectionStep(fit, (), ()), trial, fit) == pytest.approx(share)
 
 
@@ -174,7 +174,7 @@ def test_what_cameras_and_clocks_explain_hides_no_hundredths_of_physics():
 
 
 @pytest.mark.parametrize(("walks", "brings", "told"), [(True, 100.0, True), (True, 900.0, False), (False, 100.0, False)])
-def test_what_fine_steps_do_not_miss_is_idle_where_walks_told_it(worn, monkeypatch, walks, brings, told):
+def test_what_fine_steps_do_not_miss_is_idle_where_floating_base_takes_identified_it(worn, monkeypatch, walks, brings, told):
     session, whole, _ = worn
     search = Search(whole.evaluator, session.model)
     load = next(c for c in candidates(session.model, whole.evaluator.evidence) if c.name == "payload")

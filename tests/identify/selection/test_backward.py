@@ -18,7 +18,7 @@ FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2
 class Search(LinearSearch):
     """A step goes most of the way."""
 
-    single_joint, held = True, ()
+    single_joint, fixed_base = True, ()
 
     def refitted(self, fit, takes, steps, free=None):
         end = self.run(self.refitting(fit, takes, steps))
@@ -27,7 +27,7 @@ class Search(LinearSearch):
 
 @pytest.mark.parametrize(("single_joint", "against", "stay"), [
     (True, False, {"torque_ceiling", "payload"}), (False, False, set(FOUND)), (False, True, {"torque_ceiling", "payload"})])
-def test_a_load_takes_the_place_of_spring_and_zero_in_a_lone_joint_or_where_held_takes_gainsay_these(
+def test_a_load_takes_the_place_of_spring_and_zero_in_a_single_joint_or_where_fixed_base_takes_contradict_these(
         monkeypatch, single_joint, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
     search.single_joint = single_joint

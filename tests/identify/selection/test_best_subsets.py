@@ -9,11 +9,11 @@ from tests.gap_linear import names, trial
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import FIT
-from workbench.identify.selection.best_subsets import Seen, begun_again, best_sets, several, variants
+from workbench.identify.selection.best_subsets import Response, begun_again, best_sets, several, variants
 
 
 def seen(name, signature, size=1.0):
-    return Seen(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
+    return Response(trial(name), np.array(signature, dtype=float)[:, None], np.array([[size]]))
 
 
 def test_two_are_named_where_both_together_explain_what_neither_does_though_a_third_explains_most_alone():
@@ -49,14 +49,14 @@ def test_an_effect_seen_at_several_sizes_takes_one_place_and_its_shape_is_kept()
 
 
 def test_a_walk_and_what_one_explains_are_left_to_single_effects():
-    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: True))
+    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: True))
     assert several(search, None, [trial("backlash")], (0,), {"knee": 5.0}) == []
-    held = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: False))
+    held = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: False))
     assert several(held, None, [trial("backlash", closed=0.95)], (0,), {"knee": 5.0}) == []
     assert several(held, None, [trial("backlash")], (0,), {"heading": 5.0}) == []
 
 
-def test_pairs_that_lines_foretell_about_as_well_are_all_fitted():
+def test_pairs_that_lines_predict_about_as_well_are_all_fitted():
     """A slow clock and waits that grow with each pose look alike from afar."""
     rng = np.random.default_rng(6)
     sag, late, noise = rng.normal(size=(3, 400))

@@ -15,7 +15,7 @@ CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 class TwoWorlds:
     """A held take (0) and a walk (1); what each leaves of a ceiling's size, None being without it."""
 
-    held, fitted, settled = (0,), (0, 1), None
+    fixed_base, fitted, settled = (0,), (0, 1), None
     evaluator = SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values())))
 
     def __init__(self, held, walk, as_held_takes_tell):
@@ -46,7 +46,7 @@ def held(size):
 
 @pytest.mark.parametrize(("there", "size", "settled"), [(27500.0, 1.15, True), (35000.0, 1.42, False)],
                          ids=["walks hardly mind", "walks show less of it"])
-def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(there, size, settled):
+def test_a_number_that_fixed_base_takes_contradict_is_theirs_where_walks_hardly_mind(there, size, settled):
     search = TwoWorlds(held, lambda x: {None: 49000.0, 1.42: 25600.0, 1.15: there}[x], 1.15)
     search, fit = checked_on_fixed_base(
         search, search.evaluated([(FLOOR, np.array([0.3])), (CEILING, np.array([1.42]))]), [FLOOR, CEILING]
@@ -56,7 +56,7 @@ def test_a_number_that_held_takes_gainsay_is_theirs_where_walks_hardly_mind(ther
     assert not search.is_settled(FLOOR)
 
 
-def test_what_held_takes_do_not_gainsay_or_would_rather_not_have_stays():
+def test_what_fixed_base_takes_do_not_contradict_or_would_rather_not_have_stays():
     near = TwoWorlds(held, lambda x: {None: 49000.0, 1.2: 25600.0}[x], 1.15)
     assert checked_on_fixed_base(near, near.evaluated([(CEILING, np.array([1.2]))]), [CEILING])[1].x.tolist() == [1.2]
     never = TwoWorlds(lambda x: 26400.0 if x is None else 26800.0, lambda x: 49000.0 if x is None else 25600.0, 1.15)

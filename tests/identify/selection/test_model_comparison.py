@@ -80,7 +80,7 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
 
 
 @pytest.mark.parametrize(("single_joint", "sure"), [(False, 0.9), (True, 0.18)])
-def test_all_that_a_lone_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, single_joint, sure):
+def test_all_that_a_single_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, single_joint, sure):
     _, search, _ = worn
     monkeypatch.setattr(type(search), "single_joint", single_joint)
     monkeypatch.setattr(calibration, "SCHEDULING", replace(SCHEDULING, few=3))  # none of three may err for itself
@@ -168,7 +168,7 @@ def test_a_rival_begins_where_it_does_the_same_as_the_other(worn):
     assert seen[1] == pytest.approx(expected)
 
 
-def test_what_walks_told_is_weighed_on_all_that_was_fitted_too():
+def test_what_floating_base_takes_identified_is_weighed_on_all_that_was_fitted_too():
     """Twice as many stretches are fitted: where these say the opposite, they count as much as those that choose."""
     fit, rival = SimpleNamespace(cost={"choose": 1000.0, "fit": 2000.0}), SimpleNamespace(cost={"choose": 1100.0, "fit": 1600.0})
     assert better_by_both(fit, rival) == pytest.approx(50.0)
@@ -191,9 +191,9 @@ def test_a_name_that_only_the_price_of_its_numbers_keeps_out_stands_beside(name,
 
 @pytest.mark.parametrize(("held", "name", "told"), [(0.0, "tether_force", True), (500.0, "tether_force", False),
                                                     (0.0, "payload", False)])
-def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
+def test_a_pull_is_the_twin_of_a_tilt_that_only_floating_base_takes_identify(held, name, told):
     """Take 0 is held; chi squared of each take stands for its residuals."""
-    search = SimpleNamespace(held=(0,), fitted=(0, 1), evaluator=SimpleNamespace(
+    search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), evaluator=SimpleNamespace(
         cost=lambda residuals, use: sum(residuals.values()), expected=lambda takes, use: 1000.0))
     tilt, other = (SimpleNamespace(name=n, effect=known_effects()[n]) for n in ("ground_tilt", name))
     fit = SimpleNamespace(effects=(tilt,), residuals={0: 100.0, 1: 900.0}, cost={"choose": 1000.0})
@@ -201,10 +201,10 @@ def test_a_pull_is_the_twin_of_a_tilt_that_only_walks_tell(held, name, told):
     assert is_equivalent(search, fit, 0, rival) is told
 
 
-@pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, ODDS.walks_say), (-5000.0, -ODDS.walks_say)])
-def test_held_takes_take_the_word_first_of_what_they_told(walks, adds):
+@pytest.mark.parametrize(("walks", "adds"), [(30.0, 2.0), (5000.0, ODDS.most_from_floating), (-5000.0, -ODDS.most_from_floating)])
+def test_fixed_base_takes_take_the_word_first_of_what_they_told(walks, adds):
     """Take 0 is held, take 1 walks; chi squared of each stands for its residuals."""
-    search = SimpleNamespace(held=(0,), fitted=(0, 1), floating_base=lambda takes: (1,),
+    search = SimpleNamespace(fixed_base=(0,), fitted=(0, 1), floating_base=lambda takes: (1,),
                              evaluator=SimpleNamespace(cost=lambda residuals, use: sum(residuals.values())))
     fit, rival = SimpleNamespace(residuals={0: 100.0, 1: 9000.0}), SimpleNamespace(residuals={0: 120.0, 1: 9000.0 - walks})
     assert better_on_fixed_base(search, fit, rival) == pytest.approx(adds - 20.0)
@@ -218,7 +218,7 @@ def test_a_rival_that_was_not_fitted_has_its_numbers_all_the_same(worn):
     assert numbers_identified(replace(fit, covariance=np.diag([1.0, 1.0, 1.0, np.inf])), 0) == 3
 
 
-def test_where_nothing_stays_nothing_is_contested(worn):
+def test_where_nothing_stays_nothing_is_compared(worn):
     _, search, _ = worn
     nominal = search.evaluated([])
     _, fit, posteriors = compare_models(search, SelectionResult(search, nominal, ()), lambda what, share: None)
@@ -235,9 +235,9 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
 def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
     """A cable hangs on another joint of a robot whose joint's names are contested with the base held."""
     left = {None: 40000.0, "knee": 130.0}
-    evaluator = SimpleNamespace(expected=lambda takes, use: 100.0, walks=lambda takes: True,
+    evaluator = SimpleNamespace(expected=lambda takes, use: 100.0, any_floating=lambda takes: True,
                            by_channel=lambda residuals, use, joint: (np.array([left[joint]]), np.array([100.0])))
-    search = SimpleNamespace(fitted=(0, 1), held=(0,), evaluator=evaluator, is_settled=lambda c: False)
+    search = SimpleNamespace(fitted=(0, 1), fixed_base=(0,), evaluator=evaluator, is_settled=lambda c: False)
     fit = SimpleNamespace(cost={"choose": left[None]}, residuals={0: None, 1: None})
     knee, whole = SimpleNamespace(joint="knee", gain={"choose": 100.0}), SimpleNamespace(joint=None, gain={"choose": 100.0})
     assert dispersion(search, fit, None, knee) == pytest.approx(1.3 * ODDS.temper)
@@ -293,5 +293,5 @@ def test_what_moves_another_links_centre_of_mass_is_put_in_its_place_on_a_walk_h
     body, tail, load, foot = (trial(com, "body", 2488.0), trial(com, "tail", 1920.0), trial(mass, "tail", 1941.0),
                               trial(com, "foot", 0.0, screened_out=True))
     seats = {body.candidate.key: (SelectionStep(None, (body, load, tail, foot), (body,)), body)}
-    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: walks), fitted=(0,), is_settled=lambda c: False)
+    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: walks), fitted=(0,), is_settled=lambda c: False)
     assert [str(t.candidate) for t in rivals_near(search, seats, [body.candidate], body.candidate, body.x)] == near

@@ -87,7 +87,7 @@ def test_two_of_the_ground_take_the_place_of_a_joint_that_was_found_for_them():
     assert all("tether_force" in {t.candidate.name for t in r.trials} for r in rounds), "a pull's rivals stay, for its place"
 
 
-def test_a_load_gets_no_company_and_what_was_only_foretold_gives_none():
+def test_a_load_gets_no_company_and_what_was_only_predicted_gives_none():
     search = LinearSearch(DOES, ground_tilt=(2.0, 1.0), ground_friction=(1.5,))
     fit, seat = found(search, "payload")
     assert pair_move.with_pair(search, POOL, fit, [seat], silent) == (fit, [seat])

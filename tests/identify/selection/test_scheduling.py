@@ -39,7 +39,7 @@ def test_a_joint_stands_out_where_nothing_else_errs_a_quarter_as_much(monkeypatc
                          [("fixed", 2, False), ("free", 2, False), ("free", SCHEDULING.tiers_of_all, True)])
 def test_what_closes_most_of_a_joint_does_not_keep_links_from_being_asked_with_the_base_held(base, tier, said):
     """What a hand carries looks like a weak shoulder."""
-    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"), floating_base=lambda takes: ())
+    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"), floating_base=lambda takes: ())
     shoulder = Candidate.of(known_effects()["servo_gain"], ("one",), (1.0,))
     for closed, enough in ((0.7, said), (0.98, True), (0.5, False)):
         trial = CandidateFit(shoulder, np.ones(1), {"fit": 9e3, "choose": 5e3}, "one", closed=closed)
@@ -53,7 +53,7 @@ def test_a_load_that_closes_all_of_a_walk_does_not_keep_other_centres_of_mass_fr
     effect = known_effects()[name]
     heard = Candidate.of(effect, () if name == "soft_ground" else ("body",), effect.neutral(None))
     trial = CandidateFit(heard, np.ones(heard.size), {"fit": 2e3, "choose": 1e3}, None, closed=1.0)
-    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
+    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"))
     assert forward._tips(search, trial, (0,), tier) is tips
 
 
@@ -90,7 +90,7 @@ def test_on_the_ground_what_leaves_half_gives_way_to_what_closes_nearly_all_for_
 def test_what_most_joints_of_a_held_robot_lack_in_common_is_the_robots_whatever_more_one_lacks(monkeypatch, base, shares, of_all):
     """Beside another clock rate, play in one joint kept joints and sets of effects being asked until the limit of work."""
     joints = [f"joint{n}" for n in range(len(shares))]
-    search = SimpleNamespace(evaluator=SimpleNamespace(walks=lambda takes: base == "free"))
+    search = SimpleNamespace(evaluator=SimpleNamespace(any_floating=lambda takes: base == "free"))
     monkeypatch.setattr(forward, "_closed_at", lambda search, current, t, takes, joint: shares[joints.index(joint)])
     for name, where, expected in (("clock_rate", (), of_all), ("servo_gain", ("joint0",), False)):
         trial = CandidateFit(Candidate.of(known_effects()[name], where, (1.0,)), np.ones(1), {"fit": 9e3, "choose": 5e3}, None)
@@ -104,7 +104,7 @@ def test_beside_a_pull_no_tilt_is_asked(worn):
     pull = Candidate.of(known_effects()["tether_force"], (), (0.0, 0.0, 0.0))
     pulled = SimpleNamespace(effects=(pull,), residuals=nominal.residuals, sizes=lambda: [(pull, np.ones(3))])
     for current, groups in ((nominal, [[[tilt]]]), (pulled, [])):
-        asked_of = [scheduling.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.held, tier)[0]
+        asked_of = [scheduling.asked(search, [tilt], current, {"one": 3.0, "two": 3.0}, search.fixed_base, tier)[0]
                     for tier in range(SCHEDULING.tiers)]
         assert [g for g in asked_of if g] == groups
 
@@ -118,7 +118,7 @@ def test_on_the_ground_what_was_read_off_is_asked_of_joints_that_were_well_while
                          (False, True, True, True))
     band = Candidate.of(known_effects()["dead_band"], (well,), (0.0,))
     groups = [g for tier in range(SCHEDULING.tiers)
-              for g in scheduling.asked(search, [mount, band], nominal, {well: 3.0}, search.held, tier)[0]]
+              for g in scheduling.asked(search, [mount, band], nominal, {well: 3.0}, search.fixed_base, tier)[0]]
     assert groups == [[mount]]
 
 
@@ -127,7 +127,8 @@ def test_of_a_held_robot_what_acts_on_all_of_it_is_asked_before_many_joints(worn
     pool = candidates(session.model, search.evaluator.evidence)
 
     def asked_of(*joints):
-        return [[c for g in scheduling.asked(search, pool, nominal, dict.fromkeys(joints, 3.0), search.held, tier)[0] for c in g]
+        beyond = dict.fromkeys(joints, 3.0)
+        return [[c for g in scheduling.asked(search, pool, nominal, beyond, search.fixed_base, tier)[0] for c in g]
                 for tier in range(SCHEDULING.tiers)]
 
     of_all, at_joints, *others = asked_of("one", "two", "three")[1:]
@@ -148,7 +149,7 @@ def test_zeros_of_a_held_robot_are_asked_about_where_the_recording_has_its_own(w
     search = Search(search.evaluator.on([seen]), session.model)
     pool = [Candidate.of(known_effects()["zero_offset"], (j,), (0.0,)) for j in session.model.joints]
     groups = [g for tier in range(SCHEDULING.tiers)
-              for g in scheduling.asked(search, pool, nominal, {"two": 3.0}, search.held, tier)[0]]
+              for g in scheduling.asked(search, pool, nominal, {"two": 3.0}, search.fixed_base, tier)[0]]
     assert [[c.where for c in g] for g in groups] == ([] if zeroed else [[("two",)]])
 
 
@@ -164,7 +165,7 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
     def tiers(heavy):
         monkeypatch.setattr(scheduling, "heavy_links", lambda model: heavy)
         return [tier for tier in range(SCHEDULING.tiers)
-                for g in scheduling.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.held, tier)[0]
+                for g in scheduling.asked(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.fixed_base, tier)[0]
                 for c in g if c is shift]
 
     assert tiers([link]) == [SCHEDULING.tiers_of_all - 1]

@@ -24,7 +24,7 @@ from workbench.simulation.batch import simulate_stream
 
 
 class Walking(RolloutEvaluator):
-    def walks(self, takes):
+    def any_floating(self, takes):
         return True
 
 
@@ -43,7 +43,7 @@ def test_an_effect_of_one_number_is_looked_at_at_several_sizes_within_its_bounds
     assert len(scan(c, (90.0, 99.0), True)) == 1  # both at the bound
 
 
-def test_a_signature_is_not_believed_far_beyond_where_it_was_looked_at():
+def test_a_response_is_not_believed_far_beyond_where_it_was_looked_at():
     c = Candidate.of(known_effects()["command_delay"], (), (0.0,))
     r0 = np.ones(20)
     probes = scan(c, (0.7, 2.0), True)
@@ -91,7 +91,7 @@ def test_rivals_know_the_best_at_their_joint_and_of_all():
 
 @pytest.mark.parametrize(("screened_out", "fitted"),
                          [((310, 230, 100), (310,)), ((296, 230, 100), (296, 230)), ((170, 160, 0), ())])
-def test_where_no_rival_is_foretold_enough_the_best_of_those_near_it_are_fitted(screened_out, fitted):
+def test_where_no_rival_is_predicted_enough_the_best_of_those_near_it_are_fitted(screened_out, fitted):
     race = Race(least=300.0)
     asking = [
         CandidateEvaluation._worth_fitting(SimpleNamespace(race=race, joints=[None], walking=True, coarse=True), [g])
@@ -107,7 +107,7 @@ def test_where_no_rival_is_foretold_enough_the_best_of_those_near_it_are_fitted(
     assert tuple(worth) == fitted
 
 
-def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(quiet):
+def test_what_an_earlier_race_predicts_to_be_hopeless_is_not_looked_at_again(quiet):
     session, evidence = quiet
     search = Search(Walking(evidence, CONFIG, n_jobs=1), session.model)
     current = search.evaluated([])
@@ -117,11 +117,11 @@ def test_what_an_earlier_race_foretells_to_be_hopeless_is_not_looked_at_again(qu
     assert power[0] > 0
     trials, asked = {}, []
     for best in (0.0, 1e9):  # of what rivals remember
-        search.signatures[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]], np.inf
+        search.responses[(c.key, (0,))] = [np.array([1.0])], [[-0.5 * r0]], np.inf
         race = Race({None: best})
         parts = {
             0: CandidateEvaluation(
-                search.evaluator, session.model, [], current.residuals, [c], race, False, search.signatures
+                search.evaluator, session.model, [], current.residuals, [c], race, False, search.responses
             ).run()
         }
         asked.clear()
@@ -321,7 +321,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
     line, truth = rng.normal(size=(2, 60)), np.array([1.5, -0.5])
     calm, wild = -truth @ line, 50 * rng.normal(size=60)
     probes = [np.array(p, dtype=float) for p in ([2, 0], [0, 2], [-2, 0], [0, -2], [2, 2], [2, -2], [-2, 2], [-2, -2])]
-    signatures = [[np.concatenate([p @ line, 30 * rng.normal(size=60)])] for p in probes]
+    responses = [[np.concatenate([p @ line, 30 * rng.normal(size=60)])] for p in probes]
     power = {0: float(calm @ calm), 1: float(wild @ wild)}
 
     def calmest(explained, least=0.0):
@@ -330,7 +330,7 @@ def test_where_one_walk_is_left_to_chance_another_says_where_to_begin():
                                       stretches=lambda takes, use: np.repeat([0, PROBLEM.most_stretches], 60))
         trying.group, trying.race = [Candidate.of(known_effects()["ground_tilt"], (), (0.0, 0.0))], Race(least=least)
         trying.takes, trying.power, trying.r0 = (0, 1), power, [np.concatenate([calm, wild])]
-        return trying._calmest(probes, signatures, explained)
+        return trying._calmest(probes, responses, explained)
 
     take, x = calmest(0.0)
     assert take == 0
@@ -386,11 +386,11 @@ def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
     assert [float(x[0]) for x in scan(c, FIT.scanned[:1] if walking else FIT.scanned, walking)] == sizes
 
 
-@pytest.mark.parametrize(("name", "walking", "unheld", "sizes"), [
+@pytest.mark.parametrize(("name", "walking", "no_fixed_base", "sizes"), [
     ("coulomb_friction", False, False, FIT.scanned), ("coulomb_friction", True, False, FIT.scanned[:1]),
     ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground)])
-def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, unheld, sizes):
+def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, no_fixed_base, sizes):
     """Of a hip's friction six times the typical one nothing was foretold at once its size, and more of a wrong name."""
     effect = known_effects()[name]
     where = ("one",) if effect.places == ("joint",) else ()
-    assert scan_sizes(Candidate.of(effect, where, (0.6,)), walking, unheld) == sizes
+    assert scan_sizes(Candidate.of(effect, where, (0.6,)), walking, no_fixed_base) == sizes

@@ -19,7 +19,7 @@ DOES = {"viscous_friction": FRICTION, "backlash": PLAY, "dead_band": PLAY + 0.6 
 RECORDED = 1.5 * FRICTION + 2.0 * DOES["dead_band"]
 
 
-class LinearJury:
+class LinearEvaluator:
     """A joint that answers in lines."""
 
     def residuals(self, questions):
@@ -38,7 +38,7 @@ class LinearJury:
 @pytest.fixture
 def search(monkeypatch):
     monkeypatch.setattr(swap, "with_effects", lambda nominal, sizes: list(sizes))
-    return SimpleNamespace(evaluator=LinearJury(), nominal=None)
+    return SimpleNamespace(evaluator=LinearEvaluator(), nominal=None)
 
 
 def fit_of(search, **sizes):

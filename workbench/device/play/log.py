@@ -31,7 +31,7 @@ class _Content:
 
 
 def finish_log(journal: str | Path, log: str | Path) -> Path:
-    """Writes the joint log (contract, section 3), whole or not at all. Its time is zero at the first goal of the rest in neutral.
+    """Writes the joint log (docs/formats.md, section 3), whole or not at all. Time zero is the first goal of the rest in neutral.
 
     A row every 20 ms and at each pose; goals and moving speeds as they were sent; positions, between two readings of a servo, on
     the line between them; duty where the servo's output is what it reports. InputError where nothing was read.

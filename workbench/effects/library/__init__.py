@@ -1,1 +1,1 @@
-"""One file for each effect of the contract, section 7."""
+"""One file for each effect of docs/formats.md, section 7."""

@@ -129,10 +129,10 @@ def poses_lost(
 def least_explained(evaluator: RolloutEvaluator, missed: Mapping[int, int]) -> float | None:
     """Share of the joint's gap that so many missed poses, by take, must explain; None: not believed. On the ground a joint may be
     kept from going, once."""
-    held = [n for i, n in missed.items() if evaluator.evidence[i].take.spec.base == "fixed"]
-    if sum(held):
+    fixed = [n for i, n in missed.items() if evaluator.evidence[i].take.spec.base == "fixed"]
+    if sum(fixed):
         return READ_OFF.dropped_explains
-    return (READ_OFF.dropped_explains_free if held else READ_OFF.dropped_explains) if sum(missed.values()) > 1 else None
+    return (READ_OFF.dropped_explains_free if fixed else READ_OFF.dropped_explains) if sum(missed.values()) > 1 else None
 
 
 def stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: int) -> bool:

@@ -1,7 +1,8 @@
 """Kinematic calibration without simulation: link lengths that differ from the model's, and horns that sit turned.
 
-Both show only in where feet meet the ground, and there in much the same way: walks alone hardly say which link it is. Where a
-link lies between two joints that turn, cameras see both axes, and so how far they are apart and, with the base held, which way.
+Both show only in where feet meet the ground, and there in much the same way: floating-base takes alone hardly say which link it
+is. Where a link lies between two joints that turn, cameras see both axes, and so how far they are apart and, on a fixed base,
+which way.
 """
 
 from __future__ import annotations
@@ -100,14 +101,14 @@ def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: 
     if not lengths or not turns or {e.effect for e in model.effects} & {e.name for e in (*lengths, *turns)}:
         return Geometry()
     between = {i: _spans(e, model) for i, e in enumerate(evidence) if e.take.recording.rigid_bodies}
-    held = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
+    fixed = [(evidence[i], there) for i, there in between.items() if evidence[i].take.spec.base == "fixed"]
     ill = {joint_of(c) for i, e in enumerate(evidence) if e.take.spec.base == "fixed" for c in channel_gaps(e, residuals[i])}
     measured, near, as_drawn = list[Measured](), dict[Key, float](), set[Key]()
-    for (effect, *_), least, told in (
+    for (effect, *_), least, estimates in (
             (lengths, READ_OFF.least_change, _changes(model, [s for there in between.values() for s in there])),
-            (turns, READ_OFF.least_turned, _turns(model, held))):
+            (turns, READ_OFF.least_turned, _turns(model, fixed))):
         name, unit = effect.name, effect.parameters[0].si
-        for where, number in told.items():
+        for where, number in estimates.items():
             if number.is_nothing(least):
                 as_drawn.add((name, (where,)))
             elif number.differs(least) and effect.hidden_by_zeroing and ill & set(model.kinematics.chain(_carried(model, where))):
@@ -129,22 +130,22 @@ def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
 def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainValue]:
     """By how much links are longer than drawn, by link."""
     k, sdf = model.kinematics, SdfRobot(model.path)
-    told: dict[str, list[UncertainValue]] = {}
+    estimates: dict[str, list[UncertainValue]] = {}
     for s in between:
         link, drawn = k.frames[s.joint].child, _drawn(k, s)
         way, distance = sdf.way(k, link), float(np.linalg.norm(drawn))
         along = float(drawn @ way) / (distance * float(np.linalg.norm(way))) if distance > 0 and way.any() else 0.0
         if along > READ_OFF.least_along:
             change, sigma = float(np.linalg.norm(s.way)) - distance, float(np.hypot(s.sigma, READ_OFF.length_error))
-            told.setdefault(link, []).append(UncertainValue(change / along, sigma / along))
-    return {link: _mean(each) for link, each in told.items()}
+            estimates.setdefault(link, []).append(UncertainValue(change / along, sigma / along))
+    return {link: _mean(each) for link, each in estimates.items()}
 
 
-def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, UncertainValue]:
+def _turns(model: RobotModel, fixed: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, UncertainValue]:
     """By how much links stand turned about the axes that carry them beyond what droop turns them, by joint."""
     k = model.kinematics
-    told: dict[str, list[UncertainValue]] = {}
-    for e, between in held:
+    estimates: dict[str, list[UncertainValue]] = {}
+    for e, between in fixed:
         m = e.take.measurement
         rest = np.array([[m.rest_pose.get(j, 0.0) for j in k.joints]])
         poses, start = k.forward(rest), k.forward(np.zeros((1, len(k.joints))))
@@ -155,10 +156,10 @@ def _turns(model: RobotModel, held: Sequence[tuple[TakeEvidence, Sequence[Span]]
             seen, drawn = turned(s.way, -m.yaw), tilt @ poses[f.child][1][0] @ _drawn(k, s)
             if abs(k.frames[s.following].axis_of_parent @ f.axis_B) > PARALLEL:
                 turn = float(np.arctan2(axis @ np.cross(drawn, seen), drawn @ seen))
-                told.setdefault(s.joint, []).append(
+                estimates.setdefault(s.joint, []).append(
                     UncertainValue(turn, float(np.hypot(s.sigma / np.linalg.norm(drawn), READ_OFF.direction_error)))
                 )
-    return {joint: _mean(each) for joint, each in told.items()}
+    return {joint: _mean(each) for joint, each in estimates.items()}
 
 
 def _drawn(k: Kinematics, s: Span) -> Array:
@@ -167,9 +168,9 @@ def _drawn(k: Kinematics, s: Span) -> Array:
     return across(following.X_PF_p - f.p_BM, f.axis_B, following.axis_of_parent)
 
 
-def _mean(told: Sequence[UncertainValue]) -> UncertainValue:
-    weights = np.array([t.sigma**-2 for t in told])
-    values = np.array([t.value for t in told])
+def _mean(estimates: Sequence[UncertainValue]) -> UncertainValue:
+    weights = np.array([t.sigma**-2 for t in estimates])
+    values = np.array([t.value for t in estimates])
     mean = float(weights @ values / weights.sum())
     scatter = float(np.sqrt(weights @ (values - mean) ** 2 / weights.sum()))
-    return UncertainValue(mean, float(np.hypot(weights.sum() ** -0.5, scatter / np.sqrt(len(told)))))
+    return UncertainValue(mean, float(np.hypot(weights.sum() ** -0.5, scatter / np.sqrt(len(estimates)))))

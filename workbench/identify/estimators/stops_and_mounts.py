@@ -55,19 +55,20 @@ def stops(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals:
                     and float(np.median(end - mean[beyond])) < READ_OFF.at_stop \
                     and float(np.nanmax(((said - seen) * side)[beyond])) > READ_OFF.least_cut:
                 ends[side].append((end + rest * side, float(np.max(said[good] * side)) + rest * side))
-    found = {side: (min(e for e, _ in told), max(m for _, m in told)) for side, told in ends.items() if told}
-    found = {side: told for side, told in found.items() if went[side] - told[0] < READ_OFF.least_cut}  # what it passed is no stop
+    found = {side: (min(e for e, _ in limits), max(m for _, m in limits)) for side, limits in ends.items() if limits}
+    # what it passed is no stop
+    found = {side: limits for side, limits in found.items() if went[side] - limits[0] < READ_OFF.least_cut}
     if not found:
         return []
     far = [stop.parameters[0].low, stop.parameters[1].high]
-    neutral, typical, held = list(far), list(far), [True, True]
+    neutral, typical, fixed = list(far), list(far), [True, True]
     for side, (end, reach) in found.items():
         k = 1 if side > 0 else 0
-        neutral[k], typical[k], held[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
+        neutral[k], typical[k], fixed[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
     # its ends do not change sides
     apart = sum(found[side][1] if side in found else went[side] for side in ends) / len(found)
     furthest = min(apart - READ_OFF.least_cut, READ_OFF.furthest_stop * max(reach - end for end, reach in found.values()))
-    return [replace(Candidate.of(stop, (joint,), neutral, typical, held), reach=float(np.rad2deg(furthest)))]
+    return [replace(Candidate.of(stop, (joint,), neutral, typical, fixed), reach=float(np.rad2deg(furthest)))]
 
 
 def _mount(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],

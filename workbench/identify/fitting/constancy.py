@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Drift:
-    """A number of an effect (its index) that held takes want to change: its values at a take's beginning and end; what a number
-    that stays leaves for that, and what chance does, a standard error: RMS over sigma."""
+    """A number of an effect (its index) that fixed-base takes want to change: its values at a take's beginning and end; what a
+    number that stays leaves for that, and what chance does, a standard error: RMS over sigma."""
 
     effect: Candidate
     number: int
@@ -44,12 +44,13 @@ class Drift:
 
 
 def drifts(search: Search, fit: Fit) -> list[Drift]:
-    """Numbers that held takes told (walks bend them), and tell differently early and late: a test of constancy against a linear
-    trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`)."""
+    """Numbers that fixed-base takes identified (floating-base takes bend them), and tell differently early and late: a test of
+    constancy against a linear trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in
+    `covariance_of`)."""
     out: list[Drift] = []
     of_number = [(c, x, k) for c, x in fit.sizes() for k in range(c.size)]
     for s in fit.slopes:
-        if not set(s.takes) <= set(search.held):
+        if not set(s.takes) <= set(search.fixed_base):
             continue
         for n, change, error, rms in _trends(search.evaluator, fit, s):
             c, x, k = of_number[n]

@@ -17,21 +17,21 @@ Array = NDArray[np.float64]
 def covariance_of(
     evaluator: RolloutEvaluator, solved: Solved, takes: tuple[int, ...], joint: str | None = None, bent: bool = True
 ) -> Array:
-    """Of a block's numbers; joint: whose channels tell them, None for all; bent: whether contact bends what walks tell. Infinite
-    where nothing depends on a number."""
+    """Of a block's numbers; joint: whose channels identify them, None for all; bent: whether contact bends what floating-base
+    takes identify. Infinite where nothing depends on a number."""
     stretches = evaluator.stretches(takes, "fit", joint)
     engines = bent * FIT.contact_error * np.abs(solved.x) * _walked(evaluator, solved, takes, stretches)
     contact = _bent_by_contact(evaluator, solved, takes, joint)
-    temper = FIT.overdispersion_free if bent and evaluator.walks(takes) else 1.0
+    temper = FIT.overdispersion_free if bent and evaluator.any_floating(takes) else 1.0
     return np.asarray(clustered(solved, stretches, temper) + np.diag(engines**2 + contact**2))
 
 
 def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
-    """Share of what is known of each number that walks tell."""
-    free = [i for i in takes if evaluator.walks((i,))]
-    told = np.sum(solved.J**2, axis=0)
-    walks = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
-    return np.asarray(np.divide(walks, told, out=np.zeros_like(told), where=told > 0))
+    """Share of what is known of each number that floating-base takes identify."""
+    free = [i for i in takes if evaluator.any_floating((i,))]
+    information = np.sum(solved.J**2, axis=0)
+    floating = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
+    return np.asarray(np.divide(floating, information, out=np.zeros_like(information), where=information > 0))
 
 
 def _bent_by_contact(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], joint: str | None) -> Array:

@@ -28,26 +28,26 @@ class Search:
     """Fits of effects to one session.
 
     settled: effects identified from fixed-base takes. They keep the values that these takes give them in all fits that follow,
-    because contact biases what floating-base takes say of them. signatures: responses scanned so far, a memory that all searches
+    because contact biases what floating-base takes say of them. responses: responses scanned so far, a memory that all searches
     of a session share.
     """
 
     def __init__(
-        self, evaluator: RolloutEvaluator, nominal: RobotModel, settled: Fit | None = None, signatures: ResponseBank | None = None
+        self, evaluator: RolloutEvaluator, nominal: RobotModel, settled: Fit | None = None, responses: ResponseBank | None = None
     ) -> None:
         self.evaluator, self.nominal, self.settled = evaluator, nominal, settled
-        self.signatures: ResponseBank = {} if signatures is None else signatures
+        self.responses: ResponseBank = {} if responses is None else responses
         self.takes = tuple(range(len(evaluator.evidence)))
         self.fitted = tuple(i for i, e in enumerate(evaluator.evidence) if e.uses["fit"].any() or e.uses["choose"].any())
-        self.held = tuple(i for i in self.fitted if not evaluator.walks((i,)))
+        self.fixed_base = tuple(i for i in self.fitted if not evaluator.any_floating((i,)))
 
     def on(self, evaluator: RolloutEvaluator) -> Search:
         """The same search on other takes of the session."""
-        return Search(evaluator, self.nominal, self.settled, self.signatures)
+        return Search(evaluator, self.nominal, self.settled, self.responses)
 
     def with_settled(self, settled: Fit | None) -> Search:
         """The same search with other effects settled."""
-        return Search(self.evaluator, self.nominal, settled, self.signatures)
+        return Search(self.evaluator, self.nominal, settled, self.responses)
 
     @property
     def single_joint(self) -> bool:
@@ -55,36 +55,37 @@ class Search:
         return len(self.nominal.joints) == 1
 
     def is_settled(self, c: Candidate) -> bool:
-        """Whether held takes told its numbers."""
+        """Whether fixed-base takes identified its numbers."""
         return self.settled is not None and c.key in {e.key for e in self.settled.effects}
 
-    def told_by_fixed_base(self, c: Candidate) -> bool:
+    def identified_on_fixed_base(self, c: Candidate) -> bool:
         """The same, or there are no others."""
-        return self.is_settled(c) or self.held == self.fitted
+        return self.is_settled(c) or self.fixed_base == self.fitted
 
     def floating_base(self, takes: tuple[int, ...]) -> tuple[int, ...]:
-        """Of these takes, those whose base is not held."""
-        return tuple(i for i in takes if i not in self.held)
+        """Of these takes, those whose base is not fixed."""
+        return tuple(i for i in takes if i not in self.fixed_base)
 
     def telling(self, effects: Iterable[Candidate], takes: tuple[int, ...]) -> tuple[int, ...]:
-        """Of these takes, those that tell numbers of effects: where some walk these alone, unless an effect is of the whole robot
-        or of the cameras; what held takes show of a joint or a link has been asked before."""
+        """Of these takes, those that identify numbers of effects: where some have a floating base these alone, unless an effect
+        is of the whole robot or of the cameras; what fixed-base takes show of a joint or a link has been asked before."""
         floating_base = self.floating_base(takes)
         alone = all(c.effect.layer in ("ground", "inertia") or (c.where and c.effect.layer != "measurement") for c in effects)
         return floating_base if floating_base and alone else takes
 
     def resettled(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
-        """`current` with those that are settled, and `more`, fitted anew on held takes, and the search in which these are
+        """`current` with those that are settled, and `more`, fitted anew on fixed-base takes, and the search in which these are
         settled: for when one went or another came."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         free = self.with_settled(None)
-        settled = free.with_timing_refitted(free.refitted(free.evaluated(there), self.held, FIT.refit_steps, range(len(there))))
-        told = settled.sizes_by_key()
-        return self.with_settled(settled), self.evaluated([(c, told.get(c.key, x)) for c, x in current.sizes()])
+        fitted = free.refitted(free.evaluated(there), self.fixed_base, FIT.refit_steps, range(len(there)))
+        settled = free.with_timing_refitted(fitted)
+        known = settled.sizes_by_key()
+        return self.with_settled(settled), self.evaluated([(c, known.get(c.key, x)) for c, x in current.sizes()])
 
     def with_timing_refitted(self, current: Fit) -> Fit:
-        """A fit on held takes with its numbers of timing told by all takes: contact bends much, but not when commands come. As it
-        was where held takes speak against that: then walks lack something else."""
+        """A fit on fixed-base takes with its numbers of timing identified from all takes: contact bends much, but not when
+        commands come. As it was where fixed-base takes speak against that: then floating-base takes lack something else."""
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
         if not timing or not self.floating_base(self.fitted):
             return current
@@ -139,7 +140,7 @@ class Search:
         def ask(point: Sequence[Array]) -> RolloutRequest:
             return RolloutRequest(with_effects(self.nominal, current.sizes(sizes(point))), takes, step)
 
-        def told(answer: dict[int, Array]) -> list[Array]:
+        def as_vectors(answer: dict[int, Array]) -> list[Array]:
             return [self.evaluator.vector(answer, "fit", joint) for joint in blocks]
 
         # several numbers share what a walk shows: a short move of one drowns
@@ -149,10 +150,10 @@ class Search:
         magnitudes = np.concatenate([c.magnitudes(x) for c, x in current.sizes()])[moving]
         start = [current.x[n] for n in blocks.values()]
         answer = {i: current.residuals[i] for i in takes} if step == 1 else (yield [ask(start)])[0]
-        stride, least = (near, magnitudes) if self.evaluator.walks(takes) else (FIT.stride_fixed, None)
+        stride, least = (near, magnitudes) if self.evaluator.any_floating(takes) else (FIT.stride_fixed, None)
         bounds = [(low[n], high[n]) for n in blocks.values()]
-        fit = fit_blocks(start, told(answer), bounds, iterations, stride, magnitudes=least)
-        solved = yield from through(fit, ask, told)
+        fit = fit_blocks(start, as_vectors(answer), bounds, iterations, stride, magnitudes=least)
+        solved = yield from through(fit, ask, as_vectors)
         x = sizes([s.x for s in solved])
         covariance = np.full((len(x), len(x)), np.inf)
         bent = any(current.effects[i].effect.layer != "timing" for i in moved)
@@ -164,11 +165,11 @@ class Search:
 
     def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
         """Whether an effect shows in the channels of its own joint alone, on these takes."""
-        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.evaluator.walks(takes)
+        return c.joint is not None and not c.effect.hidden_by_zeroing and not self.evaluator.any_floating(takes)
 
     def _blocks(self, current: Fit, moved: Sequence[int], takes: tuple[int, ...]) -> dict[str | None, NDArray[np.int_]]:
-        """Numbers (indices of x) that are fitted together, by the joint whose channels tell them, None for all: one rollout moves
-        all blocks."""
+        """Numbers (indices of x) that are fitted together, by the joint whose channels identify them, None for all: one rollout
+        moves all blocks."""
         if not all(self.apart(current.effects[i], takes) for i in moved):
             return {None: current.numbers(moved)}
         joints = dict.fromkeys(current.effects[i].joint for i in moved)
@@ -192,15 +193,16 @@ class Search:
 
     def refined(self, fit: Fit) -> Fit:
         """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
-        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that walks
-        tell, if it is one, the bottom of what is seen far around. A quarter of the way counts as a standard deviation more."""
+        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that
+        floating-base takes identify, if it is one, the bottom of what is seen far around. A quarter of the way counts as a
+        standard deviation more."""
         if not fit.slopes or not np.isfinite(fit.covariance).any():
             return self.finely(fit, self.takes, fit.x)[0]
         before, fit = fit, self._finer(fit)
         walked = fit.numbers([i for i, c in enumerate(fit.effects) if not self.is_settled(c)])
-        alone = int(walked[0]) if len(walked) == 1 and self.held != self.fitted else None
-        told_by_fixed_base = not len(walked) and all(set(s.takes) <= set(self.held) for s in fit.slopes)
-        takes = self.held if told_by_fixed_base and self.held else self.takes
+        alone = int(walked[0]) if len(walked) == 1 and self.fixed_base != self.fitted else None
+        identified_on_fixed_base = not len(walked) and all(set(s.takes) <= set(self.fixed_base) for s in fit.slopes)
+        takes = self.fixed_base if identified_on_fixed_base and self.fixed_base else self.takes
         points = [fit.x] if alone is None else _around(fit, alone)
         seen = self.finely(fit, takes, *points, *([] if before is fit else [before.x]))
         move, start = self._newton(seen[0]), fit.x.copy()
@@ -216,7 +218,7 @@ class Search:
         return replace(best, covariance=fit.covariance + np.diag(((best.x - fit.x) / 4) ** 2))
 
     def _finer(self, fit: Fit) -> Fit:
-        """The fit with what walks tell fitted once more in finer steps, where that is more than one number."""
+        """The fit with what floating-base takes identify fitted once more in finer steps, where that is more than one number."""
         if sum(c.size for c in fit.effects if not self.is_settled(c)) < 2 or not self.floating_base(self.fitted):
             return fit
         return self.side_by_side([self.refitting(fit, self.fitted, FIT.finer_steps, step=FIT.finer)])[0]
@@ -253,7 +255,7 @@ def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence
 
 def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
     """Whether the fixed-base takes contradict a fit, compared with another: by more than `against` of chi squared."""
-    return gained(search.evaluator, fit, other, search.held, "fit") > FIT.against
+    return gained(search.evaluator, fit, other, search.fixed_base, "fit") > FIT.against
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:

@@ -19,17 +19,17 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
 """What a part of a search asks, is answered, and returns."""
-Seen = tuple[list[Array], list[list[Array]], float]
+Response = tuple[list[Array], list[list[Array]], float]
 """Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
-ResponseBank = dict[tuple[object, ...], Seen]
+ResponseBank = dict[tuple[object, ...], Response]
 """By group and takes."""
 
 
-def scan_sizes(c: Candidate, walking: bool, unheld: bool) -> tuple[float, ...]:
-    """Of the above, for an effect. unheld: whether no take had the base held, where joints show what they lack, however much."""
+def scan_sizes(c: Candidate, walking: bool, no_fixed_base: bool) -> tuple[float, ...]:
+    """Of the above, for an effect. unheld: whether no take had a fixed base, where joints show what they lack, however much."""
     if walking and c.effect.layer == "ground":
         return FIT.scanned_ground
-    return FIT.scanned[:1] if walking and not unheld else FIT.scanned
+    return FIT.scanned[:1] if walking and not no_fixed_base else FIT.scanned
 
 
 def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
@@ -53,7 +53,7 @@ def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
 def linearised_estimate(
     c: Candidate, r0: Array, probes: Sequence[Array], seen: Sequence[Array], far: float
 ) -> tuple[Array, float]:
-    """Sizes to start from, and how much of the sum of squares signatures say they take away."""
+    """Sizes to start from, and how much of the sum of squares responses say they take away."""
     whole = float(r0 @ r0)
     if not c.size:
         return np.empty(0), whole - float(seen[0] @ seen[0])

@@ -1,4 +1,4 @@
-"""What a diagnosis says (contract, section 6), typed: the verdict, where the gap is, what explains it, what does not."""
+"""What a diagnosis says (docs/formats.md, section 6), typed: the verdict, where the gap is, what explains it, what does not."""
 
 from __future__ import annotations
 

@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 
 def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = ACCEPTANCE.least_share
                ) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is held."""
+    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is fixed."""
     evidence = search.evaluator.evidence
     out: dict[str, float] = {}
     for i in takes:
         was, now = channel_gaps(evidence[i], before.residuals[i]), channel_gaps(evidence[i], current.residuals[i])
-        allowed = share if i in search.held else ACCEPTANCE.rough_share
+        allowed = share if i in search.fixed_base else ACCEPTANCE.rough_share
         least = dict(zip(evidence[i].channels, _may_err(search, before, current, i, allowed)))
         out |= {c: max(s, out.get(c, 0.0)) for c, s in now.items() if s**2 - 1 > least[c] * (was.get(c, 0.0)**2 - 1)}
     return out
@@ -38,7 +38,7 @@ def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> 
     """By channel of a take, the share that effects may err by, of what they brought from `before` to `now`."""
     e = search.evaluator.evidence[take]
     shares = np.full(len(e.channels), share)
-    if not search.evaluator.walks((take,)):
+    if not search.evaluator.any_floating((take,)):
         was, left = (_of_joints(e, fit.residuals[take]) for fit in (before, now))
         parts = sorted((left[j] / was[j], j) for j in e.joints if was[j] > PROBLEM.gap_ratio**2 - 1)
         given = {c.joint for c in now.effects}
@@ -54,37 +54,37 @@ def _of_joints(e: TakeEvidence, residual: Array) -> dict[str, float]:
 
 
 def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
-    """Share that an effect on the ground must take away, beside what held takes told. More, where a joint that was given an
-    effect still goes wrong with the base held: no known name is what it lacks, and it leads all others astray."""
+    """Share that an effect on the ground must take away, beside what fixed-base takes identified. More, where a joint that was
+    given an effect still goes wrong on a fixed base: no known name is what it lacks, and it leads all others astray."""
     given = {c.joint for c in current.effects}
-    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.held, ACCEPTANCE.rough_share))
+    part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.fixed_base, ACCEPTANCE.rough_share))
     return ACCEPTANCE.last_closed if part else ACCEPTANCE.least_closed
 
 
 def too_little_left(search: Search, current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep], everywhere: bool = True
                     ) -> bool:
     """Whether all that is beyond noise would not be enough for one more effect: on the ground beside those of the whole robot
-    that walks told, and beyond what others, as all with the base held, may err by in each channel. everywhere: of walks, not in
-    channels with a gap alone."""
+    that floating-base takes identified, and beyond what others, as all on a fixed base, may err by in each channel. everywhere:
+    of floating-base takes, not in channels with a gap alone."""
     evaluator, left = search.evaluator, 0.0
-    walks = evaluator.walks(takes)
-    before, share = current if walks else before_rough(rounds, current), ACCEPTANCE.least_share
+    floating = evaluator.any_floating(takes)
+    before, share = current if floating else before_rough(rounds, current), ACCEPTANCE.least_share
     settled = _settling(search, rounds)
-    if walks and search.settled is not None and settled:
+    if floating and search.settled is not None and settled:
         before, share = settled[0].before, ACCEPTANCE.rough_share
     for i in takes:
         if channel_gaps(evaluator.evidence[i], current.residuals[i]):
             was, now = {i: before.residuals[i]}, {i: current.residuals[i]}
             may_err = _may_err(search, before, current, i, share)
             left += sum(evaluator.beyond(now, use, was, may_err, everywhere) for use in ("fit", "choose")) / 3  # a third chooses
-    if not walks:
+    if not floating:
         return left < ACCEPTANCE.all_closed * FIT.least_gain
     brought = sum(t.gain["choose"] for t in taken(rounds) if t.joint is None and not search.is_settled(t.candidate))
     return left < max(ACCEPTANCE.least_walking, ACCEPTANCE.left_share * brought)
 
 
 def _settling(search: Search, rounds: Sequence[SelectionStep]) -> list[SelectionStep]:
-    """Those in which something was taken that held takes told."""
+    """Those in which something was taken that fixed-base takes identified."""
     return [r for r in rounds if any(search.is_settled(t.candidate) for t in taken([r]))]
 
 
@@ -92,21 +92,21 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
     """Whether an effect that was fitted beside `current` brings enough."""
     if t.screened_out:
         return False
-    walks = search.evaluator.walks(takes)
-    least = ACCEPTANCE.least_walking if t.joint is None and walks else FIT.least_gain * max(1, t.candidate.size)
+    floating = search.evaluator.any_floating(takes)
+    least = ACCEPTANCE.least_walking if t.joint is None and floating else FIT.least_gain * max(1, t.candidate.size)
     if t.joint is not None and t.closed > SUBSETS.nearly_all:
         least *= ACCEPTANCE.all_closed
     gain = min(t.gain["choose"], t.gain["fit"] / 2)  # twice as many stretches are fitted
-    if not walks:
+    if not floating:
         return min(gain, _beyond_error(search, t, takes, before_rough(rounds, current), current, ACCEPTANCE.least_share)) > least
-    walked = [(r, a) for r in rounds for a in taken([r])
+    floating_terms = [(r, a) for r in rounds for a in taken([r])
               if (t.joint is None or a.joint in (None, t.joint)) and not search.is_settled(a.candidate)]
-    brought = sum(a.gain["choose"] for _, a in walked)
+    brought = sum(a.gain["choose"] for _, a in floating_terms)
     settled = _settling(search, rounds)
     if search.settled is not None and settled:
         gain = min(gain, _beyond_error(search, t, takes, settled[0].before, search.settled, ACCEPTANCE.rough_share))
-    if walked and gain <= ACCEPTANCE.walking_share * brought:  # which may have been in other channels
-        gain = min(gain, _beyond_error(search, t, takes, walked[0][0].before, current, ACCEPTANCE.walking_share))
+    if floating_terms and gain <= ACCEPTANCE.walking_share * brought:  # which may have been in other channels
+        gain = min(gain, _beyond_error(search, t, takes, floating_terms[0][0].before, current, ACCEPTANCE.walking_share))
     return gain > least
 
 
@@ -123,11 +123,12 @@ def _beyond_error(search: Search, t: CandidateFit, takes: Sequence[int], before:
 
 def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now: Fit) -> float:
     """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on held takes alone, where they told it. Of a joint that walks tell, its own gap, if it has
-    one, counts as much as all that follows from it, and not what is left to the effects of others."""
+    that was judged or stood out; on fixed-base takes alone, where they identified it. Of a joint that floating-base takes
+    identify, its own gap, if it has one, counts as much as all that follows from it, and not what is left to the effects of
+    others."""
     joint = t.candidate.joint
     outstanding = joint in standing_out(search, r.before, search.fitted)
-    takes = search.held if search.is_settled(t.candidate) else search.fitted
+    takes = search.fixed_base if search.is_settled(t.candidate) else search.fitted
     before, after = ({i: fit.residuals[i] for i in takes} for fit in (r.before, now))
     if t.joint is not None or joint is None or outstanding:
         return search.evaluator.closed(before, after, "choose", joint if outstanding else t.joint)
@@ -137,13 +138,13 @@ def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now:
 
 
 def idle(search: Search, fit: Fit) -> list[Candidate]:
-    """Effects that walks told and that, in fine steps, bring too little: a coarse step's error may be what they made up for.
-    fit: as fine steps judge it."""
-    walked = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
-    if not walked or not search.floating_base(search.fitted):
+    """Effects that floating-base takes identified and that, in fine steps, bring too little: a coarse step's error may be what
+    they made up for. fit: as fine steps judge it."""
+    floating_terms = [(c, own) for c, own in zip(fit.effects, fit.slices()) if not search.is_settled(c) and c.size]
+    if not floating_terms or not search.floating_base(search.fitted):
         return []
-    points = np.tile(fit.x, (len(walked), 1))
-    for x, (_, own) in zip(points, walked):
+    points = np.tile(fit.x, (len(floating_terms), 1))
+    for x, (_, own) in zip(points, floating_terms):
         x[own] = 0.0
     without = search.finely(fit, search.takes, *points)
-    return [c for (c, _), f in zip(walked, without) if f.cost["choose"] - fit.cost["choose"] < ACCEPTANCE.least_walking]
+    return [c for (c, _), f in zip(floating_terms, without) if f.cost["choose"] - fit.cost["choose"] < ACCEPTANCE.least_walking]

@@ -22,9 +22,9 @@ def without_part_answers(search: Search, current: Fit, rounds: Sequence[Selectio
 
 
 def without_idle(search: Search, current: Fit) -> Fit:
-    """Backward: an effect that the others have made idle goes. The others may have far to go: in a lone joint, where all act
-    alike and a load does by itself what another does with a spring and a zero askew; and where held takes go better without it,
-    as a knee that was not fitted soft enough leaves walks something for play to close."""
+    """Backward: an effect that the others have made idle goes. The others may have far to go: in a robot of one joint, where all
+    act alike and a load does by itself what another does with a spring and a zero askew; and where fixed-base takes go better
+    without it, as a knee that was not fitted soft enough leaves floating-base takes something for play to close."""
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
             break

@@ -1,4 +1,4 @@
-"""Several effects in one joint at once: what their signatures together say, where no single one explains what is missing.
+"""Several effects in one joint at once: what their responses together say, where no single one explains what is missing.
 
 Lines through what each was seen to do alone are cheap to add up, so that all sets are tried: best subsets, not one at a time
 (A. J. Miller, Subset Selection in Regression, 2002). Only the best sets are fitted.
@@ -26,11 +26,11 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What an effect does to what is fitted in a joint: signatures (m, k), each at the sizes in a row of points (k, n)."""
+class Response:
+    """What an effect does to what is fitted in a joint: responses (m, k), each at the sizes in a row of points (k, n)."""
 
     trial: CandidateFit
-    signatures: Array
+    responses: Array
     points: Array
 
     def sizes(self, share: Array) -> Array:
@@ -48,9 +48,9 @@ class Seen:
 def subsets_for(
     search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], joint: str
 ) -> list[list[CandidateFit]]:
-    """Sets of effects that, as signatures foretell it, explain a joint far better than fewer do, with sizes to begin from.
+    """Sets of effects that, as responses predict it, explain a joint far better than fewer do, with sizes to begin from.
 
-    trials: of a race beside `current` on these takes, whose base is held.
+    trials: of a race beside `current` on these takes, whose base is fixed.
     """
     known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
     until = min((looked[2] for _, looked in known), default=np.inf)
@@ -63,7 +63,7 @@ def subsets_for(
 
 def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
     """Sizes at which a candidate was looked at, what each did, and for how long it was looked at [s]."""
-    for name, (points, seen, until) in search.signatures.items():
+    for name, (points, seen, until) in search.responses.items():
         if name[-1] == takes and t.candidate.key in name[:-1]:
             b = name.index(t.candidate.key)
             return points, [s[b] for s in seen], until
@@ -81,19 +81,19 @@ def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, ju
     return search.evaluator.vector(inside, "fit", judged) != 0
 
 
-def variants(t: CandidateFit, points: Sequence[Array], signatures: Sequence[Array]) -> Iterator[Seen]:
+def variants(t: CandidateFit, points: Sequence[Array], responses: Sequence[Array]) -> Iterator[Response]:
     """An effect of several numbers, each seen alone; of one, as it was seen at each size."""
     c = t.candidate
     if not c.size or not len(points):
         return
     if np.count_nonzero(~c.shapes) > 1:
-        yield Seen(t, np.stack(signatures, axis=1), np.array(points))
+        yield Response(t, np.stack(responses, axis=1), np.array(points))
         return
-    for p, v in zip(points, signatures):
-        yield Seen(t, v[:, None], p[None])
+    for p, v in zip(points, responses):
+        yield Response(t, v[:, None], p[None])
 
 
-def best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
+def best_sets(seen: Sequence[Response], r0: Array) -> list[list[CandidateFit]]:
     lines = _NormalEquations(seen, r0)
     best = lines.whole
     out: list[list[CandidateFit]] = []
@@ -118,10 +118,10 @@ def best_sets(seen: Sequence[Seen], r0: Array) -> list[list[CandidateFit]]:
 class _NormalEquations:
     """ResponseBank added up: what is missing, r0, less what they do in shares of what was seen."""
 
-    def __init__(self, seen: Sequence[Seen], r0: Array) -> None:
-        A = np.concatenate([s.signatures for s in seen], axis=1)
+    def __init__(self, seen: Sequence[Response], r0: Array) -> None:
+        A = np.concatenate([s.responses for s in seen], axis=1)
         self.seen, self.whole = seen, float(r0 @ r0)
-        self.ends = np.cumsum([0, *(s.signatures.shape[1] for s in seen)])
+        self.ends = np.cumsum([0, *(s.responses.shape[1] for s in seen)])
         self.H, self.g = A.T @ A, A.T @ r0
         self.H[np.diag_indices_from(self.H)] += 1e-9 * np.diag(self.H) + 1e-9
 
@@ -136,7 +136,7 @@ class _NormalEquations:
         return self.whole + float(2 * g @ share + share @ H @ share), x
 
 
-def possible(s: Seen, x: Array) -> bool:
+def possible(s: Response, x: Array) -> bool:
     """Whether an effect is there at all, at these sizes."""
     return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
 
@@ -149,9 +149,9 @@ def worst_joint(beyond: dict[str, float]) -> str | None:
 
 def several(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
             ) -> list[list[CandidateFit]]:
-    """Sets of effects for the joint that errs most, where the base is held and no single one is most of it."""
+    """Sets of effects for the joint that errs most, where the base is fixed and no single one is most of it."""
     joint = worst_joint(beyond)
-    if joint is None or search.evaluator.walks(takes):
+    if joint is None or search.evaluator.any_floating(takes):
         return []
     if max((t.closed for t in trials if t.joint in (joint, None)), default=0.0) > SUBSETS.nearly_all:
         return []

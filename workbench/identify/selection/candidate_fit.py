@@ -31,18 +31,18 @@ class CandidateFit:
 
 @dataclass(frozen=True)
 class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's signatures foretell, that
-    those seen now do, and that a first step reached, by joint; wide: what is foretold of each that all channels judge, of one
-    number, as coarse steps show it, and of several; least: what must be foretold of one that is fitted; unheld: whether no take
-    had the base held, so that walks alone tell what joints lack, however much; early: what there is without them leaves, by takes
-    and how long these are looked at."""
+    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's responses predict, that
+    those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of one
+    number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; unheld: whether no take
+    had a fixed base, so that floating-base takes alone tell what joints lack, however much; early: what there is without them
+    leaves, by takes and how long these are looked at."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     screened_out: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0
-    unheld: bool = False
+    no_fixed_base: bool = False
     early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
 

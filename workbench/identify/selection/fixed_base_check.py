@@ -11,24 +11,25 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.selection.options import SUBSETS
 
 
-def checked_on_fixed_base(search: Search, current: Fit, told: Sequence[Candidate]) -> tuple[Search, Fit]:
-    """The fit with such numbers of effects that walks have just told as held takes tell them, and the search in which these are
-    settled; as it was where walks then show less of them, or held takes want none at all."""
-    if not search.held:
+def checked_on_fixed_base(search: Search, current: Fit, identified: Sequence[Candidate]) -> tuple[Search, Fit]:
+    """The fit with such numbers of effects that floating-base takes have just identified as fixed-base takes identify them, and
+    the search in which these are settled; as it was where floating-base takes then show less of them, or fixed-base takes want
+    none at all."""
+    if not search.fixed_base:
         return search, current
-    for c in told:
+    for c in identified:
         if c.where and c.size and not c.read_off and c.effect.layer != "ground" and not search.is_settled(c):
             search, current = _checked(search, current, c)
     return search, current
 
 
 def _checked(search: Search, current: Fit, c: Candidate) -> tuple[Search, Fit]:
-    held, walks = search.held, search.floating_base(search.fitted)
+    fixed, floating = search.fixed_base, search.floating_base(search.fitted)
     without = search.evaluated(current.sizes_without(c.key))
     if not contradicted_by_fixed_base(search, current, without):
         return search, current
     settled, fit = search.resettled(current, c)
-    walking = [gained(search.evaluator, without, there, walks, "fit") for there in (fit, current)]
-    if gained(search.evaluator, without, fit, held, "fit") > 0 and walking[0] > SUBSETS.nearly_all * walking[1]:
+    walking = [gained(search.evaluator, without, there, floating, "fit") for there in (fit, current)]
+    if gained(search.evaluator, without, fit, fixed, "fit") > 0 and walking[0] > SUBSETS.nearly_all * walking[1]:
         return settled, fit
     return search, current

@@ -1,6 +1,7 @@
 """Forward: which effects are taken, judged on stretches that no fit saw.
 
-First what held takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground adds.
+First what fixed-base takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground
+adds.
 """
 
 from __future__ import annotations
@@ -35,22 +36,23 @@ from workbench.identify.selection.single_joint import set_right, single_joint_st
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
            ) -> SelectionResult:
     """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
-    left out of what is played; read anew by what held takes told."""
+    left out of what is played; read anew by what fixed-base takes identified."""
     current = nominal = search.evaluated([])
     rounds: list[SelectionStep] = []
-    work = FORWARD.most_work_lone if search.single_joint else FORWARD.most_work
+    work = FORWARD.most_work_single_joint if search.single_joint else FORWARD.most_work
     most = np.inf if thorough else max(work, FORWARD.most_rollouts * search.evaluator.seconds)
-    if search.held:
-        search, current, rounds = _phase(search, pool, current, search.held, rounds, report, most)
+    if search.fixed_base:
+        search, current, rounds = _phase(search, pool, current, search.fixed_base, rounds, report, most)
     if current.effects and played is not None:
         report("looking anew", None)
         begun = search
         search, played = reestimated(search, current, played)
         if search is not begun:
             rounds = [replace(r, before=search.evaluated(r.before.sizes())) for r in rounds]
-            current = search.refitted(search.evaluated(current.sizes()), search.held or search.fitted, FORWARD.replayed_steps)
+            there = search.evaluated(current.sizes())
+            current = search.refitted(there, search.fixed_base or search.fitted, FORWARD.replayed_steps)
         nominal = search.evaluated([])
-    if search.held != search.fitted:
+    if search.fixed_base != search.fitted:
         current = search.with_timing_refitted(current)
         search = search.with_settled(current)
         closed = least_closed(search, nominal, current)
@@ -68,8 +70,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
 
 
 def _may_go_on(search: Search, fit: Fit) -> bool:
-    """Whether a fit may not have come to its end: where walks still show a gap, as fits of several numbers begin in coarse steps,
-    and of a lone joint, where all acts alike and valleys are long."""
+    """Whether a fit may not have come to its end: where floating-base takes still show a gap, as fits of several numbers begin in
+    coarse steps, and of a robot of one joint, where all acts alike and valleys are long."""
     return search.single_joint or any(
         channel_gaps(search.evaluator.evidence[i], fit.residuals[i]) for i in search.floating_base(search.fitted)
     )
@@ -80,17 +82,17 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, rounds = False, list(rounds)
-    least = ACCEPTANCE.least_walking if search.evaluator.walks(takes) else ACCEPTANCE.all_closed * FIT.least_gain
+    least = ACCEPTANCE.least_walking if search.evaluator.any_floating(takes) else ACCEPTANCE.all_closed * FIT.least_gain
     for _ in range(FORWARD.most_rounds):
         beyond = remaining(search, current, before_rough(rounds, current), takes)
         if stopped or not beyond or too_little_left(search, current, takes, rounds):
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
-        if not search.evaluator.walks(takes) and search.single_joint and search.evaluator.work <= most_work:
-            current, seats = single_joint_step(search, pool, current, beyond, takes, say)
-            rounds += seats
-            if seats:
+        if not search.evaluator.any_floating(takes) and search.single_joint and search.evaluator.work <= most_work:
+            current, taken_in = single_joint_step(search, pool, current, beyond, takes, say)
+            rounds += taken_in
+            if taken_in:
                 continue
         trials: list[CandidateFit] = []
         likely = pool
@@ -114,7 +116,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         fits = search.side_by_side([fitted_beside(search, current, accepted, takes, SUBSETS.most_steps) for accepted in choices])
         after, accepted = min(zip(fits, choices), key=lambda f: penalised_cost(f[0]), default=(current, []))
         sizes = {c.key: x for fit in fits for c, x in fit.sizes()}
-        seats = [
+        taken_in = [
             SelectionStep(current, tuple(replace(t, x=sizes.get(t.candidate.key, t.x)) for t in trials), tuple(accepted), stopped)
         ]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
@@ -122,45 +124,45 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
         if sets and penalised_cost(sets[0][0]) < SUBSETS.half * penalised_cost(after):
             after = sets[0][0]
-            seats = [replace(seats[0], accepted=()), *selection_steps(search, current, sets)]
-        rounds += seats
+            taken_in = [replace(taken_in[0], accepted=()), *selection_steps(search, current, sets)]
+        rounds += taken_in
         if after is current:
             break
         current = after
-        if search.evaluator.walks(takes):
+        if search.evaluator.any_floating(takes):
             search, current = checked_on_fixed_base(search, current, [t.candidate for t in accepted])
         else:
             current, rounds = reevaluated(search, current, rounds, takes)
-    if search.evaluator.walks(takes):
+    if search.evaluator.any_floating(takes):
         current, rounds = reevaluated(search, current, rounds, takes)
     elif search.single_joint and search.evaluator.work <= most_work:
-        current, seats = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
-        rounds = seats or rounds
+        current, taken_in = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
+        rounds = taken_in or rounds
     return search, current, rounds
 
 
 def _says_it(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether the best so far leaves nothing worth asking in the tiers that follow."""
-    surely = tier < SCHEDULING.tiers_of_all or not search.evaluator.walks(takes)
+    surely = tier < SCHEDULING.tiers_of_all or not search.evaluator.any_floating(takes)
     if surely and t.joint is None and t.candidate.joint in standing_out(search, current, takes):
         closed = _closed_at(search, current, t, takes, t.candidate.joint)
         return t.gain["choose"] > ACCEPTANCE.least_walking and closed > FORWARD.own_gap
     if not surely:
         return t.closed > FORWARD.enough
-    return t.closed > (FORWARD.nearly_all_walking if search.evaluator.walks(takes) else SUBSETS.nearly_all)
+    return t.closed > (FORWARD.nearly_all_walking if search.evaluator.any_floating(takes) else SUBSETS.nearly_all)
 
 
 def _tips(search: Search, t: CandidateFit, takes: tuple[int, ...], tier: int) -> bool:
     """Whether centres of mass of links that are asked last are not to be passed over: they tip a robot on the ground as the best
     so far does. A load there, with a number more, does so wherever it hangs, which tells nothing."""
-    return search.evaluator.walks(takes) and tier + 1 < SCHEDULING.tiers_of_all and t.candidate.effect.layer == "inertia"
+    return search.evaluator.any_floating(takes) and tier + 1 < SCHEDULING.tiers_of_all and t.candidate.effect.layer == "inertia"
 
 
 def _is_of_all(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], beyond: dict[str, float]) -> bool:
-    """Whether an effect of the whole robot takes nearly all away of what most joints lack with the base held: they lack it in
+    """Whether an effect of the whole robot takes nearly all away of what most joints lack on a fixed base: they lack it in
     common, whatever more one of them lacks."""
     joints = {joint_of(c) for c in beyond if c not in BODY}
-    if t.candidate.where or len(joints) <= SCHEDULING.few or search.evaluator.walks(takes):
+    if t.candidate.where or len(joints) <= SCHEDULING.few or search.evaluator.any_floating(takes):
         return False
     return float(np.median([_closed_at(search, current, t, takes, j) for j in joints])) > SUBSETS.nearly_all
 

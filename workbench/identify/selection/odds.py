@@ -18,15 +18,15 @@ Array = NDArray[np.float64]
 
 
 def is_equivalent(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
-    """Whether a rival moves the robot as effect i does, and held takes do not tell which it is."""
+    """Whether a rival moves the robot as effect i does, and fixed-base takes do not tell which it is."""
     if rival.effects[-1].name not in fit.effects[i].effect.equivalent_to:
         return False
-    return -_better(search, fit, rival, search.held) < ODDS.better * misfit(search, fit)
+    return -_better(search, fit, rival, search.fixed_base) < ODDS.better * misfit(search, fit)
 
 
 def is_by_floating_base(search: Search, c: Candidate, taken: CandidateFit) -> bool:
-    """Whether walks tell an effect."""
-    return taken.joint is None and search.evaluator.walks(search.fitted) and not search.is_settled(c)
+    """Whether floating-base takes identify an effect."""
+    return taken.joint is None and search.evaluator.any_floating(search.fitted) and not search.is_settled(c)
 
 
 def dispersion(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> float:
@@ -38,11 +38,11 @@ def dispersion(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> f
 
 def misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
     """What a fit leaves on the choosing stretches in shares of what a right model does, at least 1: by how much more than noise
-    alone would have them chi squared differences are left to chance. joint: that was judged alone with the base held, and does
+    alone would have them chi squared differences are left to chance. joint: that was judged alone on a fixed base, and does
     not feel what goes wrong elsewhere."""
     if joint is None:
         return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected(search.fitted, "choose")))
-    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.held}, "choose", joint)
+    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.fixed_base}, "choose", joint)
     return max(1.0, float(left.sum()) / max(1.0, float(expected.sum())))
 
 
@@ -68,8 +68,8 @@ def is_outpriced(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
 
 
 def better_by_both(fit: Fit, rival: Fit) -> float:
-    """By how much a rival is better of an effect that all takes tell, of chi squared on the choosing stretches: twice as many are
-    fitted, and say as much of each; what more numbers make of these is in their price."""
+    """By how much a rival is better of an effect that all takes identify, of chi squared on the choosing stretches: twice as many
+    are fitted, and say as much of each; what more numbers make of these is in their price."""
     return by_both({use: fit.cost[use] - rival.cost[use] for use in ("choose", "fit")})
 
 
@@ -79,9 +79,10 @@ def by_both(of: Mapping[str, float]) -> float:
 
 
 def better_on_fixed_base(search: Search, fit: Fit, rival: Fit) -> float:
-    """By how much a rival of an effect that held takes told is better: these take the word first."""
-    walks = _better(search, fit, rival, search.floating_base(search.fitted)) * ODDS.temper / FIT.overdispersion_free
-    return _better(search, fit, rival, search.held) + float(np.clip(walks, -ODDS.walks_say, ODDS.walks_say))
+    """By how much a rival of an effect that fixed-base takes identified is better: these take the word first."""
+    floating = _better(search, fit, rival, search.floating_base(search.fitted)) * ODDS.temper / FIT.overdispersion_free
+    most = ODDS.most_from_floating
+    return _better(search, fit, rival, search.fixed_base) + float(np.clip(floating, -most, most))
 
 
 def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float:
@@ -90,7 +91,7 @@ def _better(search: Search, fit: Fit, rival: Fit, takes: Sequence[int]) -> float
 
 
 def numbers_identified(fit: Fit, i: int) -> int:
-    """Numbers of an effect that the data tell: where along its axis a joint carries a mass makes no name better. All of one that
-    was too far behind to be fitted."""
-    told = int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
-    return told or fit.effects[i].size
+    """Numbers of an effect that the data identify: where along its axis a joint carries a mass makes no name better. All of one
+    that was too far behind to be fitted."""
+    identified = int(np.count_nonzero(np.isfinite(np.diag(fit.covariance)[fit.slices()[i]])))
+    return identified or fit.effects[i].size

@@ -12,32 +12,33 @@ class ScreeningOptions:
 
     far: float = 5.0
     far_walking: float = 1.6
-    """Times the size it was looked at that an effect's signature is believed to grow: a foot grips or slips, which no line
+    """Times the size it was looked at that an effect's response is believed to grow: a foot grips or slips, which no line
     tells."""
     looked: float = 2.5
     looked_share: float = 0.3
-    looked_share_held: float = 0.5
+    looked_share_fixed: float = 0.5
     """How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on
-    the ground and with the base held; else longer. Late in walks small differences have grown into others."""
+    the ground and on a fixed base; else longer. Late in walks small differences have grown into others."""
     calm: float = 0.5
-    """Share of what is beyond noise that signatures of several numbers must explain. If they do not on all walks, but do on one
-    of them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and a calmer one
-    may."""
+    """Share of what is beyond noise that responses of several numbers must explain. If they do not on all floating-base takes,
+    but do on one of them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and
+    a calmer one may."""
     worth: float = 0.3
     worth_walking: float = 0.5
-    """Share of the best gain at its place, as signatures foretell it, from which on an effect is fitted: where the base is held,
+    """Share of the best gain at its place, as responses predict it, from which on an effect is fitted: where the base is fixed,
     where that is cheap, and on a walk."""
     doubted: float = 0.6
-    """Share of the least gain from which on the best are fitted where none is foretold all of it: signatures say too little where
+    """Share of the least gain from which on the best are fitted where none is predicted all of it: responses say too little where
     only a part of a walk was looked at."""
     behind: float = 0.6
     """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
     remembered: float = 0.15
     remembered_least: float = 0.25
-    """Shares of the best gain and of the least, as signatures of a race beside fewer effects foretell it, from which on an effect
+    """Shares of the best gain and of the least, as responses of a race beside fewer effects predict it, from which on an effect
     is looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
     most_fitted: int = 3
-    """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is foretold."""
+    """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is
+    predicted."""
     steps: int = 3
     steps_walking: int = 2
     """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
@@ -50,8 +51,9 @@ class SchedulingOptions:
     tiers: int = 8
     tiers_of_all: int = 6
     """On the ground the first are what moves the robot as a whole, and joints that stand out."""
-    lone: int = 2
-    """The last tier of a lone joint that is held: its links move nothing else, and what they carry looks like what it lacks."""
+    single_joint_tier: int = 2
+    """The last tier of the one joint of a robot on a fixed base: its links move nothing else, and what they carry looks like what
+    it lacks."""
     stands_out: float = 4.0
     """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on
     it lacks something, not the robot as a whole."""
@@ -69,20 +71,20 @@ class SubsetOptions:
     """Best subsets of effects in one joint."""
 
     nearly_all: float = 0.9
-    """Share of a gap from which on less likely effects are not asked for with the base held, as what a hand carries looks like a
+    """Share of a gap from which on less likely effects are not asked for on a fixed base, as what a hand carries looks like a
     weak shoulder, nor sets of them."""
     half: float = 0.5
-    """Share of what the best smaller set leaves, as signatures foretell it, that the best with one more effect may leave."""
+    """Share of what the best smaller set leaves, as responses predict it, that the best with one more effect may leave."""
     sizes: tuple[int, int] = (2, 3)
     fitted: int = 6
     as_good: float = 2.0
     """Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does,
-    as lines foretell roughly."""
+    as lines predict roughly."""
     again: tuple[tuple[float, float], ...] = tuple(product((0.75, 1.33), (-0.7, 0.7)))
     """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
     most_steps: int = 5
     together_steps: int = 12
-    """Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines foretell them, and
+    """Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines predict them, and
     where others must take one's place. It ends where little changes."""
 
 
@@ -129,17 +131,18 @@ class AcceptanceOptions:
     """The stopping criterion and the acceptance test."""
 
     least_walking: float = 300.0
-    """LEAST_GAIN of an effect that only walks show, whatever its numbers are: contact makes more of small differences."""
+    """LEAST_GAIN of an effect that only floating-base takes show, whatever its numbers are: contact makes more of small
+    differences."""
     all_closed: float = 0.5
     """Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
     least_share: float = 0.01
     walking_share: float = 0.02
-    """Of what the effects before it brought at its place, that an effect must bring with the base held and on the ground, and of
-    a held channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect
+    """Of what the effects before it brought at its place, that an effect must bring on a fixed base and on the ground, and of a
+    fixed-base channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect
     does, and a second effect must not live on that."""
     alone: float = 0.25
-    """Of LEAST_SHARE, for a held joint that nothing was given to and of which much more than of any other is left: what engines
-    play differently of an effect that all joints show, they do in all."""
+    """Of LEAST_SHARE, for a joint on a fixed base that nothing was given to and of which much more than of any other is left:
+    what engines play differently of an effect that all joints show, they do in all."""
     rough_share: float = 0.04
     left_share: float = 0.02
     """The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
@@ -174,14 +177,14 @@ class ForwardOptions:
     """The forward selection."""
 
     most_rounds: int = 6
-    """With the base held, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
+    """On a fixed base, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
     most_work: float = 3200.0
-    most_work_lone: float = 6400.0
+    most_work_single_joint: float = 6400.0
     most_rollouts: float = 60.0
-    """Seconds of rollouts, of a lone joint, of which sets are fitted, and rollouts of all takes if that is more, after which
-    nothing more is tried: minutes, of half a minute of recording."""
+    """Seconds of rollouts, of a robot of one joint, of which sets are fitted, and rollouts of all takes if that is more, after
+    which nothing more is tried: minutes, of half a minute of recording."""
     enough: float = 0.6
-    """Share of a gap from which on less likely effects are not asked for. With the base held it is NEARLY_ALL, and on the ground
+    """Share of a gap from which on less likely effects are not asked for. On a fixed base it is NEARLY_ALL, and on the ground
     before joints are asked, as a joint's effect can look like one of the whole robot's."""
     own_gap: float = 0.9
     """The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play closes three quarters."""
@@ -206,22 +209,21 @@ class OddsOptions:
     """From differences of chi squared to odds."""
 
     temper: float = 4.0
-    """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where walks do
-    not tell."""
+    """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where
+    floating-base takes do not identify it."""
     rough: float = 0.015
-    """The same as a share of an effect's gain: where that is more, walks leave more open."""
+    """The same as a share of an effect's gain: where that is more, floating-base takes leave more open."""
     better: float = 30.0
-    """Of the same: a twin that held takes find worse by this much is none; by more where the fit leaves more than a right model
-    does."""
+    """Of the same: a equivalent effect that fixed-base takes find worse by this much is none; by more where the fit leaves more
+    than a right model does."""
     number: float = 40.0
     number_share: float = 0.03
     """What each number that a name has more than another must bring, of the same: TEMPER times the logarithm of how many frames
     speak (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a
     model, differ by some hundredths of it, and a name with more numbers makes more of that."""
-    walks_say: float = 2 * temper
-    """The most of chi squared that walks add to what held takes say of a name: odds of e to one. Small differences send a walk
-    elsewhere, and a wrong name may happen to go that way.
-    """
+    most_from_floating: float = 2 * temper
+    """The most of chi squared that floating-base takes add to what fixed-base takes say of a name: odds of e to one. Small
+    differences send a walk elsewhere, and a wrong name may happen to go that way."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +231,7 @@ class RivalOptions:
     """Which rivals are fitted in an effect's place."""
 
     near: float = 400.0
-    near_held: float = 0.05
+    near_fixed: float = 0.05
     """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one
     that is this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
     steps: int = 4
@@ -244,9 +246,9 @@ class ComparisonOptions:
 
     likelier: float = 0.5
     """A rival whose lead is this share of what leads are divided by is a fourth likelier, and takes an effect's place."""
-    twin: float = 1.0 / 3.0
-    """The least odds of a finding's twin that walks tell, where it came near enough to be put in its place, and of a name that
-    held takes find better but for the price of its numbers."""
+    least_equivalent: float = 1.0 / 3.0
+    """The least odds of a finding's equivalent effect that floating-base takes identify, where it came near enough to be put in
+    its place, and of a name that fixed-base takes find better but for the price of its numbers."""
     closed: tuple[tuple[float, float], ...] = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
     """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the
     last. True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in
@@ -259,8 +261,8 @@ class CalibrationOptions:
     """How sure an effect is, beyond its odds."""
 
     left: tuple[tuple[float, float], ...] = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
-    """RMS over sigma that held takes leave in some channel there at the end, and the factor for that; LEAST beyond the last. A
-    large gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
+    """RMS over sigma that fixed-base takes leave in some channel there at the end, and the factor for that; LEAST beyond the
+    last. A large gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
     rattles: float = 0.7
     """At least that factor for a link that cameras saw rock across its servo's axis: which way it lies is chance, each moment as
     far from a right model as it has play."""
@@ -272,9 +274,9 @@ class CalibrationOptions:
     alike_floor: float = 0.15
     hardly: float = 0.5
     """By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less:
-    of robots that lack nothing, played by another engine, walks want up to 5 % more, and a mass that swings looks like 12 % more.
-    The same for a number that would go further if it might, or may be nothing, and for a pull straight down: it makes up for
-    something else."""
+    of robots that lack nothing, played by another engine, floating-base takes want up to 5 % more, and a mass that swings looks
+    like 12 % more. The same for a number that would go further if it might, or may be nothing, and for a pull straight down: it
+    makes up for something else."""
     nothing: float = 3.0
     """Standard deviations from neutral within which a number may be nothing: a mass that swings below a body looked like a load
     of 2.7, true ones come to 3.3 and more."""

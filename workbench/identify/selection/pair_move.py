@@ -1,8 +1,8 @@
 """Pair moves, for confounded causes: a force that lifts the robot explains much of what a slope and a slippery floor do together.
 
 What explains most by itself is found first, and then nothing completes it. So it and what came near it are given company,
-foretold by lines around each one's own fit, in which all that walks told gives way: a motor that ends early makes up for much of
-a body that leans.
+predicted by lines around each one's own fit, in which all that floating-base takes identified gives way: a motor that ends early
+makes up for much of a body that leans.
 """
 
 from __future__ import annotations
@@ -31,44 +31,45 @@ Array = NDArray[np.float64]
 
 def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Report
            ) -> tuple[Fit, list[SelectionStep]]:
-    """The fit, with two effects in the place of the last that walks told, one of them at least of the ground or of masses, where
-    that left much and these bring enough more, and the rounds with them."""
+    """The fit, with two effects in the place of the last that floating-base takes identified, one of them at least of the ground
+    or of masses, where that left much and these bring enough more, and the rounds with them."""
     there = current.sizes_by_key()
-    told = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
-    if not told or told[-1][1].closed > RECORD.complete or told[-1][1].candidate.effect.point_mass:
+    by_all = [(r, t) for r in rounds for t in r.accepted if judged_by_all(search, t) and t.candidate.key in there]
+    if not by_all or by_all[-1][1].closed > RECORD.complete or by_all[-1][1].candidate.effect.point_mass:
         return current, list(rounds)
     if too_little_left(search, current, search.fitted, rounds):
         return current, list(rounds)
-    seat, found = told[-1]
+    first, found = by_all[-1]
     report(f"trying two causes for {found.candidate}", None)
     rest = search.evaluated(current.sizes_without(found.candidate.key))
-    free = [c for c in pool if _keeps_company(c) and c.key not in {e.key for e in rest.effects}]
+    free = [c for c in pool if _may_pair(c) and c.key not in {e.key for e in rest.effects}]
     known = {found.candidate.key: replace(found, x=there[found.candidate.key])}
-    known |= {t.candidate.key: t for t in seat.trials if t.candidate in free and judged_by_all(search, t)
+    known |= {t.candidate.key: t for t in first.trials if t.candidate in free and judged_by_all(search, t)
               and t.candidate.key != found.candidate.key and t.gain["choose"] >= PAIR_MOVE.near * found.gain["choose"]}
-    pairs = _foretold(search, rest, list(known.values())[:PAIR_MOVE.ones], free)
+    pairs = _predicted(search, rest, list(known.values())[:PAIR_MOVE.ones], free)
     fits = search.side_by_side([fitted_beside(search, rest, pair, search.fitted, PAIR_MOVE.steps) for pair in pairs])
     ranked = sorted(zip(fits, pairs), key=lambda f: penalised_cost(f[0]))
     if not ranked or not _enough(search, *ranked[0], current, rounds):
         return current, list(rounds)
-    seats = [_beside_tried(r, seat) for r in selection_steps(search, rest, ranked)]
-    return ranked[0][0], [*(r for r in rounds if r is not seat), *seats]
+    instead = [_beside_tried(r, first) for r in selection_steps(search, rest, ranked)]
+    return ranked[0][0], [*(r for r in rounds if r is not first), *instead]
 
 
-def _beside_tried(taken: SelectionStep, seat: SelectionStep) -> SelectionStep:
-    """A round with what else was tried at first: a pull's twin is to be put in its place."""
+def _beside_tried(taken: SelectionStep, first: SelectionStep) -> SelectionStep:
+    """A round with what else was tried at first: a pull's equivalent effect is to be put in its place."""
     fitted = {t.candidate.key for t in taken.trials}
-    return replace(taken, trials=(*taken.trials, *(t for t in seat.trials if t.candidate.key not in fitted)))
+    return replace(taken, trials=(*taken.trials, *(t for t in first.trials if t.candidate.key not in fitted)))
 
 
-def _keeps_company(c: Candidate) -> bool:
-    """What the ground does, and where masses are; not how heavy what is carried is, which walks tell last."""
+def _may_pair(c: Candidate) -> bool:
+    """What the ground does, and where masses are; not how heavy what is carried is, which floating-base takes identify last."""
     return c.size > 0 and c.effect.layer in ("ground", "inertia") and not c.effect.point_mass
 
 
 @dataclass(frozen=True)
 class _Around:
-    """What is asked around a fit with one effect: each number that walks tell moved, and each other effect beside it."""
+    """What is asked around a fit with one effect: each number that floating-base takes identify moved, and each other effect
+    beside it."""
 
     one: CandidateFit
     fit: Fit
@@ -107,7 +108,7 @@ def _probes(c: Candidate) -> list[Array]:
     return [np.clip(s * p, *c.bounds()) for p in c.probes() for s in sizes]
 
 
-def _foretold(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: Sequence[Candidate]) -> list[list[CandidateFit]]:
+def _predicted(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: Sequence[Candidate]) -> list[list[CandidateFit]]:
     """The pairs that lines around each one's fit say leave least, with sizes to begin from."""
     takes = search.telling([t.candidate for t in ones], search.fitted)
     around = [_Around.of(t, search.evaluated([*rest.sizes(), (t.candidate, t.x)]), others, search) for t in ones]

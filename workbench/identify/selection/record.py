@@ -61,5 +61,5 @@ def _exact(t: CandidateFit) -> bool:
 
 
 def judged_by_all(search: Search, t: CandidateFit) -> bool:
-    """Whether it was fitted by some number, and all channels judged it; not what held takes told."""
+    """Whether it was fitted by some number, and all channels judged it; not what fixed-base takes identified."""
     return not t.screened_out and t.joint is None and t.candidate.size > 0 and not search.is_settled(t.candidate)

@@ -18,16 +18,17 @@ from workbench.identify.selection.record import SelectionStep
 
 Array = NDArray[np.float64]
 
-Seats = dict[Key, tuple[SelectionStep, CandidateFit]]
+TakenIn = dict[Key, tuple[SelectionStep, CandidateFit]]
 """By effect, when it was taken and on what."""
 
 
-def rivals_near(search: Search, seats: Seats, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[CandidateFit]:
-    """Who came near an effect when it was taken, and is not among those that stay; its twin; what it is at its shape's end; where
-    walks tell it, what moves another link's centre of mass, which tips the robot as much once it is fitted to its end."""
-    r, trial = seats[c.key]
+def rivals_near(search: Search, taken_in: TakenIn, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[CandidateFit]:
+    """Who came near an effect when it was taken, and is not among those that stay; its equivalent effect; what it is at its
+    shape's end; where floating-base takes identify it, what moves another link's centre of mass, which tips the robot as much
+    once it is fitted to its end."""
+    r, trial = taken_in[c.key]
     taken = {e.key for e in effects}
-    reach = max(RIVAL.near, (FORWARD.close if trial.joint is None else RIVAL.near_held) * trial.gain["choose"])
+    reach = max(RIVAL.near, (FORWARD.close if trial.joint is None else RIVAL.near_fixed) * trial.gain["choose"])
     there = [t for t in r.rivals(trial) if t.candidate.key not in taken]
     alike = {(name, c.where) for name in c.effect.equivalent_to if trial.joint is None}
     if _at_its_end(c, x):
@@ -52,9 +53,9 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
 
 
 def put_in_place(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
-    """The fit with a rival in effect i's place and its numbers fitted there, with those of others in its joint where held takes
-    tell them; the same effect elsewhere begins at the size that the other has, and what the other becomes where that does the
-    same, if that is better."""
+    """The fit with a rival in effect i's place and its numbers fitted there, with those of others in its joint where fixed-base
+    takes identify them; the same effect elsewhere begins at the size that the other has, and what the other becomes where that
+    does the same, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)
@@ -65,7 +66,7 @@ def put_in_place(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[
     there = min((yield from search.evaluating(*([*others, (rival.candidate, x)] for x in starts))), key=lambda f: f.cost["fit"])
     if there.cost["choose"] - fit.cost["choose"] > max(2 * RIVAL.near, 2 * FORWARD.close * rival.gain["choose"]):
         return there
-    held = search.told_by_fixed_base(own)
-    takes = search.held if held else search.fitted
-    beside = [j for j, (c, _) in enumerate(others) if held and (search.single_joint or c.joint == own.joint)]
+    fixed = search.identified_on_fixed_base(own)
+    takes = search.fixed_base if fixed else search.fitted
+    beside = [j for j, (c, _) in enumerate(others) if fixed and (search.single_joint or c.joint == own.joint)]
     return (yield from search.refitting(there, takes, RIVAL.steps, free=[*beside, len(others)]))

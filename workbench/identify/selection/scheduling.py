@@ -18,7 +18,7 @@ from workbench.identify.selection.options import SCHEDULING
 
 def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
             tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
-    """Groups to try, and on which takes each: effects of joints at the joints with a gap, with the base held all joints at once,
+    """Groups to try, and on which takes each: effects of joints at the joints with a gap, on a fixed base all joints at once,
     as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= SCHEDULING.ill * worst}
@@ -35,7 +35,8 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
         likely = _tier(c, bool(floating_base), many, stand.heavy, outstanding, stand.carried_by(c) in well)
-        if c.key in used or _is_covered(c, current.effects) or (min(likely, SCHEDULING.lone) if single_joint else likely) != tier:
+        likely = min(likely, SCHEDULING.single_joint_tier) if single_joint else likely
+        if c.key in used or _is_covered(c, current.effects) or likely != tier:
             continue
         if c.effect.layer == "measurement":
             groups[c.key] = [c]
@@ -99,16 +100,16 @@ def standing_out(search: Search, current: Fit, takes: tuple[int, ...]) -> set[st
 
 
 def well_on_fixed_base(search: Search, current: Fit) -> tuple[set[str], set[str]]:
-    """Joints that moved while the base was held and went as the model has it; those that did not go so."""
+    """Joints that moved while the base was fixed and went as the model has it; those that did not go so."""
     evidence = search.evaluator.evidence
-    ill = {joint_of(c) for i in search.held for c in channel_gaps(evidence[i], current.residuals[i])}
-    moved = {j for i in search.held for j in evidence[i].joints
+    ill = {joint_of(c) for i in search.fixed_base for c in channel_gaps(evidence[i], current.residuals[i])}
+    moved = {j for i in search.fixed_base for j in evidence[i].joints
              if np.nanmax(np.abs(evidence[i].recorded[:, evidence[i].channels.index(j)]), initial=0.0) > SCHEDULING.moved}
     return moved - ill, ill
 
 
 def _tier(c: Candidate, floating_base: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str], well: bool) -> int:
-    """First what was read off: how cameras saw the robot, stops, loose mounts. With the base held, the whole robot, if many
+    """First what was read off: how cameras saw the robot, stops, loose mounts. On a fixed base, the whole robot, if many
     joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
     number, by where feet stand, by several (for which a walk has to be looked at all around), of links that their joint carried
     well in all axes but its own last, then joints, what links carry."""
@@ -132,7 +133,7 @@ def _tier(c: Candidate, floating_base: bool, many: bool, heavy: Sequence[str], o
 
 
 def _could_show(search: Search, c: Candidate, joints: set[str]) -> bool:
-    """Whether an effect could make these joints err with the base held, and no others: one of the whole robot errs in several,
+    """Whether an effect could make these joints err on a fixed base, and no others: one of the whole robot errs in several,
     one of a link in the joints that carry it, the floor in none."""
     if not c.effect.observable_when_fixed:
         return False

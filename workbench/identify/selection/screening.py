@@ -27,11 +27,11 @@ Asking = Part[list[CandidateFit]]
 
 def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], takes: Mapping[int, tuple[int, ...]],
           report: Callable[[float], None], ahead: float = 0.0, least: float = 0.0) -> list[CandidateFit]:
-    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is held, one effect
+    """Every group fitted beside `current`, all in lockstep. A group is one candidate, or, while the base is fixed, one effect
     at several joints, each judged by its own joint's channels. takes: on which, by group.
     ahead: gain on fitted stretches of the best of rivals tried before, for those judged by all channels; least: what
-    signatures must foretell of one that is fitted."""
-    race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, unheld=not search.held), []
+    responses must predict of one that is fitted."""
+    race, asking = Race({None: ahead}, {None: ahead}, {None: ahead}, least=least, no_fixed_base=not search.fixed_base), []
     for n, group in enumerate(groups):
         base = {i: current.residuals[i] for i in takes[n]}
         asking.append(
@@ -43,7 +43,7 @@ def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], t
                 group,
                 race,
                 search.apart(group[0], takes[n]),
-                search.signatures,
+                search.responses,
             ).run()
         )
     return [trial for trials in search.side_by_side(asking, report) for trial in trials]
@@ -53,7 +53,7 @@ class CandidateEvaluation:
     """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
-    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. signatures: of earlier
+    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. responses: of earlier
     races; this one's are added.
     """
 
@@ -66,17 +66,17 @@ class CandidateEvaluation:
         group: Sequence[Candidate],
         race: Race,
         apart: bool,
-        signatures: ResponseBank,
+        responses: ResponseBank,
     ) -> None:
-        self.evaluator, self.group, self.race, self.signatures = evaluator, group, race, signatures
+        self.evaluator, self.group, self.race, self.responses = evaluator, group, race, responses
         self.with_these = with_effects(nominal, beside)
         self.joints = [c.joint if apart else None for c in group]
-        self.walking = evaluator.walks(tuple(base))
+        self.walking = evaluator.any_floating(tuple(base))
         self.base, self.takes = base, tuple(base)
         self.coarse = all(c.size < 2 for c in group)  # several numbers are told apart by little
         self.r0 = self._left(base)
         self.power = {i: evaluator.cost({i: r}, "fit") for i, r in base.items()}
-        alone = self.coarse and self.walking  # walks are expensive
+        alone = self.coarse and self.walking  # floating-base takes are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
         single_joint = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
         self.until = self._shown() if self.coarse and not single_joint else np.inf
@@ -101,8 +101,8 @@ class CandidateEvaluation:
         return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
-        """Sizes and gains as signatures of an earlier race foretell them, where that is hopeless; None: to be looked at."""
-        known = self.signatures.get(self._name) if self.walking else None
+        """Sizes and gains as responses of an earlier race predict them, where that is hopeless; None: to be looked at."""
+        known = self.responses.get(self._name) if self.walking else None
         guesses = None if known is None else self._guessed(*known)
         if guesses is not None:
             note_best(self.race.remembered, self.joints, guesses[1])
@@ -111,37 +111,37 @@ class CandidateEvaluation:
         return None if guesses is None or guesses[1][0] >= enough else guesses
 
     def _looked_at(self) -> Part[tuple[list[Array], list[float]]]:
-        """Sizes to start from and what signatures say they gain, from coarse rollouts."""
+        """Sizes to start from and what responses say they gain, from coarse rollouts."""
         everyone = list(range(len(self.group)))
         c = self.group[0]
-        probes = scan(c, scan_sizes(c, self.walking, self.race.unheld), self.walking)
+        probes = scan(c, scan_sizes(c, self.walking, self.race.no_fixed_base), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
         plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse, until=self.until) for q in looks]
         before = self._left(plain)
-        signatures = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
-        self.signatures[self._name] = probes, signatures, self.until
-        told = self._guessed(probes, signatures, self.until)
-        calm = None if self.coarse or not self.walking else self._calmest(probes, signatures, told[1][0])
+        responses = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
+        self.responses[self._name] = probes, responses, self.until
+        guess = self._guessed(probes, responses, self.until)
+        calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
         if calm is None:
-            return told
+            return guess
         x = yield from self._fitted_on(*calm)
         (answer,) = yield [self._question([0], [x])]
-        return max(told, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
+        return max(guess, ([x], [sum(self.power.values()) - self.evaluator.cost(answer, "fit")]), key=lambda t: t[1])
 
     def _fitted_on(self, take: int, x: Array) -> Part[Array]:
         """Sizes as one take alone wants them."""
         def ask(point: Sequence[Array]) -> RolloutRequest:
             return replace(self._question([0], point), takes=(take,))
 
-        def tell(answer: dict[int, Array]) -> list[Array]:
+        def as_vectors(answer: dict[int, Array]) -> list[Array]:
             return [self.evaluator.vector(answer, "fit")]
 
         (answer,) = yield [ask([x])]
-        (solved,) = yield from through(self._stepping([x], tell(answer), [0], SCREENING.steps_walking), ask, tell)
+        (solved,) = yield from through(self._stepping([x], as_vectors(answer), [0], SCREENING.steps_walking), ask, as_vectors)
         return solved.x
 
-    def _calmest(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
-        """The take of which signatures explain most, and sizes as it wants them; None where none is, or all are (gain)."""
+    def _calmest(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], gain: float) -> tuple[int, Array] | None:
+        """The take of which responses explain most, and sizes as it wants them; None where none is, or all are (gain)."""
         beyond = {i: self.power[i] - self.evaluator.expected((i,), "fit") for i in self.takes}
         if gain > SCREENING.calm * sum(beyond.values()):
             return None
@@ -151,20 +151,20 @@ class CandidateEvaluation:
         for i in self.takes:
             here = take == i
             r0 = self.r0[0][here]
-            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in signatures], SCREENING.far_walking)
+            x, gain = linearised_estimate(self.group[0], r0, probes, [r0 + s[0][here] for s in responses], SCREENING.far_walking)
             share = gain / max(beyond[i], self.race.least, 1.0)
             if share > most:
                 best, most = (i, x), share
         return best
 
-    def _guessed(self, probes: Sequence[Array], signatures: Sequence[Sequence[Array]], until: float
+    def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], until: float
                  ) -> tuple[list[Array], list[float]]:
         """Sizes to start from and what they gain, on all takes as on what was looked at."""
         looked_at = self._early(until)
         r0 = self._left(looked_at)
         far = SCREENING.far_walking if self.walking else SCREENING.far
         guesses = [
-            linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in signatures], far) for b, c in enumerate(self.group)
+            linearised_estimate(c, r0[b], probes, [r0[b] + s[b] for s in responses], far) for b, c in enumerate(self.group)
         ]
         share = max(self.evaluator.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
@@ -172,7 +172,7 @@ class CandidateEvaluation:
     def _shown(self) -> float:
         """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
         seen, until = {i: self.base[i] for i in self.looked_at}, SCREENING.looked
-        share = SCREENING.looked_share if self.walking else SCREENING.looked_share_held
+        share = SCREENING.looked_share if self.walking else SCREENING.looked_share_fixed
         least = {j: share * self.evaluator.cost(seen, "fit", j) for j in self.joints}
         while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
             until += SCREENING.looked / 2
@@ -186,12 +186,12 @@ class CandidateEvaluation:
         return self.race.early[key]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
-        """Of the group, those that are not told to be far behind a rival."""
+        """Of the group, those that are not predicted to be far behind a rival."""
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
         note_best(race.screened_out, self.joints, gains)
-        yield []  # until all have said what they foretell
+        yield []  # until all have said what they predict
         last = sorted(alike, reverse=True)[:SCREENING.most_fitted][-1] if alike else 0.0
         worth = SCREENING.worth_walking if self.walking else SCREENING.worth
         least = race.least * (1.0 if best_at(race.screened_out, None) > race.least else SCREENING.doubted)

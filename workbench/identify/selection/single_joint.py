@@ -83,10 +83,10 @@ def _free(c: Candidate, x: Array) -> Array:
 
 def _looked_at(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
                say: Callable[[float], None]) -> list[CandidateFit]:
-    """What signatures say of all that acts in the one joint, nothing fitted."""
+    """What responses say of all that acts in the one joint, nothing fitted."""
     groups: list[list[Candidate]] = []
     on: dict[int, tuple[int, ...]] = {}
-    for tier in range(SCHEDULING.lone + 1):
+    for tier in range(SCHEDULING.single_joint_tier + 1):
         more, takes_of = asked(search, pool, current, beyond, takes, tier)
         on |= {len(groups) + n: takes_of[n] for n in range(len(more))}
         groups += more

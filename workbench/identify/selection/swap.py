@@ -1,6 +1,6 @@
 """Effects that were found together in one joint, one of them replaced: what lines around their fit say of all others.
 
-Lines drawn from a robot that lacks nothing foretell poorly what an effect does beside two more. Around a fit they are short, and
+Lines drawn from a robot that lacks nothing predict poorly what an effect does beside two more. Around a fit they are short, and
 the others give way: sequential replacement (A. J. Miller, Subset Selection in Regression, 2002).
 """
 
@@ -21,13 +21,13 @@ from workbench.identify.fitting.responses import scan
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts import RolloutRequest
-from workbench.identify.selection.best_subsets import Seen, possible, variants
+from workbench.identify.selection.best_subsets import Response, possible, variants
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS, SWAP
 
 Array = NDArray[np.float64]
 NOTHING = {"fit": 0.0, "choose": 0.0}
-"""The gain of what lines only foretell."""
+"""The gain of what lines only predict."""
 
 
 def exchanges(
@@ -40,7 +40,7 @@ def exchanges(
     beside: bool = False,
 ) -> list[list[CandidateFit]]:
     """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
-    whoever was asked about the joint, on these takes, whose base is held. beside: those, too, in which it stands for none."""
+    whoever was asked about the joint, on these takes, whose base is fixed. beside: those, too, in which it stands for none."""
     there = fit.sizes_by_key()
     mine = [c for c in alone if c.key in there]
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
@@ -57,12 +57,12 @@ def exchanges(
     slopes = [np.column_stack([(next(seen) - left) / float((x - there[c.key]).sum()) for x in points])
               for c, points in zip(mine, moves)]
     rests = [next(seen) for _ in mine]
-    signatures = [[next(seen) - left for _ in points] for points in probes]
+    responses = [[next(seen) - left for _ in points] for points in probes]
     out: list[list[CandidateFit]] = []
     for k, rest in enumerate([*rests, left] if beside else rests):
         staying = [n for n in range(len(mine)) if n != k]
         x = [there[mine[n].key] for n in staying]
-        sets = [s for t, points, did in zip(others, probes, signatures)
+        sets = [s for t, points, did in zip(others, probes, responses)
                 for s in in_place(t, points, did, rest, [mine[n] for n in staying], x, [slopes[n] for n in staying])]
         sets.sort(key=lambda s: s[0])
         out += [chosen for cost, chosen in sets[:SWAP.fitted] if cost < SUBSETS.as_good * sets[0][0]]
@@ -81,7 +81,7 @@ def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], res
     ends = np.cumsum([0, *(len(size) for size in x)])
     ways: list[tuple[float, list[CandidateFit]]] = []
     for seen in variants(t, points, did):
-        solved = lsq_linear(np.column_stack([*slopes, seen.signatures]), -rest, _bounds(seen, staying, x))
+        solved = lsq_linear(np.column_stack([*slopes, seen.responses]), -rest, _bounds(seen, staying, x))
         size = seen.sizes(solved.x[ends[-1]:])
         if possible(seen, size):
             beside = [
@@ -91,7 +91,7 @@ def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], res
     return sorted(ways, key=lambda way: way[0])[:1]
 
 
-def _bounds(seen: Seen, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
+def _bounds(seen: Response, staying: Sequence[Candidate], x: Sequence[Array]) -> tuple[Array, Array]:
     """Of moves of those that stay, and of shares of the points at which the other was seen."""
     low = [e.bounds()[0] - size for e, size in zip(staying, x)]
     high = [e.bounds()[1] - size for e, size in zip(staying, x)]

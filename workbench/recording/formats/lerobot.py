@@ -41,13 +41,13 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
     """
     source = str(path)
     table = _table(path)
-    episodes = _episodes(table)
+    episodes = _episodes(path, table)
     if episode is None and len(episodes) > 1:
         raise InputError(source, f"holds {len(episodes)} episodes; choose one as FILE#EPISODE, of {', '.join(episodes[:12])}")
     chosen = episode if episode is not None else (episodes or ("0",))[0]
     if episodes:
         table = table.filter(pa.compute.equal(table.column(_EPISODE), int(chosen)))
-    time = np.asarray(table.column(_TIME).to_numpy(zero_copy_only=False), dtype=float)
+    time = _numbers(source, table, _TIME)
     goals, positions = _vectors(source, table, _ACTION), _vectors(source, table, _STATE)
     if goals.shape != positions.shape:
         raise InputError(source, f"action has {goals.shape[1]} joints, observation.state {positions.shape[1]}; expected the same")
@@ -67,7 +67,7 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
 
 def episodes(path: Path) -> tuple[str, ...]:
     """Numbers of the episodes that a file or data set holds."""
-    return _episodes(_table(path))
+    return _episodes(path, _table(path))
 
 
 def _files(path: Path) -> list[Path]:
@@ -99,17 +99,30 @@ def _table(path: Path) -> pa.Table:
         raise InputError(path, f"files of one data set differ: {str(e)[:200]}") from None
 
 
-def _episodes(table: pa.Table) -> tuple[str, ...]:
+def _numbers(source: str, table: pa.Table, name: str) -> Array:
+    kind = table.column(name).type
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind)):
+        raise InputError(source, f"column '{name}': expected numbers, found {kind}")
+    return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=float)
+
+
+def _episodes(path: Path, table: pa.Table) -> tuple[str, ...]:
     if _EPISODE not in table.column_names:
         return ()
+    if not pa.types.is_integer(table.column(_EPISODE).type):
+        raise InputError(path, f"column '{_EPISODE}': expected whole numbers, found {table.column(_EPISODE).type}")
     return tuple(str(e) for e in dict.fromkeys(table.column(_EPISODE).to_pylist()) if e is not None)
 
 
 def _vectors(source: str, table: pa.Table, name: str) -> Array:
+    kind = table.column(name).type
+    inner = getattr(kind, "value_type", None)
+    if inner is None or not (pa.types.is_floating(inner) or pa.types.is_integer(inner)):
+        raise InputError(source, f"column '{name}': expected a vector of numbers in each row, found {kind}")
     try:
         rows = np.array(table.column(name).to_pylist(), dtype=float)
-    except (ValueError, TypeError) as e:
-        raise InputError(source, f"column '{name}': expected as many numbers in each row ({e})") from None
+    except (ValueError, TypeError):
+        raise InputError(source, f"column '{name}': expected as many numbers in each row") from None
     if rows.ndim != 2 or not rows.shape[1] or not np.isfinite(rows).all():
         raise InputError(source, f"column '{name}': expected a vector of finite numbers in each row")
     return rows
@@ -143,6 +156,9 @@ def _scales(joints: tuple[str, ...], positions: Array) -> tuple[Array, list[str]
         return np.ones(len(joints)), ["the file does not say the unit of angles, and shows no sensor's count; taken as degrees"]
     if np.all(np.abs(counts[known] - COUNT) < _CLEAN * COUNT):
         return np.ones(len(joints)), []
+    if np.all(np.abs(np.rad2deg(counts[known]) - COUNT) < _CLEAN * COUNT):
+        said = "angles are in radians, as their steps show (one count of 4096 a turn); converted"
+        return np.full(len(joints), 180 / np.pi), [said]
     shown = ", ".join(f"{j} {c:.4g}" for j, c in zip(joints, counts) if np.isfinite(c))
     out = [f"angles are of each joint's range, not degrees: their steps ({shown}) differ; scaled so that a step is one count of "
            "4096 a turn, zero at the middle of the range"]

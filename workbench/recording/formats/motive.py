@@ -135,6 +135,8 @@ def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], 
         return frames, rate
     span, ticks = np.ptp(time[good]), frames[good][-1] - frames[good][0]
     seconds = float(np.median(np.diff(time[good])))
+    if seconds <= 0:
+        problems.append("the Time column does not increase; times are told by the frame numbers alone")
     steady = seconds > 0 and np.median(np.abs(np.diff(time[good]) - seconds)) < 0.2 * seconds
     if not steady or not span > 0 or abs(span * rate / ticks - 1) < _DISAGREE:
         return frames, rate

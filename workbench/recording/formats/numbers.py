@@ -21,6 +21,8 @@ from workbench.robot.tables import HEAD, plain_table, split_row
 
 Array = NDArray[np.float64]
 Bytes = bytes | mmap.mmap
+_BLOCK = 1 << 22
+"""Bytes that are read at once; less is sooner read by one thread than given to several."""
 _BLANK = ["", " ", "NaN", "nan"]
 
 
@@ -63,7 +65,7 @@ def read_columns(source: str, content: Bytes, offset: int, lines: int, width: in
     try:
         table = arrow_csv.read_csv(
             pa.BufferReader(body),
-            read_options=arrow_csv.ReadOptions(column_names=names, block_size=1 << 22),
+            read_options=arrow_csv.ReadOptions(column_names=names, block_size=_BLOCK, use_threads=len(body) > _BLOCK),
             convert_options=arrow_csv.ConvertOptions(column_types=types, include_columns=kept, null_values=_BLANK,
                                                      strings_can_be_null=True))
     except pa.ArrowInvalid as e:

@@ -22,6 +22,10 @@ from workbench.robot.tables import is_binary, split_row
 
 Array = NDArray[np.float64]
 _TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.IGNORECASE)
+_SECONDS = re.compile(r"(?:.*[./])?(?:stamp|time)[./]secs?", re.IGNORECASE)
+_NANO = re.compile(r"(?:.*[./])?(?:stamp|time)[./](?:nano_?sec|nsec)s?", re.IGNORECASE)
+_EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+"""Times since 1970 are 1.7e18 ns, 1.7e15 us, 1.7e12 ms or 1.7e9 s: from how many on, and seconds for each."""
 _GOAL = r"(reference|desired|setpoint|goal|command)"
 _SEEN = r"(feedback|actual|measured|state|output)"
 _INDEXED = r"[./]positions?[._]?\[?(\d+)\]?"
@@ -35,6 +39,8 @@ _JOINT = re.compile(r"(?:.*[./])?joint_?names?[._]?\[?(\d+)\]?", re.IGNORECASE)
 def _columns(cells: list[str]) -> tuple[int | None, dict[str, dict[str, int]], dict[str, int]]:
     """Column of the time; of goals and positions by joint or index; of joints' names by index."""
     time = next((i for i, c in enumerate(cells) if _TIME.fullmatch(c)), None)
+    if time is None:
+        time = next((i for i, c in enumerate(cells) if _SECONDS.fullmatch(c)), None)
     found: dict[str, dict[str, int]] = {"goal": {}, "position": {}}
     names: dict[str, int] = {}
     for i, cell in enumerate(cells):
@@ -58,7 +64,7 @@ def matches(head: bytes) -> bool:
     if is_binary(head):
         return False
     line = head.partition(b"\n")[0].decode("utf-8-sig", "replace")
-    if "/" not in line and "[" not in line and "field." not in line:
+    if not any(mark in line for mark in ("/", "[", "field.", "positions")):
         return False
     time, found, _ = _columns(split_row(line))
     return time is not None and bool(set(found["goal"]) & set(found["position"]))
@@ -75,16 +81,19 @@ def read_ros_csv(path: Path) -> Recording:
     keys = [k for k in found["goal"] if k in found["position"]]
     if time_at is None or not keys:
         raise InputError(source, "line 1: expected a time, and goals and positions of the same joints")
-    wanted = {time_at, *(found[kind][k] for kind in found for k in keys)}
+    nano_at = next((i for i, c in enumerate(cells) if _NANO.fullmatch(c)), None) if _SECONDS.fullmatch(cells[time_at]) else None
+    wanted = {time_at, *([] if nano_at is None else [nano_at]), *(found[kind][k] for kind in found for k in keys)}
     table = read_columns(source, content, end + 1 if end >= 0 else len(content), 1, len(cells), set(names.values()),
                          wanted | set(names.values()))
     goals, positions = (np.column_stack([column(table, found[kind][k]) for k in keys]) for kind in ("goal", "position"))
     time = column(table, time_at)
+    if nano_at is not None:
+        time = time - time[0] + 1e-9 * column(table, nano_at)
     whole = np.isfinite(time) & np.isfinite(goals).all(axis=1) & np.isfinite(positions).all(axis=1)
     time, goals, positions = time[whole], goals[whole], positions[whole]
     if len(time) < 2 or not np.all(np.diff(time) > 0):
         raise InputError(source, f"column '{cells[time_at]}': expected increasing times in two rows or more")
-    scale = 1e-9 if time[0] > 1e14 else 1.0  # since 1970: 1.7e18 ns, 1.7e9 s
+    scale = next((of for least, of in _EPOCHS if time[0] > least), 1.0)
     time = (time - time[0]) * scale
     joints = tuple(_name(table, names, k) for k in keys)
     channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}

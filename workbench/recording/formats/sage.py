@@ -114,11 +114,12 @@ def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, d
     try:
         table = arrow_csv.read_csv(pa.BufferReader(pa.py_buffer(memoryview(content))), convert_options=arrow_csv.ConvertOptions(
             column_types={"timestamp": pa.float64(), **dict.fromkeys(columns, pa.string())}))
+        names = table.column_names
     except (pa.ArrowInvalid, UnicodeDecodeError) as e:
         raise InputError(source, f"{e}") from None
-    missing = [c for c in ("timestamp", *columns) if c not in table.column_names]
-    if missing:
-        raise InputError(source, f"line 1: column '{missing[0]}' is missing")
+    for wanted in ("timestamp", *columns):
+        if names.count(wanted) != 1:
+            raise InputError(source, f"line 1: column '{wanted}' {'stands there twice' if wanted in names else 'is missing'}")
     out = {}
     for name in columns:
         try:

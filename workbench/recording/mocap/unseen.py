@@ -18,6 +18,9 @@ _ALTERNATES = -0.4
 _ROUNDINGS = 1.5
 """Noise of so many units of the last digit never repeats a pose of seven numbers by chance."""
 _LEAST = 1e-7  # of noise [m]
+_RUN, _LEAP, _LEAST_LEAP = 4, 3.0, 0.003
+"""Where noise is below the last digit a body that stands is held if it stands so many frames, and then leaps by so many times
+its largest other step, and so far [m]."""
 
 
 def without_unseen(tracks: Tracks) -> Tracks:
@@ -34,7 +37,7 @@ def without_unseen(tracks: Tracks) -> Tracks:
             continue
         p[i, held], q[i, held] = np.nan, np.nan
         share = held.sum() / np.isfinite(tracks.p[i, :, 0]).sum()
-        if share > 0.4 and _longest(held)[1] <= 2:
+        if share > 0.4 and _longest(held)[1] <= max(2, round(share / (1 - share))):  # every second frame, or every n-th
             rate = tracks.rate * (1 - share)
             continue
         first, longest = _longest(held)
@@ -65,7 +68,18 @@ def _held(p: Array, q: Array) -> NDArray[np.bool_]:
     same = (poses[seen[1:]] == poses[seen[:-1]]).all(axis=1)
     if same.any() and _noisy(p[seen][np.concatenate([[True], ~same])]):
         held[seen[1:][same]] = True
+    elif same.any():
+        for first, last in np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2):
+            if last - first >= _RUN and _leaps(p[seen], last):
+                held[seen[first + 1:last + 1]] = True
     return held
+
+
+def _leaps(p: Array, last: int) -> bool:
+    """Whether a body (N, 3) [m] leaves the place of row `last`, where it stood, by a step that it makes nowhere else."""
+    steps = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    others = np.delete(steps, last) if last < len(steps) else steps
+    return last < len(steps) and bool(steps[last] > max(_LEAP * np.max(others, initial=0.0), _LEAST_LEAP))
 
 
 def _noisy(places: Array) -> bool:

@@ -43,7 +43,7 @@ class _Evidence:
 
 def session_yaw(recordings: Sequence[Recording], model: RobotModel, commands: Sequence[Commands | None] = (),
                 base: str = "free") -> YawEstimate:
-    """One yaw for all takes of a session, whose capture frame does not move (contract, section 1).
+    """One yaw for all takes of a session, whose capture frame does not move (docs/formats.md, section 1).
 
     In the neutral pose every rigid body's frame is parallel to the capture's axes, whatever the robot's yaw; so what tells the
     yaw is the axes of the relative rotations. Each joint's is the first principal axis of its rotation vectors; the weighted

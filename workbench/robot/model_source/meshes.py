@@ -39,7 +39,7 @@ def find_mesh(model: Path, place: str, uri: str, packages: Mapping[str, str]) ->
     else:
         raise InputError(model, f"{place}: mesh '{uri}': expected a file, file://, package:// or model://")
     for folder in folders:
-        found = folder / inner
+        found = folder / (inner if scheme in ("", "file") else inner.lstrip("/"))
         if found.is_file():
             return found.resolve()
     hint = ""

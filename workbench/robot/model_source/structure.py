@@ -20,9 +20,9 @@ def check_structure(path: Path, sdf: Element) -> list[str]:
     problems = []
     for model in sdf.iter("model"):
         _check_tree(path, model)
-        moved = {(j.findtext("child") or "").strip() for j in model.findall("joint") if j.get("type") != "fixed"}
+        hangs = {(j.findtext("child") or "").strip(): j.get("type") for j in model.findall("joint")}
         for link in model.findall("link"):
-            problems += _inertia_problems(path, link, (link.get("name") or "") in moved)
+            problems += _inertia_problems(path, link, hangs.get(link.get("name") or "") != "fixed")
         for joint in model.findall("joint"):
             problems += _limit_problems(path, joint)
     return problems
@@ -82,7 +82,7 @@ def _limit_problems(path: Path, joint: Element) -> list[str]:
         raise InputError(path, f"{name}: lower limit {lower:g} is above the upper, {upper:g}")
     if joint.get("type") != "revolute":
         return []
-    out = []
+    out = [f"{name}: its limits are equal, {math.degrees(lower):.4g} deg: it cannot move"] if lower == upper else []
     if lower > 0 or upper < 0:
         at = lower if lower > 0 else upper
         out.append(f"{name}: zero lies outside its limits, {math.degrees(lower):.4g} to {math.degrees(upper):.4g} deg: it starts "

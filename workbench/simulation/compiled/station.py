@@ -50,6 +50,8 @@ def _check(job: Job) -> None:
     for name, value in known.items():
         if getattr(c, name) != value:
             raise NotCoveredError(f"{name} '{getattr(c, name)}'")
+    if c.boxes:
+        raise NotCoveredError("boxes on the floor")
     if c.time_step == 0:
         raise NotCoveredError("a continuous plant")
     if c.base not in ("free", "fixed"):
@@ -85,6 +87,7 @@ class CompiledJob:
         self.physics: Physics = physics_of(self.model)
         self.tables: Tables = tables_of(self.model, self.physics.description, self.free)
         self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step)
+        self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
         self.plan = self._plan()
 
     def _plan(self) -> _Plan:
@@ -109,26 +112,35 @@ class CompiledJob:
         other.plan = other._plan()
         return other
 
-    def take(self) -> Take:
-        """Settles, plays, and reads the log; NotCoveredError where something touches that is no foot on the floor."""
+    def take(self, as_seen: bool = True) -> Take:
+        """Settles, plays, and reads the log; NotCoveredError where something touches that is no foot on the floor. as_seen: with
+        angles as cameras see them where something is between servos and links; else servos' angles and velocities stand."""
         plan = self.plan
         schedule = schedule_of(self.config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)
         log = self.log(schedule)
-        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - plan.lead)
+        return self._read(log, np.arange(len(log.q)) * self.config.logged_every - plan.lead, as_seen)
 
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
         config, plan = self.config, self.plan
-        state, work = self._rest(), work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
-        stand(*self.machine, state, work)
-        self._play(settling(config, len(self.model.joints)), state, self._log(0), work)
-        if self.free:
-            _centre(state)
+        work = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
+        if not self._settled:
+            self._settled.append(self._at_rest(work))
+        state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._put(Start(*self.job.start), state)
         log = self._log(rows_of(config, plan.lead + plan.duration))
         self._play(schedule, state, log, work)
         return log
+
+    def _at_rest(self, work: Work) -> State:
+        """The robot as it stands in neutral before the first command."""
+        state = self._rest()
+        stand(*self.machine, state, work)
+        self._play(settling(self.config, len(self.model.joints)), state, self._log(0), work)
+        if self.free:
+            _centre(state)
+        return state
 
     def _play(self, schedule: Schedule, state: State, log: Log, work: Work) -> None:
         how = run(*self.machine, schedule, state, log, work)
@@ -175,7 +187,7 @@ class CompiledJob:
             self.tables.derived[key] = Structure(self.model, self.physics)
         return self.tables.derived[key]  # type: ignore[return-value]
 
-    def _read(self, log: Log, time: np.ndarray) -> Take:
+    def _read(self, log: Log, time: np.ndarray, as_seen: bool = True) -> Take:
         job, joint, config = self.job, self.machine.servos.joint, self.config
         p_WB, quat_WB = log.base[:, 4:], log.base[:, :4]
         if not self.free:
@@ -185,7 +197,7 @@ class CompiledJob:
         take = Take(name=job.name, source="simulation", time=time, joints=self.model.joints, q=log.q[:, joint], starts_at=0.0,
                     base=config.base, v=log.v[:, joint], p_WB=p_WB, quat_WB=quat_WB,
                     torque=log.torque if len(log.torque) else None, contact=self._contact(log, time), commands=job.commands)
-        take = self._as_built(take, log)
+        take = self._as_built(take, log) if as_seen else take
         return take if job.times is None else take.resampled(job.times)
 
     def _contact(self, log: Log, time: np.ndarray) -> dict[str, np.ndarray]:

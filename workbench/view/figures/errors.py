@@ -12,7 +12,7 @@ from workbench.compare.results import Channel, by_error
 from workbench.view.figures.style import COMMAND, ERROR, FLOOR, NOISE, RECORDED, SIMULATED, new_figure, styled
 
 LIMIT = 1.3
-"""An error within this many times the root of noise² + floor² is explained (contract, section 6)."""
+"""An error within this many times the root of noise² + floor² is explained (docs/formats.md, section 6)."""
 
 
 @styled

@@ -8,8 +8,12 @@ from collections.abc import Mapping
 from matplotlib.figure import Figure
 
 from workbench.dynamics import InverseDynamicsResult
+from workbench.dynamics.margins import ServoLoad
 from workbench.robot import GRAVITY, RobotModel
 from workbench.view.figures import base_wrench, joint_torques, servo_margins
+
+_MEASURED = ("sd: what the measurement's noise makes of angles that are differentiated twice; smoothing, and how feet share the "
+             "load, are not in it. A robot that did more than the servo has, has another servo or load than the model.")
 
 
 def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[str, Figure]:
@@ -25,10 +29,23 @@ def force_figures(result: InverseDynamicsResult, model: RobotModel) -> Mapping[s
 
 
 def margin_table(result: InverseDynamicsResult) -> str:
-    """A line for each servo, the one with least torque left first."""
-    lines = ["joint     rms    peak   left   N m   speed left  rad/s   time above a fifth of stall torque"]
+    """A line for each servo, the one with least torque left first, each margin with its standard deviation where the motion was
+    measured."""
+    lines = ["joint     rms    peak   left   N m           speed left   rad/s        time above a fifth of stall torque"]
     for joint, load in sorted(result.loads.items(), key=lambda item: item[1].torque_margin):
-        mark = "" if load.feasible or math.isnan(load.torque_margin) else "   more than the servo has"
-        lines.append(f"{joint:6s} {load.rms:6.2f}  {load.peak:6.2f} {load.torque_margin:6.2f}         {load.speed_margin:6.2f}"
-                     f"          {100 * load.beyond_fifth:5.0f} %{mark}")
+        lines.append(f"{joint:6s} {load.rms:6.2f}  {load.peak:6.2f} {_with(load.torque_margin, load.torque_sigma)}     "
+                     f"{_with(load.speed_margin, load.speed_sigma)}     {100 * load.beyond_fifth:5.0f} %{_mark(load)}")
+    if any(load.torque_sigma > 0 for load in result.loads.values()):
+        lines.append(_MEASURED)
     return "\n".join(lines)
+
+
+def _with(margin: float, sigma: float) -> str:
+    return f"{margin:6.2f} {f'(sd {sigma:.2f})' if sigma > 0 else '':10s}"
+
+
+def _mark(load: ServoLoad) -> str:
+    if load.exceeded:
+        return "   more than the servo has"
+    negative = not load.feasible and not math.isnan(load.torque_margin)
+    return "   nothing left, or no more than noise makes of it" if negative else ""

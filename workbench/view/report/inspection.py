@@ -117,6 +117,8 @@ def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:
         return _json
     if suffix in (".yaml", ".yml"):
         return _yaml
+    if suffix in (".sdf", ".urdf"):
+        return None
     if suffix == ".mtn":
         return _motion if part else _motion_file
     from workbench.recording.formats.file_kind import file_kind
