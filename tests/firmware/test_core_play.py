@@ -282,7 +282,7 @@ def uploads(count: int, seed: int) -> None:
         if sim.get("state") == 5 and sim.get("poses"):
             assert tuple(sim.get("goal", j) for j in range(15)) in goals
     assert sim.get("state") in (3, 5)
-    assert taken > count / 20
+    assert taken > count / 40  # one number in five jumps by 200: what follows is stale until the numbers have come round
 
 
 def test_only_whole_and_fitting_uploads_ever_play() -> None:
