@@ -10,24 +10,20 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from tests.example_diagnosis import diagnosis, finding
 from tests.view_takes import small_robot, swing
 from workbench.bench.arm import arm_sdf
 from workbench.cli.diagnose import finding_line
 from workbench.identify.results.findings import (
     Alternative,
-    Change,
     Diagnosis,
     Estimate,
-    Finding,
-    GapEntry,
     NextExperiment,
-    Rejected,
     Unexplained,
-    Verdict,
 )
-from workbench.identify.results.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, ScreenedOut, WorseInPlace
+from workbench.identify.results.reasons import Dependence, DownwardPull, Outdone, ParameterDrift, WorseInPlace
 from workbench.identify.results.take_report import TakeReport
-from workbench.robot import EffectSpec, RobotModel
+from workbench.robot import RobotModel
 from workbench.view.figures import encode
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.report.diagnosis import diagnosis_report, write_diagnosis
@@ -55,23 +51,6 @@ def take(model: RobotModel) -> TakeReport:
     before, after = ((q - take.q) / SIGMA * moving for take in (nominal, fitted))
     return TakeReport(recorded, nominal, fitted, model.joints, np.full(len(model.joints), SIGMA), before, after,
                      (fitted.time > 0.7) & (fitted.time < 0.9))
-
-
-def finding(effect: str = "backlash", confidence: float = 0.97) -> Finding:
-    return Finding(effect, ("flm",), confidence, {"gap": Estimate(2.0, 1.8, 2.3, "deg")}, Change(1.9, 0.12, "deg"),
-                   Change(2.0, 0.11, "deg"), (Alternative("joint_compliance", ("flm",), 0.02),), "It shows where the load turns.")
-
-
-def diagnosis(model: RobotModel, verdict: Verdict = "explained") -> Diagnosis:
-    return Diagnosis(
-        verdict, model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 2.0})), model,
-        gap=tuple(GapEntry("structure", ("flm",), "walk", ((0.5 + k, 1.2 + k),), 2.0, 0.1, "deg", "stance") for k in range(8)),
-        findings=(finding(),),
-        rejected=(Rejected("coulomb_friction", ("flm",), Outdone("dead_band", ("flm",), 900.0, 40.0), Change(2.0, 1.9, "deg")),
-                  Rejected("payload", ("body_link",), ScreenedOut())),
-        unexplained=(Unexplained(("frb",), 0.6, 0.2, "deg", Dependence("a <take>", "frb", "angle", 0.6)),),
-        next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
-        provenance={"seed": 7, "seconds": 94.0}, left_out=(("trot", "line 9: the file is cut"),))
 
 
 def test_ratios_are_of_unseen_frames(take: TakeReport) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import LOOP
-from workbench.identify.conclusions import estimates, finding, rejected, verdict_of
+from workbench.identify.conclusions import estimates, finding, rejected, unexplained, verdict_of
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
@@ -78,3 +78,27 @@ def test_a_name_that_is_less_likely_than_not_explains_nothing():
     assert verdict_of(True, [], [rest]) == "unexplained"
     assert verdict_of(True, [named(0.9)], []) == verdict_of(True, [named(0.4, tie)], []) == "explained"
     assert verdict_of(True, [named(0.9), named(0.4)], []) == verdict_of(True, [named(0.9)], [rest]) == "partly_explained"
+
+
+@pytest.mark.parametrize(("size", "floor", "left"), [(1.0, 0.0, ()), (1.6, 0.0, ("three",)), (1.6, 1.0, ())],
+                         ids=["noise alone", "more than noise", "no more than the fitted model's own floor"])
+def test_what_stays_beyond_noise_and_floor_on_unseen_stretches_is_unexplained(worn, size, floor, left):
+    """Residuals over sigma of `size` in one joint, white, on the take's frames; in the others as noise makes them."""
+    (e,) = worn[1].evaluator.evidence
+    residual = np.random.default_rng(0).normal(size=e.recorded.shape)
+    residual[:, e.channels.index("three")] *= size
+    floors = {0: np.where(np.array(e.channels) == "three", floor, 0.0)}
+    assert tuple(j for u in unexplained([e], {0: residual}, floors) for j in u.where) == left
+
+
+@pytest.mark.parametrize("goes_with", ["angle", "speed", None])
+def test_what_is_left_says_which_signal_it_goes_with(worn, goes_with):
+    (e,) = worn[1].evaluator.evidence
+    random = np.random.default_rng(1)
+    angle = e.take.recorded.q[:, e.take.recorded.column("three")]
+    signal = {"angle": angle, "speed": np.gradient(angle, e.take.recorded.time), None: random.normal(size=len(angle))}[goes_with]
+    residual = random.normal(size=e.recorded.shape)
+    residual[:, e.channels.index("three")] += 4.0 * (signal - np.nanmean(signal)) / np.nanstd(signal)
+    (said,) = unexplained([e], {0: residual}, {})
+    assert said.where == ("three",)
+    assert said.description.signal == goes_with

@@ -9,30 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from workbench.identify.results.findings import (
-    Alternative,
-    Change,
-    Diagnosis,
-    Estimate,
-    Finding,
-    GapEntry,
-    NextExperiment,
-    Rejected,
-    Unexplained,
-)
-from workbench.identify.results.reasons import Dependence, TooLittle
-from workbench.robot import EffectSpec, load_model, load_model_file, puppy_model
+from tests.example_diagnosis import diagnosis
+from workbench.identify.results.findings import Alternative, Diagnosis, Estimate
+from workbench.identify.results.reasons import ScreenedOut
+from workbench.robot import load_model, load_model_file, puppy_model
 
-BACKLASH = Finding(
-    "backlash", ("flm",), 0.97, {"gap": Estimate(3.1, 2.7, 3.5, "deg")}, Change(1.12, 0.21, "deg"), Change(1.10, 0.23, "deg"),
-    (Alternative("joint_compliance", ("flm",), 0.02),))
-DIAGNOSIS = Diagnosis(
-    "explained", puppy_model().with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.1})), puppy_model(),
-    gap=(GapEntry("structure", ("flm",), "walk", ((1.2, 1.4),), 2.1, 0.2, "deg", "stance"),), findings=(BACKLASH,),
-    rejected=(Rejected("coulomb_friction", ("flm",), TooLittle(), Change(1.1, 1.0, "deg")),),
-    unexplained=(Unexplained(("frm",), 0.6, 0.2, "deg", Dependence("walk", "frm", "speed", 0.6)),),
-    next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
-    provenance={"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94})
+DIAGNOSIS = diagnosis(puppy_model(), gaps=1)
+(BACKLASH,) = DIAGNOSIS.findings
 
 
 def test_it_is_the_contracts_file(tmp_path: Path) -> None:
@@ -40,19 +23,22 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
     assert [p.name for p in paths] == ["findings.json", "model.yaml", "nominal.yaml"]
     assert json.loads(paths[0].read_text()) == {
         "format": 1, "verdict": "explained",
-        "gap": [{"layer": "structure", "where": ["flm"], "take": "walk", "when": [[1.2, 1.4]], "phase": "stance", "error": 2.1,
-                 "floor": 0.2, "unit": "deg"}],
+        "gap": [{"layer": "structure", "where": ["flm"], "take": "walk", "when": [[0.5, 1.2]], "phase": "stance", "error": 2.0,
+                 "floor": 0.1, "unit": "deg"}],
         "findings": [{
             "effect": "backlash", "where": ["flm"], "confidence": 0.97,
-            "parameters": {"gap": {"value": 3.1, "low": 2.7, "high": 3.5, "unit": "deg"}},
+            "parameters": {"gap": {"value": 2.0, "low": 1.8, "high": 2.3, "unit": "deg"}},
             "alternatives": [{"effect": "joint_compliance", "where": ["flm"], "confidence": 0.02}],
-            "fit": {"before": 1.12, "after": 0.21, "unit": "deg"}, "validation": {"before": 1.10, "after": 0.23, "unit": "deg"}}],
-        "rejected": [{"effect": "coulomb_friction", "where": ["flm"], "reason": str(TooLittle()),
-                      "validation": {"before": 1.1, "after": 1.0, "unit": "deg"}}],
-        "unexplained": [{"where": ["frm"], "error": 0.6, "floor": 0.2, "unit": "deg",
-                         "description": "walk: goes with speed (correlation 0.60)"}],
+            "fit": {"before": 1.9, "after": 0.12, "unit": "deg"}, "validation": {"before": 2.0, "after": 0.11, "unit": "deg"},
+            "evidence": "It shows where the load turns."}],
+        "rejected": [{"effect": "coulomb_friction", "where": ["flm"],
+                      "reason": "dead_band(flm) takes 900 off chi squared on the choosing stretches, this 40",
+                      "validation": {"before": 2.0, "after": 1.9, "unit": "deg"}},
+                     {"effect": "payload", "where": ["body_link"], "reason": str(ScreenedOut())}],
+        "unexplained": [{"where": ["frb"], "error": 0.6, "floor": 0.2, "unit": "deg",
+                         "description": "a <take>: goes with angle (correlation 0.60)"}],
         "next_experiment": {"motion": "next_experiment.csv", "base": "fixed", "separates": [["backlash", "joint_compliance"]]},
-        "provenance": {"workbench": "0.1", "drake": "1.51", "model_sha256": "0", "seed": 0, "seconds": 94}}
+        "provenance": {"seed": 7, "seconds": 94}, "left_out": [{"take": "trot", "reason": "line 9: the file is cut"}]}
     assert load_model(paths[1]).effects == DIAGNOSIS.model.effects
     assert load_model_file(paths[2]).provenance["seconds"] == 94
     assert load_model(paths[2]).sha256 == puppy_model().sha256

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.multibody.plant import MultibodyPlant
 
 from workbench.effects.apply import physics_of
 from workbench.effects.base import Effect
@@ -38,11 +39,14 @@ def config_for(base: str, step: float = 2e-3, settle: float = 0.4) -> Simulation
     return SimulationConfig(base=base, time_step=step, settle=settle, contact_period=0.0)
 
 
-def drake_steps(model: RobotModel, config: SimulationConfig, seed: int, count: int, swing: float = 0.35, switched: bool = False
-                ) -> Iterator[Step]:
-    """Steps of a robot that goes to new random goals every 30 steps; switched: servos go off and on again."""
+def drake_steps(model: RobotModel, config: SimulationConfig, seed: int, count: int, swing: float = 0.35, switched: bool = False,
+                changed: Callable[[MultibodyPlant], None] | None = None) -> Iterator[Step]:
+    """Steps of a robot that goes to new random goals every 30 steps; switched: servos go off and on again; changed: what is set
+    otherwise on Drake's plant alone."""
     random = np.random.default_rng(seed)
     sim = Simulation(model, config)
+    if changed is not None:
+        changed(sim.plant)
     sim._rest_in_neutral(None)
     sim._set_first_command(0.0)
     plant, context = sim.plant, sim._plant_context

@@ -42,6 +42,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--ensemble", metavar="FILE", help="the robots to stand, as YAML (default: the one that ships)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="threads and processes that simulate (default: 2)")
     add_model(parser)
     add_out(parser, default="runs/optimize")
     parser.set_defaults(run=run)
@@ -61,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
     model = load_model(args.model, args.packages)
     check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
-    machine, ensemble, options = GaitMachine(model), load_ensemble(args.ensemble, posterior), options_of(args.effort, args.seed)
+    machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
+    options = options_of(args.effort, args.seed, args.jobs)
     request = _request(args, model)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)

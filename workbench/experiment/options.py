@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from workbench.identify.options import PROBLEM
+
 
 @dataclass(frozen=True)
 class ExperimentOptions:
@@ -44,10 +46,10 @@ class ExperimentOptions:
     """How far a parameter may still go, as a share of what there is of it: a standard deviation. The session fitted it."""
     step: float = 0.2
     """Of that, for sensitivities."""
-    time_step: float = 2e-3
+    time_step: float = PROBLEM.time_step
     """Of the rollouts [s], as the search's."""
-    rest: float = 0.1
-    """Before the first command [s]."""
+    rest: float = PROBLEM.rest
+    """Before the first command [s], as the search's."""
     after: float = 0.02
     """After the last frame [s]."""
     upright: float = 0.94

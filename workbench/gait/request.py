@@ -22,8 +22,8 @@ SLOWEST = 0.02
 """Speed [m/s] from which drift is told by distance: a gait that stands has none to tell."""
 ROBUST = 0.6
 """Share of the speed asked for that the worse half of the draws must keep on average."""
-SHARE_FALLEN = 0.1
-"""Use of the limit on falls by one draw that falls in a hundred: none may."""
+FALLEN = 100.0
+"""Use of the limit on falls beyond one, by the share of robots that fell: none may, and one in a hundred is twice too many."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ class Request:
 
     def wanted(self, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:
         """Whether the speed is there, on the nominal robot and over draws; whether draws fall or wander."""
-        out = [_margin("falls", SHARE_FALLEN * sum(m.fell for m in (nominal, *draws)) * 100 / (1 + len(draws)), SHARE_FALLEN, "")]
+        fell, count = sum(m.fell for m in (nominal, *draws)), 1 + len(draws)
+        out = [Margin("falls", f"of {count} robots", float(fell), 0.0, "allowed", 1.0 + FALLEN * fell / count if fell else 0.0)]
         if self.speed is not None:
             out.append(_least("speed", self.progress(nominal), self.speed, self.unit))
         if draws:

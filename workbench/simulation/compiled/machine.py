@@ -34,11 +34,11 @@ def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, 
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")
     joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.int64)
-    return Machine(_tree(physics, tables, joint, free, dt), _servos(physics, joint), _shapes(model, physics, tables, free))
+    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), _shapes(model, physics, tables, free))
 
 
-def _tree(physics: Physics, tables: Tables, joint: Ints, free: bool, dt: float) -> Tree:
-    armature, damping = tables.armature.copy(), tables.damping.copy()
+def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
+    armature, damping = tables.tree.armature.copy(), tables.tree.damping.copy()
     stages = [tables.joints.index(s) for names in physics.stages.values() for s in names]
     damping[stages] *= max(1.0, dt / (2 * SPRING_TIME))  # as the station steadies springs
     armature[joint], damping[joint] = physics.law.inertia, physics.law.damping
@@ -46,11 +46,8 @@ def _tree(physics: Physics, tables: Tables, joint: Ints, free: bool, dt: float) 
     brake, gain = np.zeros(len(tables.joints)), np.zeros(len(tables.joints))
     brake[joint] = most
     gain[joint] = np.where(most == physics.law.coulomb, HOLDING_DAMPING, np.maximum(HOLDING_DAMPING, most / MOST_CREEP))
-    return Tree(
-        free=free, parent=tables.parent, path=tables.path, group=tables.group, R=tables.R, p=tables.p, axis=tables.axis,
-        mass=tables.mass, com=tables.com, inertia=tables.inertia, armature=armature, damping=damping, stiffness=tables.stiffness,
-        rest=tables.rest, lower=tables.lower, upper=tables.upper, brake=brake, brake_gain=gain,
-        gravity=np.array(physics.gravity, dtype=float), pull=np.array(physics.tether, dtype=float))
+    return tables.tree._replace(armature=armature, damping=damping, brake=brake, brake_gain=gain,
+                                gravity=np.array(physics.gravity, dtype=float), pull=np.array(physics.tether, dtype=float))
 
 
 def _servos(physics: Physics, joint: Ints) -> Servos:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from copy import copy
 from dataclasses import dataclass, replace
+from threading import Event, Lock
 
 import numpy as np
 from pydrake.math import RotationMatrix
@@ -25,6 +26,7 @@ from workbench.simulation.structure import Structure
 
 ENDED = {TOUCHED: "shapes touch that are no foot on the floor"}
 """Why a run was given up, by how it ended; any other way, Drake shall say."""
+_first, _ran = Lock(), Event()
 
 
 def covers(job: Job) -> str | None:
@@ -39,9 +41,15 @@ def covers(job: Job) -> str | None:
 def run_compiled(job: Job) -> Take:
     """The take of a job; NotCoveredError says why it has to be Drake's."""
     compiled = CompiledJob(job)
-    if not is_compiled():
-        logging.getLogger(__name__).warning("compiling the station, once for this version and machine (half a minute) ...")
-    return compiled.take()
+    if is_compiled() or _ran.is_set():
+        return compiled.take()
+    with _first:  # of several threads one compiles and says so, the others wait for it
+        if not (is_compiled() or _ran.is_set()):
+            logging.getLogger(__name__).warning("compiling the station, once for this version and machine (half a minute) ...")
+        try:
+            return compiled.take()
+        finally:
+            _ran.set()
 
 
 def _check(job: Job) -> None:
@@ -155,7 +163,7 @@ class CompiledJob:
                    force=np.empty((forces, s, 3)))
 
     def _rest(self) -> State:
-        n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.path)
+        n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.tree.path)
         return State(base=np.array([1.0, 0, 0, 0, 0, 0, 0]), q=np.zeros(n), v=np.zeros(nv), reference=np.zeros(m),
                      goal=self.physics.zero.copy(), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
                      memory=np.zeros((4, m)), stepped=np.zeros(1))

@@ -26,7 +26,7 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
-from workbench.simulation.compiled.arrays import Array, Ints
+from workbench.simulation.compiled.arrays import Array, Ints, Tree
 from workbench.simulation.contact import SelectFeet
 
 KEPT_TABLES = 64
@@ -55,25 +55,12 @@ class ShapeTable:
 
 @dataclass(frozen=True)
 class Tables:
-    """What does not depend on servos, floor and step. joints: names, as the arrays number them. Arrays as in `arrays.Tree`.
-    X_WBase: pose of a held base link in W. derived: what others have worked out from these and keep."""
+    """What does not depend on servos, floor and step. joints: names, as the arrays number them. tree: as the description has it,
+    without servos' friction, gravity and pull. X_WBase: pose of a fixed base link in W. derived: what others have worked out from
+    these and keep."""
 
     joints: tuple[str, ...]
-    parent: Ints
-    path: Ints
-    group: Ints
-    R: Array
-    p: Array
-    axis: Array
-    mass: Array
-    com: Array
-    inertia: Array
-    armature: Array
-    damping: Array
-    stiffness: Array
-    rest: Array
-    lower: Array
-    upper: Array
+    tree: Tree
     X_WBase: RigidTransform
     shapes: ShapeTable
     derived: dict[str, object] = field(default_factory=dict)
@@ -184,13 +171,14 @@ class _Reader:
         path = np.concatenate([np.arange(-1, o - 1, dtype=np.int64), np.where(parent >= 0, parent + o, o - 1)])
         mass, com, inertia = self._weights(n)
         stiffness, rest = self._springs()
-        return Tables(
-            joints=tuple(j.name() for j in self.turning), parent=parent, path=path, group=_groups(path), R=R, p=p, axis=axis,
-            mass=mass, com=com, inertia=inertia, armature=self._armature(),
-            damping=np.array([j.default_damping() for j in self.turning]), stiffness=stiffness, rest=rest,
-            lower=np.array([j.position_lower_limit() for j in self.turning]),
-            upper=np.array([j.position_upper_limit() for j in self.turning]), X_WBase=self._X_WBase(),
-            shapes=self._shapes(n, on_root))
+        tree = Tree(
+            free=self.free, parent=parent, path=path, group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com,
+            inertia=inertia, armature=self._armature(), damping=np.array([j.default_damping() for j in self.turning]),
+            stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
+            upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
+            gravity=np.zeros(3), pull=np.zeros(3))
+        return Tables(joints=tuple(j.name() for j in self.turning), tree=tree, X_WBase=self._X_WBase(),
+                      shapes=self._shapes(n, on_root))
 
     def _X_WBase(self) -> RigidTransform:
         """Of a held base; the origin for a free one."""

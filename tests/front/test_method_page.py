@@ -1,0 +1,46 @@
+"""docs/method.md names files that are there, and for each question of its table a file that answers it."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+PAGE = (Path(__file__).parents[2] / "docs/method.md").read_text(encoding="utf-8")
+ROOM = Path(__file__).parents[2] / "workbench"
+FILES = sorted(set(re.findall(r"`([\w/]+\.py)`", PAGE)))
+FOLDERS = sorted(set(re.findall(r"`([\w/]+/)`", PAGE)) - {"workbench/"})
+QUESTIONS = {
+    "how is a walk cut into windows": ("identify/shooting.py", "def edges"),
+    "where is a stop read off": ("identify/estimators/stops_and_mounts.py", "def stops"),
+    "how do two names tie": ("identify/results/findings.py", "def tie"),
+    "what is the numerical floor": ("identify/preparation.py", "floor = _apart"),
+    "where does a new recording format go": ("recording/formats/", "FORMAT"),
+    "where are rollouts remembered": ("identify/rollouts.py", "def _keep"),
+    "where are the report's sentences made": ("view/report/words.py", "def in_words"),
+    "who chooses the next experiment": ("experiment/next_experiment.py", "design_experiment"),
+    "what must a plug-in effect say": ("effects/base.py", "class Effect"),
+}
+
+
+def file_of(name: str) -> list[Path]:
+    """A file that the page names from workbench/ on, or by its end alone."""
+    return [ROOM / name] if (ROOM / name).exists() else [p for p in ROOM.rglob(Path(name).name) if str(p).endswith(f"/{name}")]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_the_page_names_is_there(name):
+    assert file_of(name)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_that_the_page_names_is_there(name):
+    assert (ROOM / name).is_dir() or (ROOM.parent / name).is_dir() or [p for p in ROOM.rglob(name.strip("/")) if p.is_dir()]
+
+
+@pytest.mark.parametrize("question", QUESTIONS)
+def test_a_question_is_answered_by_a_file_that_does_it(question):
+    name, does = QUESTIONS[question]
+    (row,) = [line for line in PAGE.splitlines() if line.startswith(f"| {question}")]
+    assert f"`{name}`" in row
+    files = [ROOM / name] if name.endswith(".py") else sorted((ROOM / name).glob("*.py"))
+    assert any(does in p.read_text(encoding="utf-8") for p in files)

@@ -1,0 +1,16 @@
+"""What friction between feet and floor has in common, of all feet or of one."""
+
+from __future__ import annotations
+
+from workbench.effects.base import Effect
+from workbench.robot import RobotModel
+
+
+class FloorFriction(Effect):
+    """Feet slide more or less easily than the model has it."""
+
+    layer = "ground"
+    observable_when_fixed = False
+
+    def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        return (1.0 if model.ground.friction is None else model.ground.friction,)
