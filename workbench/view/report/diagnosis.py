@@ -29,6 +29,7 @@ from workbench.view.report.words import (
     left_row,
     listed,
     next_said,
+    probable,
     quantity,
     rival_of,
     sentence_of,
@@ -131,9 +132,9 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
     numbers = []
     for f in diagnosis.findings:
         rival = rival_of(f)
-        sure = f"{100 * f.together:.0f} % sure" + (
+        sure = f"{probable(f.together)} sure" + (
             f" {this_or(f.tie)}" if f.tie else
-            f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
+            f"; or {title_of(rival.effect, rival.where)}: {probable(rival.confidence)}" if rival else "")
         told = max(f.parameters.values(), key=_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in takes:
@@ -206,15 +207,15 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
     parts: list[Part] = [Text(said)]
     if finding.evidence not in said:
         parts.append(Text(finding.evidence.removeprefix(said).strip()))
-    sure = f"{100 * finding.confidence:.0f} %"
+    sure = probable(finding.confidence)
     for a in finding.alternatives:
-        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {100 * a.confidence:.0f} %.** These recordings alone do not rule "
+        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {probable(a.confidence)}.** These recordings alone do not rule "
                           "that out."))
-        sure += f", or {title_of(a.effect, a.where)} {100 * a.confidence:.0f} %"
+        sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
     if finding.tie:
-        sure += f": {100 * finding.together:.0f} % for one of the two"
+        sure += f": {probable(finding.together)} for one of the two"
     f = finding.family
-    family = [] if f is None else [["of its family", f"{f.name}: {100 * f.confidence:.0f} %"]]
+    family = [] if f is None else [["of its family", f"{f.name}: {probable(f.confidence)}"]]
     rows = [["how sure", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
