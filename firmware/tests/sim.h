@@ -9,7 +9,7 @@ struct sim_servo {
     int64_t milli; /* position, thousandths of a count */
     bool powered, mute, twin, overload;
     bool held;     /* something is in its way: it does not move */
-    uint8_t heat;
+    uint8_t heat, drop; /* deg C; 0.1 V less than the others have */
 };
 
 enum { LOG_GOALS = 1, LOG_OFF = 2, LOG_STATE = 3 };
