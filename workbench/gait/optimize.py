@@ -41,6 +41,8 @@ IN_HAND = 0.02
 """By which a search goes beyond the speed asked for: twice what 2 ms and 1 ms differ by."""
 DRIFT_SHARE = 0.6
 """Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
+SPREAD_SHARE = 0.7
+"""Of the drift over draws allowed, likewise: other robots are drawn for the certificate."""
 FIRST_LOOK = Budget(seeds=80, generations=6, robust=0, draws=0)
 """Beside a refusal: what works instead, in half a minute."""
 BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5)
@@ -112,7 +114,8 @@ def _briefly(options: CertifyOptions) -> CertifyOptions:
 def sought(request: Request) -> Request:
     """What a search is asked, so that its gait keeps the request in the certificate's longer and finer runs, too."""
     speed = None if request.speed is None else request.speed * (1 + IN_HAND)
-    return replace(request, speed=speed, limits=replace(request.limits, drift=DRIFT_SHARE * request.limits.drift))
+    return replace(request, speed=speed, limits=replace(
+        request.limits, drift=DRIFT_SHARE * request.limits.drift, spread=SPREAD_SHARE * request.limits.spread))
 
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,

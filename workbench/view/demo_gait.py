@@ -21,9 +21,9 @@ SPEED = 0.10
 
 
 def demo_options() -> OptimizeOptions:
-    """A look that takes seconds: few seeds, four robots of the ensemble, no finer step than half a millisecond."""
+    """A look that takes seconds: few seeds, six robots of the ensemble, no finer step than half a millisecond."""
     first = options_of(1)
-    return replace(first, budget=replace(first.budget, seeds=40, starts=1, generations=3, robust=3, draws=3, enough=1),
+    return replace(first, budget=replace(first.budget, seeds=40, starts=2, generations=2, robust=5, draws=6, enough=1),
                    certify=replace(first.certify, draws=6, seconds=4.0, variants=("2 ms", "1 ms", "0.5 ms")))
 
 
