@@ -90,6 +90,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             progress("planning seeds", 0.0)
         planned = planned_seeds(machine, request) if options.planned else ()
         found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
+        if not found.best.good:  # it may keep what was asked for all the same, with less in hand than the search wanted
+            again = Evaluator(machine, request, draws, memory, options.n_jobs)
+            (best,) = again.judged([found.best.shape], options.budget.draws, list)
+            found = replace(found, best=best) if best.good else found
         chosen = found.best if found.best.good else found.nearest
         if chosen is None:
             return Optimized(request, False, _unmet(request, found, None), None, None, found)
