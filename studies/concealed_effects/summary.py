@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 from studies.concealed_effects.score import ParameterScore, Score
 
@@ -60,8 +60,8 @@ class EffectSummary:
 
 def bounds(k: int, n: int) -> tuple[float, float]:
     """95 % of a share k of n (Clopper and Pearson, 1934)."""
-    low = float(beta.ppf(0.025, k, n - k + 1)) if k else 0.0
-    return low, float(beta.ppf(0.975, k + 1, n - k)) if k < n else 1.0
+    low, high = binomtest(k, n).proportion_ci(0.95, "exact")
+    return float(low), float(high)
 
 
 def reliability(scores: Sequence[Score]) -> list[Bin]:

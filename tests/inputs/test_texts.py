@@ -59,6 +59,16 @@ def test_poses_are_of_plain_numbers(tmp_path: Path, cell: str) -> None:
         load_motion(tmp_path / "m.csv")
 
 
+@pytest.mark.parametrize(("effect", "said"), [
+    ("{effect: backlash, where: [flm], parameters: {ratio: 1}}", "backlash"), ("{effect: rust, where: [flm]}", "rust"),
+    ("{effect: backlash, where: [wing], parameters: {gap: 1}}", "wing")])
+def test_a_wrong_effect_is_told_with_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str], effect: str, said: str) -> None:
+    (tmp_path / "model.yaml").write_text(f"format: 1\neffects:\n- {effect}\n")
+    line = refused(capsys, "inspect", str(tmp_path / "model.yaml"))
+    assert f"{tmp_path / 'model.yaml'}: " in line
+    assert said in line
+
+
 def test_poses_that_are_no_degrees_or_seconds_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "radians.csv").write_text("time,blb\n0,0\n1,0.5\n2,0\n")
     assert "radians" in succeeds(capsys, "inspect", str(tmp_path / "radians.csv"))

@@ -1,9 +1,13 @@
-"""Quaternions wxyz in bulk, (..., 4); the few operations this room needs, without a Python loop."""
+"""Quaternions wxyz in bulk, (..., 4); the few operations this room needs, without a Python loop.
+
+Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; what has no gaps is left to scipy.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
 
 Array = NDArray[np.float64]
 
@@ -51,19 +55,7 @@ def from_matrix(R: Array) -> Array:
 def interpolated(time: Array, q: Array, at: Array) -> Array:
     """Rotations (M, 4) at times `at` (M,) within `time` (N,), increasing, by the shortest turn at an even rate between
     neighbours of q (N, 4) (slerp)."""
-    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    share = ((at - time[i]) / (time[i + 1] - time[i]))[:, None]
-    begin, end = q[i], q[i + 1]
-    cosine = np.sum(begin * end, axis=1, keepdims=True)
-    end = np.where(cosine < 0, -end, end)
-    half = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
-    sine = np.sin(half)
-    near = sine < 1e-6  # a straight line is as good, and sin / sin is not
-    safe = np.where(near, 1.0, sine)
-    left = np.where(near, 1 - share, np.sin((1 - share) * half) / safe)
-    right = np.where(near, share, np.sin(share * half) / safe)
-    out = left * begin + right * end
-    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))
+    return np.asarray(Slerp(time, Rotation.from_quat(q, scalar_first=True))(at).as_quat(scalar_first=True))
 
 
 def rotation_vector(q: Array) -> Array:

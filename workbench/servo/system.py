@@ -37,9 +37,10 @@ class ServoBank(LeafSystem):
         moving_speed   (n) rad/s -->|           |--> duty              (n)   -1 to 1
         torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
 
-    torque_enable may stay unconnected: all on. The reference advances every `period` seconds (discrete state, n). Back-EMF and
-    viscous friction act as joint damping of the plant, Coulomb friction as its joints' actuators (implicit) or as bristles
-    of this system (continuous state, n; after Dahl 1968), which both hold at rest, so that generalized_force holds what remains.
+    moving_speed and torque_enable may stay unconnected: at once, and all on. The reference advances every `period` seconds
+    (discrete state, n). Back-EMF and viscous friction act as joint damping of the plant, Coulomb friction as its joints'
+    actuators (implicit) or as bristles of this system (continuous state, n; after Dahl 1968), which both hold at rest, so
+    that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
@@ -105,7 +106,7 @@ class ServoBank(LeafSystem):
         return self._cached_command.Eval(context)  # type: ignore[no-any-return]
 
     def _calc_command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
-        speed = self._speed.Eval(context)
+        speed = self._speed.Eval(context) if self._speed.HasValue(context) else np.zeros(len(self.joints))
         step = np.where(speed > 0, speed * self._period, np.inf)
         on = self._enable.Eval(context) > 0.5 if self._enable.HasValue(context) else None
         return self._goal.Eval(context), -step, step, None if on is None or on.all() else on

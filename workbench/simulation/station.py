@@ -41,10 +41,11 @@ def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> Ro
     """A robot in its world: plant, floor, servos, and a log of each port. InputError for a base or an effect that does not fit.
 
     Inputs: `goal_position` (n) rad and `moving_speed` (n) rad/s, `torque_enable` (n) (drive "servo"). Joints in
-    `model.joints`' order. Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, and with drive
-    "servo" `motor_torque` (n) N m, `duty` (n), `reference` (n) rad. Systems: "plant", "scene_graph", "servo_bank",
-    "joint_reference" (the trajectory that drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named
-    after the port they write down: "state_log", "net_actuation_log", "reference_log".
+    `model.joints`' order. Outputs: `state` (nq + nv) of the plant, `net_actuation`, `contact_results`, `query_object` for
+    Drake's visualizers, and with drive "servo" `motor_torque` (n) N m, `duty` (n), `reference` (n) rad. `moving_speed` and
+    `torque_enable` may stay unconnected. Systems: "plant", "scene_graph", "servo_bank", "joint_reference" (the trajectory that
+    drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named after the port they write down:
+    "state_log", "net_actuation_log", "reference_log".
     """
     config = config or SimulationConfig()
     config.check()
@@ -156,6 +157,7 @@ def _add_logs(builder: RobotDiagramBuilder, plant: MultibodyPlant, config: Simul
     diagram = builder.builder()
     diagram.ExportOutput(plant.get_state_output_port(), "state")
     diagram.ExportOutput(plant.get_contact_results_output_port(), "contact_results")
+    diagram.ExportOutput(builder.scene_graph().get_query_output_port(), "query_object")
     logged = {"state": plant.get_state_output_port()}
     if plant.num_actuators():
         logged["net_actuation"] = plant.get_net_actuation_output_port()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 from workbench.effects.registry import effect_named, estimated_by
 from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, end_of, played_without, steps
@@ -60,13 +60,12 @@ class DroppedCommands:
 
     def finding(self) -> Finding:
         """With the 90 % interval of a share (Clopper and Pearson 1934)."""
-        low = float(beta.ppf(0.05, self.count, self.of - self.count + 1))
-        high = 1.0 if self.count == self.of else float(beta.ppf(0.95, self.count + 1, self.of - self.count))
+        low, high = binomtest(self.count, self.of).proportion_ci(0.9, "exact")
         return Finding(
             self.effect,
             (self.joint,),
             READ_OFF.dropped_probability,
-            {self._parameter: Estimate(self.probability, low, high, "1")},
+            {self._parameter: Estimate(self.probability, float(low), float(high), "1")},
             self.fit,
             self.validation,
             evidence=effect_named(self.effect).sentence(self.spec) + f" ({self.count} of {self.of} here.)",

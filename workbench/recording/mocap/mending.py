@@ -105,7 +105,7 @@ def _filled(tracks: Tracks, longest: float) -> Tracks:
             span = tracks.time[b] - tracks.time[a]
             f = (tracks.time[at] - tracks.time[a]) / span
             p[i, at] = p[i, a] + f[:, None] * (p[i, b] - p[i, a])
-            q[i, at] = _slerp(q[i, a], q[i, b], f)
+            q[i, at] = quat.interpolated(tracks.time[[a, b]], q[i, [a, b]], tracks.time[at])
             reach[i, at] = f * (1 - f) * span**2
             mended[at] = True
         left = gaps[~short]
@@ -117,13 +117,3 @@ def _filled(tracks: Tracks, longest: float) -> Tracks:
             text += f"; {len(left)} left open, the longest {worst[1] - worst[0]} frames from {tracks.time[worst[0]]:.3f} s"
         problems.append(text)
     return replace(tracks, p=p, q=q, seconds_squared=reach, mended=mended, problems=tuple(problems))
-
-
-def _slerp(a: Array, b: Array, f: Array) -> Array:
-    cosine = float(np.clip(a @ b, -1.0, 1.0))
-    angle = np.arccos(cosine)
-    if angle < 1e-6:
-        out = (1 - f)[:, None] * a + f[:, None] * b
-    else:
-        out = (np.sin((1 - f) * angle)[:, None] * a + np.sin(f * angle)[:, None] * b) / np.sin(angle)
-    return np.asarray(out / np.linalg.norm(out, axis=1, keepdims=True))

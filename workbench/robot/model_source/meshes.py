@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -94,7 +95,8 @@ def _triangles(path: Path, model: Path, place: str) -> Any:
     import trimesh
 
     try:
-        loaded = trimesh.load_mesh(path)
+        with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # pycollada 0.9 under numpy 2.5
+            loaded = trimesh.load_mesh(path)
         mesh = loaded.to_geometry() if isinstance(loaded, trimesh.Scene) else loaded
         good = isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) > 0 and bool(abs(mesh.vertices).max() < float("inf"))
     except Exception as e:  # trimesh has no error of its own, and each loader raises others

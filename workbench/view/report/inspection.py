@@ -263,8 +263,12 @@ def _fitted_model(path: Path) -> Inspection:
 
     model = load_model(path)
     named = [" ".join([e.effect, *e.where]) for e in model.effects]
+    try:
+        problems = model_problems_of(model)
+    except InputError as e:  # of an effect, which knows no file
+        raise e if e.source else InputError(path, f"effects: {e.problem}") from None
     return Inspection(str(path), "fitted_model", "1", joints=model.joints, details={"effects": named or ["none"]},
-                      problems=tuple(model_problems_of(model)))
+                      problems=tuple(problems))
 
 
 def _json(path: Path) -> Inspection:

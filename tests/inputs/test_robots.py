@@ -1,0 +1,92 @@
+"""Robots as people publish them, through the verbs: read, simulated, compared, and diagnosed from their servos' own logs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.command import succeeds
+from tests.inputs.robots import ROBOTS, Made, write_robot
+from workbench.motion import load_motion
+from workbench.recording import write_joint_log
+from workbench.robot import EffectSpec, RobotModel, load_servo_constants
+from workbench.simulation import Simulation, SimulationConfig
+
+COUNT = 2 * np.pi / 4096
+HIDDEN = 0.15
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def _model(urdf: Path) -> RobotModel:
+    model = RobotModel(str(urdf))
+    servo = load_servo_constants(urdf.parents[1] / "servo.yaml")
+    return RobotModel(str(urdf), servos=dict.fromkeys(model.joints, servo))
+
+
+def _motion(folder: Path, made: Made, model: RobotModel) -> Path:
+    """The last two joints of the first leg swing, all others rest."""
+    leg = next(iter(made.legs))
+    moving = [f"{leg}_{name}" for name, _ in made.joints[-2:]]
+    rows = ["time," + ",".join(model.joints)]
+    for k, (a, b) in enumerate([(0, 0), (20, -15), (-10, 25), (25, 10), (-15, -20), (10, 15), (0, 0)]):
+        rows.append(f"{0.4 * k}," + ",".join(str({moving[0]: a, moving[1]: b}.get(j, 0)) for j in model.joints))
+    (folder / "swing.csv").write_text("\n".join(rows) + "\n")
+    return folder / "swing.csv"
+
+
+def _record(folder: Path, made: Made, model: RobotModel, motion: Path) -> str:
+    """A joint log of the robot, held, with dry friction that its model lacks in the joint whose name is returned."""
+    joint = f"{next(iter(made.legs))}_{made.joints[-1][0]}"
+    worn = model.with_effect(EffectSpec("coulomb_friction", (joint,), {"torque": HIDDEN}))
+    commands = load_motion(motion, model).commands(2)
+    take = Simulation(worn, SimulationConfig(base="fixed")).run(commands)
+    at = np.arange(take.starts_at, take.time[-1], 1 / 50)
+    channels = {}
+    for name in take.joints:
+        channels[f"goal.{name}"] = commands.goals[np.maximum(
+            np.searchsorted(commands.times, at - take.starts_at, side="right") - 1, 0), commands.column(name)]
+        channels[f"speed.{name}"] = commands.speeds[np.maximum(
+            np.searchsorted(commands.times, at - take.starts_at, side="right") - 1, 0), commands.column(name)]
+        channels[f"position.{name}"] = np.round(np.interp(at, take.time, take.q[:, take.column(name)]) / COUNT) * COUNT
+    write_joint_log(folder / "log.csv", at - at[0], channels)
+    content = {"format": 1, "robot": {"model": f"urdf/{made.name}.urdf", "servos": "servo.yaml"}, "ground": {"friction": 0.6},
+               "takes": [{"name": "swing", "recording": "log.csv", "base": "fixed"}]}
+    (folder / "session.yaml").write_text(yaml.safe_dump(content))
+    return joint
+
+
+@pytest.mark.parametrize("made", ROBOTS, ids=lambda made: made.name)
+def test_it_is_read_whole(made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = succeeds(capsys, "inspect", str(write_robot(tmp_path, made)))
+    assert f" {len(made.legs) * len(made.joints)}: " in said
+    assert "made OBJ for Drake" in said
+    assert "no problems" in said
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("made", ROBOTS, ids=lambda made: made.name)
+def test_it_goes_through_the_verbs(made: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = _model(write_robot(tmp_path, made))
+    motion = _motion(tmp_path, made, model)
+    joint = _record(tmp_path, made, model, motion)
+    assert "no problems" in succeeds(capsys, "inspect", str(tmp_path))
+    session = str(tmp_path / "session.yaml")
+    said = succeeds(capsys, "simulate", str(motion), "--model", session, "--out", str(tmp_path / "simulate"))
+    assert "turned" in said
+    succeeds(capsys, "compare", str(tmp_path), "--out", str(tmp_path / "compare"), "--jobs", "1")
+    (take,) = json.loads((tmp_path / "compare" / "comparison.json").read_text())["takes"]
+    assert max(take["joints"], key=lambda j: take["joints"][j]["error"]) == joint
+    succeeds(capsys, "diagnose", str(tmp_path), "--out", str(tmp_path / "diagnose"), "--jobs", "1")
+    findings = json.loads((tmp_path / "diagnose" / "findings.json").read_text())
+    (found,) = findings["findings"]
+    assert (found["effect"], found["where"]) == ("coulomb_friction", [joint])
+    assert found["parameters"]["torque"]["value"] == pytest.approx(HIDDEN, rel=0.2)
+    assert findings["verdict"] == "explained"
