@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
-from studies.xl330 import bam, effects
+from studies.xl330 import bam
 from studies.xl330.fitting import Number, Problem, fit_all
+from studies.xl330.refit import fit_published, training
 from studies.xl330.rig import DUTY_PER_UNIT, Log, find_logs, nominal_servo, published, write_session
-from studies.xl330.selection import fit_effects, select
-from studies.xl330.station import station_errors
+from studies.xl330.station import played
 from tests.shared_data import shared
 from workbench.compare.session import load_session
 from workbench.recording import write_joint_log
@@ -21,10 +21,9 @@ from workbench.robot import InputError
 
 M1 = {"kt": 0.387, "R": 4.02, "armature": 0.0018, "q_offset": 0.031, "friction_base": 0.0128, "friction_viscous": 0.0037}
 FRICTIONLESS = M1 | {"friction_base": 0.0, "friction_viscous": 0.0, "q_offset": 0.0}
-TRUE = {"zero_offset.angle": 1.3, "load_friction.coefficient": 0.35, "supply_voltage.voltage": 8.2}
 
 
-def _logs(gains: tuple[int, ...] = (100, 200, 400), seconds: float = 3.0, step: float = effects.STEP) -> bam.Logs:
+def _logs(gains: tuple[int, ...], seconds: float, step: float) -> bam.Logs:
     """A lift, a fast wave and a release at each gain; nothing recorded yet."""
     t = np.arange(0.0, seconds, step)
     goals = {"lift": 1.4 * np.sin(1.2 * t) ** 2, "wave": np.sin(2.0 * t**2), "drop": -1.2 * np.minimum(t / 1.5, 1.0)}
@@ -34,10 +33,6 @@ def _logs(gains: tuple[int, ...] = (100, 200, 400), seconds: float = 3.0, step: 
     return bam.Logs(tuple(f"{name}_{g}" for name, g in each), tuple(g for _, g in each), goal, np.zeros_like(goal),
                     np.column_stack([on[name] for name, _ in each]), np.zeros(len(each)),
                     np.array([g * DUTY_PER_UNIT for _, g in each]), 0.49, 0.1, 7.4)
-
-
-def _recorded(logs: bam.Logs, values: dict[str, float]) -> bam.Logs:
-    return replace(logs, position=effects.roll_out(logs, M1, values)[:, 0])
 
 
 def test_m1_in_the_words_of_a_servo_file() -> None:
@@ -74,13 +69,13 @@ def test_budgets_of_friction(model: str, more: dict[str, float], budget: float) 
     assert float(found) == pytest.approx(budget)
 
 
-def test_fits_find_what_was_put_in() -> None:
-    logs = _recorded(_logs(), TRUE)
-    seen = np.array(logs.gains) != 200
-    (model,) = fit_effects([(("load_friction", "zero_offset", "supply_voltage"), seen, {})], logs, M1)
-    assert {k: model.values[k] for k in TRUE} == pytest.approx(TRUE, rel=0.02)
-    left = bam.errors(logs, effects.roll_out(logs, M1, model.values))[0]
-    assert left.max() < 2e-3
+def test_a_refit_finds_what_was_put_in() -> None:
+    logs = _logs((100, 200, 400), 2.0, bam.STEP)
+    true = M1 | {"friction_base": 0.03, "q_offset": 0.0}
+    logs = replace(logs, position=bam.roll_out(logs, "m1", true)[:, 0])
+    (found,) = fit_published("m1", M1, logs, [training(logs, 200)], starts=1)
+    assert bam.errors(logs, bam.roll_out(logs, "m1", found))[0].max() < 2e-3
+    assert found["friction_base"] == pytest.approx(0.03, rel=0.05)
 
 
 def test_fits_stay_in_bounds_and_beside_each_other() -> None:
@@ -96,13 +91,6 @@ def test_fits_stay_in_bounds_and_beside_each_other() -> None:
     assert bounded.cost > free.cost
 
 
-def test_the_effects_that_were_there_are_chosen() -> None:
-    logs = _recorded(_logs(seconds=2.0), {"zero_offset.angle": 3.0, "load_friction.coefficient": 0.4})
-    (chain,) = select(logs, M1, [200], most=2)
-    assert set(chain[-1].effects) == {"load_friction", "zero_offset"}
-    assert [len(m.effects) for m in chain] == [0, 1, 2]
-
-
 def test_a_session_of_the_rig(tmp_path: Path) -> None:
     t = np.linspace(0.1, 2.0, 300)
     for gain in (100, 200):
@@ -116,7 +104,7 @@ def test_a_session_of_the_rig(tmp_path: Path) -> None:
     assert session.model.kinematics.masses["arm"] == pytest.approx(0.49)
     rows = np.genfromtxt(tmp_path / "session/predict/wave_200.csv", delimiter=",", names=True)
     assert np.isfinite(rows["positionservo"]).sum() == 1
-    assert list(station_errors(session, session.model, 100)) == ["wave_100"]
+    assert list(played(session, session.model, 100)) == ["wave_100"]
     assert "use" not in yaml.safe_load(path.read_text())["takes"][0]
     with pytest.raises(InputError, match="logs of one rig"):
         write_session(tmp_path / "other", [found[0], replace(found[1], mass=0.5)], M1)

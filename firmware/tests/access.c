@@ -30,7 +30,7 @@ static uint8_t *byte_of(struct sim *s, const char *what, uint32_t k) {
 static bool *flag(struct sim *s, const char *what, uint32_t k) {
     const struct { const char *name; bool *at; } fields[] = {
         {"mute", &s->servo[k].mute}, {"twin", &s->servo[k].twin}, {"overload", &s->servo[k].overload}, {"babble", &s->babble},
-        {"start", &s->r.start_pressed}, {"powered", &s->servo[k].powered}};
+        {"start", &s->r.start_pressed}, {"powered", &s->servo[k].powered}, {"held", &s->servo[k].held}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
         if (!strcmp(what, fields[i].name)) return fields[i].at;
     return NULL;

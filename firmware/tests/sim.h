@@ -8,6 +8,7 @@ struct sim_servo {
     uint8_t table[DXL_END];
     int64_t milli; /* position, thousandths of a count */
     bool powered, mute, twin, overload;
+    bool held;     /* something is in its way: it does not move */
     uint8_t heat;
 };
 

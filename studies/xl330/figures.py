@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from studies.xl330.bam import Logs
 from studies.xl330.rig import Log
+from studies.xl330.station import Played
 from workbench.robot import GRAVITY
 from workbench.view.figures import style
 
@@ -46,21 +46,19 @@ def draw_balance(logs: Sequence[Log], stall_torque: float) -> Figure:
 
 
 @style.styled
-def draw_logs(logs: Logs, curves: Mapping[str, Array], step: float, title: str) -> Figure:
-    """Recorded angles and models' (T, L) [rad], a panel for each log."""
-    n = len(logs.names)
-    figure = style.new_figure(12, 3.1 * ((n + 1) // 2))
-    time = step * np.arange(len(logs.position))
-    colours = dict(zip(curves, (style.COMMAND, style.SIMULATED)))
-    panels = np.atleast_1d(figure.subplots((n + 1) // 2, 2, sharex=True)).ravel()
-    for i, (name, panel) in enumerate(zip(logs.names, panels)):
-        panel.plot(time, np.degrees(logs.position[:, i]), color=style.RECORDED, lw=2.4, label="recorded")
-        for label, q in curves.items():
-            shown = np.where(np.isfinite(logs.position[:, i]), q[:, i], np.nan)
-            panel.plot(time, np.degrees(shown), color=colours[label], lw=1.3, label=label)
+def draw_logs(models: Mapping[str, Mapping[str, Played]], title: str) -> Figure:
+    """Recorded angles and models', by model and log; a panel for each log."""
+    logs = next(iter(models.values()))
+    figure = style.new_figure(12, 3.1 * ((len(logs) + 1) // 2))
+    colours = dict(zip(models, (style.COMMAND, style.SIMULATED)))
+    panels = np.atleast_1d(figure.subplots((len(logs) + 1) // 2, 2, sharex=True)).ravel()
+    for (name, log), panel in zip(logs.items(), panels):
+        panel.plot(log.time, np.degrees(log.recorded), color=style.RECORDED, lw=2.4, label="recorded")
+        for label, of in models.items():
+            panel.plot(of[name].time, np.degrees(of[name].simulated), color=colours[label], lw=1.3, label=label)
         panel.set_title(name.rsplit("_", 1)[0].replace("_", " "))
         panel.set_ylabel("angle [deg]")
-    for panel in panels[max(0, n - 2):]:
+    for panel in panels[max(0, len(logs) - 2):]:
         panel.set_xlabel("time [s]")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)

@@ -119,3 +119,16 @@ def write_commands(path: Path, log: Log) -> Path:
 
 def _named(recording: Recording) -> dict[str, Array]:
     return {f"{name.partition('.')[0]}.{JOINT}" if "." in name else name: c for name, c in recording.channels.items()}
+
+
+def full_duty(logs: Sequence[Log]) -> tuple[float, float, int]:
+    """What the logs say of the supply [V]: median while the motor is idle, median while it stands at full duty, and rows of the
+    latter."""
+    idle: list[Array] = []
+    full: list[Array] = []
+    for log in logs:
+        channels = {name.partition(".")[0]: c for name, c in log.read().channels.items()}
+        duty = np.abs(channels["duty"])
+        idle.append(channels["voltage"][duty < 0.02])
+        full.append(channels["voltage"][(duty > 0.98) & (np.abs(channels["velocity"]) < 0.3)])
+    return float(np.median(np.concatenate(idle))), float(np.median(np.concatenate(full))), sum(len(f) for f in full)

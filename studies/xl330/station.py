@@ -1,23 +1,38 @@
-"""The study's models on the station (Drake), take by take."""
+"""Models on the station (Drake), take by take."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes
-from workbench.robot import EffectSpec, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
-DIAGNOSED = "model.yaml"
-"""Where a session's folder keeps what `workbench diagnose` made of it."""
+Array = NDArray[np.float64]
 STATION = SimulationConfig(base="fixed", contact_period=0)
 
 
-def station_errors(session: Session, model: RobotModel, gain: int, n_jobs: int = 1) -> dict[str, float]:
-    """Mean absolute error [rad] of a model on a session's takes at one gain, by name, each from its measured start."""
+@dataclass(frozen=True)
+class Played:
+    """One log played by a model from its measured start. time (N,) [s]; recorded, simulated (N,) [rad]."""
+
+    time: Array
+    recorded: Array
+    simulated: Array
+
+    @property
+    def error(self) -> float:
+        """Mean absolute error [rad]."""
+        return float(np.nanmean(np.abs(self.simulated - self.recorded)))
+
+
+def played(session: Session, model: RobotModel, gain: int, n_jobs: int = 1) -> dict[str, Played]:
+    """A session's takes at one gain, by name."""
     read = [t for t in read_takes(session)[0] if t.spec.name.endswith(f"_{gain}")]
     jobs = []
     for t in read:
@@ -25,14 +40,10 @@ def station_errors(session: Session, model: RobotModel, gain: int, n_jobs: int =
         since = t.recording.time - t.recording.time[0]
         own = replace(model.with_servos(t.spec.servos), effects=model.effects)
         jobs.append(Job(own, STATION, t.commands, float(since[-1]) + 2e-3, start=t.start_state(), times=since, name=t.spec.name))
-    out = {}
-    for t, rollout in zip(read, simulate_batch(jobs, n_jobs)):
-        position = t.recording.channels[f"position.{t.model.joints[0]}"]
-        out[t.spec.name] = float(np.nanmean(np.abs(rollout.as_logged().q[:, 0] - position)))
-    return out
+    return {t.spec.name: Played(job.times, t.recording.channels[f"position.{t.model.joints[0]}"], rollout.as_logged().q[:, 0])
+            for t, job, rollout in zip(read, jobs, simulate_batch(jobs, n_jobs)) if job.times is not None}
 
 
-def with_specs(session: Session, effects: tuple[EffectSpec, ...]) -> RobotModel:
-    """The nominal rig with effects."""
-    return replace(session.model, effects=effects)
-
+def mean_error(of: Mapping[str, Played]) -> float:
+    """Over logs [rad]."""
+    return float(np.mean([p.error for p in of.values()]))

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import FRAME, candidate, linear, region
+from workbench.identify.evidence.fit import fitting
 from workbench.identify.evidence.holdout import vetoed
+from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep, search
@@ -75,13 +77,16 @@ def test_effects_that_do_the_same_share_the_probability():
 
 
 def test_takes_kept_back_speak_against_what_only_some_show():
-    """An effect that one take asks for, and that the others would be worse with, is none."""
+    """An effect that two takes ask for, and that the others would be worse with, is none."""
     rollouts = robot({"load_friction": 2.0})
     (of,) = rollouts.regions
-    odd = rollouts.does["backlash.gap"] * np.where(of.takes == 0, 2.0, -0.4)
+    odd = rollouts.does["backlash.gap"] * np.where(of.takes < 2, 1.2, -0.8)
     rollouts = replace(rollouts, truth=rollouts.truth + odd)
-    after, found, _ = searched(rollouts, replace(OPTIONS, stop=-50.0, most=2))
-    with_both = next(f for f in found.fits.values() if {c.name for c in f.hypothesis.effects} == {"load_friction", "backlash"})
+    after, found, _ = searched(rollouts)
+    h = start(found.region.numbers)
+    for name in ("load_friction", "backlash"):
+        h = h.with_effect(candidate(name), np.ones(1))
+    with_both = lockstep(after, {0: fitting(found.region, OPTIONS, h, 0.01, OPTIONS.iterations)})[0]
     said = lockstep(after, {0: vetoed(found.region, OPTIONS, with_both, [(0,), (1,), (2,), (3,)])})[0]
     assert {c.name for c in said} == {"backlash"}
 

@@ -1,4 +1,4 @@
-"""Windows of walks: where they begin, what is read off there, and what then tells nothing."""
+"""Windows of floating-base takes: where they begin, what is read off there, and what then tells nothing."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tests.command import refused, succeeds
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli import progress
 from workbench.cli.output import LEFT, output_directory
-from workbench.compare.file_problems import session_check, told
+from workbench.compare.file_problems import session_check, summed_up
 from workbench.compare.session import load_session
 from workbench.recording import read_recording, write_motive
 from workbench.robot import InputError
@@ -97,7 +97,7 @@ def test_a_frozen_body_is_a_warning_of_every_verb(arm: Path) -> None:
 
 
 def test_many_problems_are_one_line() -> None:
-    assert told(["a", "b", "c", "d"]) == "a; b; c (and 1 more: see workbench inspect)"
+    assert summed_up(["a", "b", "c", "d"]) == "a; b; c (and 1 more: see workbench inspect)"
 
 
 def test_warnings_wait_for_a_run_that_ends_well_or_is_long(capsys: pytest.CaptureFixture[str]) -> None:

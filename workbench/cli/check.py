@@ -31,24 +31,24 @@ def check_session(verb: str, session: Session, yes: bool = True) -> None:
 
 def check_model(verb: str, model: RobotModel) -> None:
     """Warns of a robot's problems."""
-    from workbench.compare.file_problems import model_problems_of, told
+    from workbench.compare.file_problems import model_problems_of, summed_up
 
     problems = model_problems_of(model)
-    warn(verb, [f"{model.description}: {told(problems)}"] if problems else [])
+    warn(verb, [f"{model.description}: {summed_up(problems)}"] if problems else [])
 
 
 def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -> None:
     """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
-    from workbench.compare.file_problems import motion_problems, told
+    from workbench.compare.file_problems import motion_problems, summed_up
 
     problems = motion_problems(motion, cycles)
-    warn(verb, [f"{motion.source}: {told(problems)}"] if problems else [])
+    warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
     _ask(motion.source, cycles * motion.duration, yes)
 
 
 def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int = 1, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
-    from workbench.compare.file_problems import recording_problems, serious, told
+    from workbench.compare.file_problems import recording_problems, serious, summed_up
     from workbench.motion import load_motion
     from workbench.recording.formats.file_kind import file_kind
     from workbench.recording.formats.read import read_recording
@@ -61,7 +61,7 @@ def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int 
         elif kind == "recording":
             recording = read_recording(file)
             problems = serious(recording_problems(file, recording, model))
-            warn(verb, [f"{file}: {told(problems)}"] if problems else [])
+            warn(verb, [f"{file}: {summed_up(problems)}"] if problems else [])
             _ask(file, float(recording.time[-1] - recording.time[0]), yes)
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
 
 
-STAGES = ("reading", "simulating", "looking anew", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
+STAGES = ("reading", "simulating", "looking again", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
 """Of a search that goes back and forth, the last begun."""
 
 

@@ -41,7 +41,7 @@ class SessionCheck:
         out = []
         for of, lines in self.problems.items():
             bad = [] if of in self.damaged else serious(lines)
-            out += [f"{of}: {told(bad)}"] if bad else []
+            out += [f"{of}: {summed_up(bad)}"] if bad else []
         return out
 
 
@@ -137,7 +137,7 @@ def serious(problems: Sequence[str]) -> list[str]:
     return [text for text in problems if _ROUTINE not in text]
 
 
-def told(problems: Sequence[str], most: int = 3) -> str:
+def summed_up(problems: Sequence[str], most: int = 3) -> str:
     """Several problems in one line, the first few in full."""
     more = f" (and {len(problems) - most} more: see workbench inspect)" if len(problems) > most else ""
     return "; ".join(problems[:most]) + more

@@ -50,7 +50,8 @@ def test_what_earlier_effects_may_err_by_counts_where_they_act_and_hides_nothing
 
 
 def test_on_the_ground_a_strong_effect_hides_nothing_in_channels_that_it_did_not_change(worn, monkeypatch):
-    """A stop that walks told brought a million in its own joint: another effect is asked for hundredths of that there alone."""
+    """A stop that floating-base takes identified brought a million in its own joint: another effect is asked for hundredths of
+    that there alone."""
     session, whole, nominal = worn
     monkeypatch.setattr(whole.evaluator, "any_floating", lambda takes: True)
     search = Search(whole.evaluator, session.model)

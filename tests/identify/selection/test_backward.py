@@ -1,4 +1,4 @@
-"""Effects that others make idle go, once the others have gone where they must: in a lone joint, as far as that is."""
+"""Effects that others make idle go, once the others have gone where they must: in a robot of one joint, as far as that is."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Several effects in one joint: which sets signatures foretell."""
+"""Several effects in one joint: which sets responses predict."""
 
 from types import SimpleNamespace
 

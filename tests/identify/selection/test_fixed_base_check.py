@@ -1,4 +1,4 @@
-"""What held takes say of numbers that walks told."""
+"""What fixed-base takes say of numbers that floating-base takes identified."""
 
 from types import SimpleNamespace
 
@@ -13,7 +13,7 @@ CEILING, FLOOR = candidate("torque_ceiling"), candidate("ground_friction")
 
 
 class TwoWorlds:
-    """A held take (0) and a walk (1); what each leaves of a ceiling's size, None being without it."""
+    """A fixed-base take (0) and a walk (1); what each leaves of a ceiling's size, None being without it."""
 
     fixed_base, fitted, settled = (0,), (0, 1), None
     evaluator = SimpleNamespace(cost=lambda residuals, use: float(sum(r.sum() for r in residuals.values())))

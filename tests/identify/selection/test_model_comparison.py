@@ -233,7 +233,7 @@ def test_a_rival_must_lead_by_more_where_no_fit_is_right():
 
 
 def test_what_goes_wrong_elsewhere_leaves_a_joints_rivals_no_more_to_chance():
-    """A cable hangs on another joint of a robot whose joint's names are contested with the base held."""
+    """A cable hangs on another joint of a robot whose joint's names are contested on a fixed base."""
     left = {None: 40000.0, "knee": 130.0}
     evaluator = SimpleNamespace(expected=lambda takes, use: 100.0, any_floating=lambda takes: True,
                            by_channel=lambda residuals, use, joint: (np.array([left[joint]]), np.array([100.0])))

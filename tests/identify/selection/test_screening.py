@@ -74,7 +74,7 @@ def test_a_number_that_only_shapes_an_effect_is_looked_at_far_both_ways_and_is_n
     c = Candidate.of(known_effects()["stribeck_friction"], ("flm",), (0.0, 20.0))
     probes = scan(c, (1.0, 4.0), False)
     assert sorted({round(c.values(p)[1]) for p in probes}) == [5, 20, 80]
-    assert {p[1] for p in scan(c, (1.0,), True)} == {0.0}  # walks are expensive
+    assert {p[1] for p in scan(c, (1.0,), True)} == {0.0}  # floating-base takes are expensive
     r0 = np.linspace(-1.0, 1.0, 20)
     fades = [r0 * (1 - 0.3 * p[0]) if p[1] == 2.0 else r0 + 0.01 * p[0] for p in probes]
     x, gain = linearised_estimate(c, r0, probes, fades, 5.0)
@@ -390,7 +390,7 @@ def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
     ("coulomb_friction", False, False, FIT.scanned), ("coulomb_friction", True, False, FIT.scanned[:1]),
     ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground)])
 def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, no_fixed_base, sizes):
-    """Of a hip's friction six times the typical one nothing was foretold at once its size, and more of a wrong name."""
+    """Of a hip's friction six times the typical one nothing was predicted at once its size, and more of a wrong name."""
     effect = known_effects()[name]
     where = ("one",) if effect.places == ("joint",) else ()
     assert scan_sizes(Candidate.of(effect, where, (0.6,)), walking, no_fixed_base) == sizes

@@ -1,4 +1,4 @@
-"""In a lone joint, effects that do nearly the same share the work where no other set leaves what a right model does."""
+"""In a robot of one joint, effects that do nearly the same share the work where no other set leaves what a right model does."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""One of several effects in a joint replaced by another: what lines around their fit foretell."""
+"""One of several effects in a joint replaced by another: what lines around their fit predict."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -205,7 +205,7 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     """The best fit with the last numbers, from whole takes; among the others it stays as likely as the search found it."""
     best = found.best
     (r,) = yield [best.hypothesis]
-    region = entire.measured(r, options)
+    region = entire.correlated(found.region.likelihood.tau)
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.polish, r)
     fit = replace(fit, log_evidence=best.log_evidence, log_prior=best.log_prior)

@@ -20,11 +20,21 @@ FAR = 2.0
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
+Label = tuple[str, tuple[str, ...], str, int]
+"""Which number: an effect's name, where it acts, the parameter and its component; of the nominal law "" and the joint."""
 
 
 def term_of(c: Candidate) -> Term:
     """What a candidate is."""
     return (c.name, c.where, c.options)
+
+
+def labels_of(c: Candidate) -> list[Label]:
+    """Of the sizes of a candidate, whichever options it has."""
+    fitted = [p.name for p, fixed in zip(c.parameters, c.fixed) if not fixed]
+    if len(fitted) != c.size:  # moments, of a mass that swings
+        fitted = ["size"] * c.size
+    return [(c.name, c.where, name, fitted[:k].count(name)) for k, name in enumerate(fitted)]
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,12 @@ class Hypothesis:
     def z(self) -> Array:
         """Of the recalibrated numbers."""
         return self.theta[:len(self.numbers)]
+
+    @property
+    def labels(self) -> list[Label]:
+        """Of theta's numbers."""
+        nominal = [("", (n.joint,), n.name, 0) for n in self.numbers]
+        return [*nominal, *(label for c in self.effects for label in labels_of(c))]
 
     def slices(self) -> list[slice]:
         """Of theta, for each effect."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
@@ -9,8 +10,9 @@ from itertools import combinations, pairwise, product
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.effects.base import Effect
 from workbench.identify.evidence.fit import Asks, Fitted, judged
-from workbench.identify.evidence.hypothesis import Hypothesis, Prior
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
@@ -21,6 +23,8 @@ AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 nothing until it is met."""
 SHAPES = (0.0, 2.0, -2.0)
 """Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+LED = 2
+"""Moves of two effects that the same one leads."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
 """Shares of the way between two sizes that were seen, and beyond the last and to the other side, at which lines are read."""
 
@@ -53,9 +57,13 @@ def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
     out = [c for c in region.candidates if (c.name, c.where) not in there]
     for c in h.effects:
         more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
-        whole = tuple(p.typical if p.shapes else 0.0 for p in c.effect.parameters)
-        out += [Candidate.of(c.effect, c.where, whole, options=(*c.options, name)) for name in more]
+        out += [Candidate.of(c.effect, c.where, _neutral(c.effect), options=tuple(sorted((*c.options, name)))) for name in more]
     return out
+
+
+def _neutral(effect: Effect) -> tuple[float, ...]:
+    """Of the numbers of an effect that has options: what vanishes is nothing, what shapes is typical."""
+    return tuple(p.typical if p.shapes else 0.0 for p in effect.parameters)
 
 
 def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
@@ -77,35 +85,48 @@ def best_of_each(moves: Sequence[Move]) -> list[Move]:
     return list(out.values())
 
 
+def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
+    """Of the best moves of one effect a beam, and of those of two as many more, but only two that the same effect leads: lines
+    foretell worse what comes beside it than that one is in all of them."""
+    out, led = list(alone[:options.beam]), Counter[object]()
+    for m in both:
+        leads = (m.added[0].key, m.added[0].options)
+        if len(out) < options.refined and led[leads] < LED:
+            out.append(m)
+            led[leads] += 1
+    return out
+
+
 def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequence[Move]) -> list[Move]:
     """Two of the best moves at once, foretold by what each does alone."""
-    out = []
-    there = {(c.name, c.where) for c in f.hypothesis.effects}
-    alone = [m for m in moves[:options.paired] if (m.added[0].name, m.added[0].where) not in there]
-    for a, b in combinations(alone, 2):
-        (two,) = b.added
-        h = a.hypothesis.with_effect(two, b.hypothesis.theta[len(b.hypothesis.theta) - two.size:])
-        J = np.column_stack([a.J, b.J[:, b.J.shape[1] - two.size:]])
-        n = len(f.hypothesis.theta)
-        led = np.arange(len(h.theta)) < n
-        back = a.J[:, :n] @ (b.hypothesis.theta[:n] - f.hypothesis.theta)
-        r = a.r + (b.r - f.r) - back  # b as it is with the other numbers where a has them
-        out.append(_judged(region, options, f, *_led(region, options, f, h, r, J, led), (*a.added, two)))
-    return out
+    return [_both(region, options, f, a, b) for a, b in combinations(moves[:options.paired], 2)
+            if a.added[0].key != b.added[0].key or a.added[0].key in {c.key for c in f.hypothesis.effects}]
+
+
+def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move) -> Move:
+    """Two moves at once: each does what it does alone, and what the fit had is led after both."""
+    (one,), (two,) = a.added, b.added
+    if one.key == two.key:  # two options of one effect that is there
+        two = Candidate.of(two.effect, two.where, _neutral(two.effect), options=tuple(sorted({*one.options, *two.options})))
+    sizes = {**dict(zip(b.hypothesis.labels, b.hypothesis.theta)), **dict(zip(a.hypothesis.labels, a.hypothesis.theta))}
+    sizes |= {label: x for label, x in zip(b.hypothesis.labels, b.hypothesis.theta) if label not in f.hypothesis.labels}
+    h = a.hypothesis.with_effect(two, np.array([sizes[label] for label in labels_of(two)]))
+    at = dict(zip(f.hypothesis.labels, f.hypothesis.theta))
+    led_after_b = [(k, x - at[label]) for k, (label, x) in enumerate(zip(b.hypothesis.labels, b.hypothesis.theta)) if label in at]
+    r = a.r + (b.r - f.r) - sum((b.J[:, k] * by for k, by in led_after_b), np.zeros(len(f.r)))
+    J, led = slopes_for(f, h)
+    for m in (a, b):
+        for label, column in zip(m.hypothesis.labels, m.J.T):
+            if label not in at:
+                J[:, h.labels.index(label)] = column
+    return _judged(region, options, f, *_led(region, options, f, h, r, J, led), (*a.added, two))
 
 
 def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
     """The fit's slopes in the order of another hypothesis' numbers, 0 of those that it lacks, and which it has."""
-    n = len(h.numbers)
-    J, known = np.zeros((len(f.r), len(h.theta))), np.zeros(len(h.theta), dtype=bool)
-    J[:, :n], known[:n] = f.J[:, :n], True
-    own = {(c.name, c.where): s for c, s in zip(f.hypothesis.effects, f.hypothesis.slices())}
-    for c, s in zip(h.effects, h.slices()):
-        if (c.name, c.where) in own:
-            was = own[c.name, c.where]
-            m = min(was.stop - was.start, s.stop - s.start)  # numbers of options come after those that are always given
-            J[:, s.start:s.start + m] = f.J[:, was.start:was.start + m]
-            known[s.start:s.start + m] = True
+    column = dict(zip(f.hypothesis.labels, f.J.T))
+    known = np.array([label in column for label in h.labels])
+    J = np.column_stack([column.get(label, np.zeros(len(f.r))) for label in h.labels]) if len(known) else np.empty((len(f.r), 0))
     return J, known
 
 
@@ -116,9 +137,9 @@ def _points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
         return [(np.ones(c.size), -1)]
     if len({p.vector for p in c.given}) > 1:  # a load: its probes are where it may hang
         return [(np.clip(p, low, high), -1) for p in c.probes()]
-    own = next((x for other, x in h.sizes() if (other.name, other.where) == (c.name, c.where)), np.empty(0))
-    start = np.concatenate([own, np.zeros(c.size - len(own))])
-    new = np.arange(c.size) >= len(own)
+    own = dict(zip(h.labels, h.theta))
+    start = np.array([own.get(label, 0.0) for label in labels_of(c)])
+    new = np.array([label not in own for label in labels_of(c)])
     shapes = SHAPES if (c.shapes & new).any() else (0.0,)
     amounts = ENDLESS if any(np.isinf(n) for n in c.neutral) else AMOUNTS
     out: list[tuple[Array, int]] = []

@@ -19,11 +19,12 @@ class EvidenceOptions:
     expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having
     searched many.
 
-    The search. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip answers smaller
-    ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that
-    are extended; refined: moves that are fitted in each; paired: of the best moves, those that are also tried two at a time.
-    most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit sees
-    all. stop [nats]: gain in log posterior below which the search ends, a third more likely.
+    The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
+    leave is correlated for longer. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip
+    answers smaller ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that are
+    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are;
+    paired: of the best moves, those that are also foretold two at a time. most: effects of one joint. seconds: of all takes
+    together that the search looks at, their beginnings; the last fit sees all.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
@@ -42,11 +43,11 @@ class EvidenceOptions:
     iterations: int = 5
     polish: int = 4
     beam: int = 3
-    refined: int = 5
-    paired: int = 4
+    refined: int = 9
+    paired: int = 10
     most: int = 6
+    explored: float = 0.15
     seconds: float = 100.0
-    stop: float = 0.3
     occam: float = 7.0
     veto: float = 3.0
     sure: float = 3.0

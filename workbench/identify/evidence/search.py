@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
 from workbench.identify.evidence.hypothesis import Term, start
-from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, slopes_for
+from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.fitting.levenberg_marquardt import together
+from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
@@ -47,36 +48,53 @@ class Found:
 
 
 def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
-    """Searches all regions side by side, level by level; returns them with what stands in each."""
-    regions = rollouts.regions
+    """Searches all regions side by side, level by level; returns them with what stands in each.
+
+    How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
+    something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
+    longer than `options.explored` and at a coarse step, and then judges what it fitted, and goes on, by what the closest fits
+    leave.
+    """
     report("the nominal law recalibrated", None)
-    first = _all_of(rollouts, [_begun(r, options) for r in regions])
+    whole, rollouts = rollouts, replace(rollouts, step=PROBLEM.coarse)
+    first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
     found = [Found(r, {f.hypothesis.key: f}) for r, f in first]
     rollouts = standing(rollouts, found)
-    open_ = set(range(len(regions)))
-    for level in range(options.most + 1):
-        report(f"effects, level {level + 1}", level / (options.most + 1))
-        levels = {i: _level(found[i], options) for i in sorted(open_)}
-        found = _replaced(found, lockstep(rollouts, levels))
+    for exploring in (True, False):
+        step = PROBLEM.coarse if exploring else whole.step
+        rollouts, found = _all_levels(replace(rollouts, step=step), found, options, exploring, report)
+    return rollouts, tuple(found)
+
+
+def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions, exploring: bool, report: Report
+                ) -> tuple[Rollouts, list[Found]]:
+    """Level by level until no region's best fit has anything to be added, dropped or exchanged."""
+    what = "exploring" if exploring else "judging"
+
+    def everywhere(part: Callable[[Found], Asks[Found]], these: Collection[int]) -> None:
+        nonlocal rollouts, found
+        found = _replaced(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
         rollouts = standing(rollouts, found)
-        again = {i: _renewed(found[i], options) for i in range(len(found))}  # other joints moved, and what is left is shorter
-        found = _replaced(found, lockstep(rollouts, again))
-        rollouts = standing(rollouts, found)
+
+    everywhere(lambda f: _renewed(f, options, exploring), range(len(found)))
+    open_ = set(range(len(found)))
+    for level in range(options.most):
+        report(f"effects, {what}, level {level + 1}", level / options.most)
+        everywhere(lambda f: _level(f, options), open_)
+        if not exploring:
+            everywhere(lambda f: _exchanged(f, options), open_)
+        everywhere(lambda f: _renewed(f, options, exploring), range(len(found)))  # other joints moved
         open_ = {i for i in open_ if found[i].goes_on(options)}
         if not open_:
             break
-    report("taking effects out, and others in their place", None)
-    found = _replaced(found, lockstep(rollouts, {i: _exchanged(found[i], options) for i in range(len(found))}))
-    rollouts = standing(rollouts, found)
-    found = _replaced(found, lockstep(rollouts, {i: _renewed(found[i], options) for i in range(len(found))}))
-    return standing(rollouts, found), tuple(found)
+    return rollouts, found
 
 
 def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitted]]:
-    """The nominal law recalibrated, and the correlation time that this leaves."""
+    """The nominal law recalibrated."""
     h = start(region.numbers)
     (r,) = yield [h]
-    region = region.measured(r, options)
+    region = region.correlated(min(options.explored, region.correlation(r, options)))
     s = region.likelihood.discrepancy(r)
     fit = yield from fitting(region, options, h, s, options.iterations, r)
     return region, fit
@@ -84,15 +102,31 @@ def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
 
 def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
     """The beam's states extended by the moves that foretell most, and those fitted."""
-    fits, extended = dict(found.fits), set(found.extended)
-    region, moves = found.region, []
-    for f in found.beam(options):
-        if f.hypothesis.key in extended:
-            continue
-        extended.add(f.hypothesis.key)
+    return (yield from _extended(found, options, found.beam(options), options.refined))
+
+
+def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
+    """Where the best fit cannot be extended to a better one: without each of its effects in turn, and with others in its
+    place."""
+    if found.best.hypothesis.key not in found.extended:
+        return found
+    best, region = found.best, found.region
+    states = [without(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
+    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J)
+                                    for h, J in states if h.key not in found.fits])
+    found = replace(found, fits={**found.fits, **{f.hypothesis.key: f for f in made}})
+    return (yield from _extended(found, options, [found.fits[h.key] for h, _ in states], options.beam))
+
+
+def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
+    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
+    fits, region, moves = dict(found.fits), found.region, []
+    states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
+    for f in states:
         alone = yield from linearised(region, options, f)
-        moves += [(f, m) for m in best_of_each([*alone, *in_pairs(region, options, f, alone)])[:options.refined]
-                  if m.hypothesis.key not in fits]
+        alone, both = ([m for m in each if m.hypothesis.key not in fits]
+                       for each in (alone, best_of_each(in_pairs(region, options, f, alone))))
+        moves += [(f, m) for m in to_be_fitted(alone, both, options)[:refined]]
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
@@ -101,69 +135,30 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f, options.polish) for f in ahead])
     fits |= {f.hypothesis.key: max(f, fits[f.hypothesis.key], key=lambda g: g.log_posterior) for f in better}
-    return Found(region, fits, frozenset(extended))
+    return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
 
 def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that foretold it where they tell all its numbers."""
+    """A move fitted, with the slopes that foretold it where they tell all its numbers; and once more with the nominal law as it
+    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
-    return (yield from fitting(region, options, m.hypothesis, f.discrepancy, options.iterations, None, None if shaped else m.J))
+    h = m.hypothesis
+    anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
+    fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
+                                    fitting(region, options, anew, f.discrepancy, options.iterations)])
+    return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
-def _renewed(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """All fits within reach of the best judged anew, as other regions stand now, by the correlation time that the closest of them
-    leaves: what a poorer model leaves is correlated because it lacks something."""
-    near = [f for f in found.fits.values() if f.log_posterior > found.best.log_posterior - 3 * options.occam]
+def _renewed(found: Found, options: EvidenceOptions, exploring: bool) -> Asks[Found]:
+    """The fits judged anew, as other regions stand now, by the correlation time of what the closest of them leave: the median of
+    a few, as one tells it badly."""
+    near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
     left = yield [f.hypothesis for f in near]
-    r = min(left, key=found.region.likelihood.discrepancy)
-    region = found.region.measured(r, options)
+    closest = sorted(left, key=found.region.likelihood.discrepancy)[:options.beam]
+    tau = float(np.median([found.region.correlation(r, options) for r in closest]))
+    region = found.region.correlated(min(tau, options.explored) if exploring else tau)
     fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)
-
-
-def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """The best fit without each of its effects in turn, then with another in its place, while that is better."""
-    region, fits = found.region, dict(found.fits)
-    for _ in range(options.most):
-        best = max(fits.values(), key=lambda f: f.log_posterior)
-        if not best.hypothesis.effects:
-            break
-        before = best.log_posterior
-        alone = yield from linearised(region, options, best)
-        fewer = [_dropped(region, options, best, c.name) for c in best.hypothesis.effects
-                 if best.hypothesis.without(lambda o, c=c: o.name == c.name).key not in fits]
-        made = yield from side_by_side(fewer)
-        fits |= {f.hypothesis.key: f for f in made}
-        swaps: list[tuple[Fitted, Move]] = []
-        for c in best.hypothesis.effects:
-            rest = fits.get(best.hypothesis.without(lambda o, c=c: (o.name, o.where) == (c.name, c.where)).key)
-            if rest is None:
-                continue
-            for m in alone[:2 * options.refined]:
-                (new,) = m.added
-                if (new.name, new.where) == (c.name, c.where) or new.options:
-                    continue
-                x = m.hypothesis.theta[len(m.hypothesis.theta) - new.size:]
-                h = rest.hypothesis.with_effect(new, x)
-                if h.key in fits:
-                    continue
-                J, _ = slopes_for(rest, h)
-                J[:, J.shape[1] - new.size:] = m.J[:, m.J.shape[1] - new.size:]
-                r = rest.r + J[:, J.shape[1] - new.size:] @ x
-                there = judged(region, options, h, r, J)
-                swaps.append((rest, Move(h, r, J, there.log_posterior - best.log_posterior, (new,))))
-        swaps.sort(key=lambda fm: -fm[1].gain)
-        made = yield from side_by_side([_moved(region, options, f, m) for f, m in swaps[:options.refined]])
-        fits |= {f.hypothesis.key: f for f in made}
-        ahead = max(fits.values(), key=lambda f: f.log_posterior)
-        if ahead.log_posterior <= before + options.stop:
-            break
-    return replace(found, fits=fits)
-
-
-def _dropped(region: Region, options: EvidenceOptions, f: Fitted, name: str) -> Asks[Fitted]:
-    h, J = without(f, lambda c: c.name == name)
-    return (yield from fitting(region, options, h, f.discrepancy, options.iterations, None, J))
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:

@@ -44,7 +44,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     if search.fixed_base:
         search, current, rounds = _phase(search, pool, current, search.fixed_base, rounds, report, most)
     if current.effects and played is not None:
-        report("looking anew", None)
+        report("looking again", None)
         begun = search
         search, played = reestimated(search, current, played)
         if search is not begun:

@@ -29,6 +29,7 @@ from workbench.view.report.words import (
     left_row,
     listed,
     next_said,
+    probable,
     quantity,
     rival_of,
     sentence_of,
@@ -112,7 +113,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if takes:
         what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
-    if any(s.recorded.base == "free" for s in takes):
+    if any(c in BODY for s in takes for c in s.channels):
         what.append(
             f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
             "paths and 3D show it left to itself."
@@ -131,9 +132,9 @@ def _key_numbers(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> list[tupl
     numbers = []
     for f in diagnosis.findings:
         rival = rival_of(f)
-        sure = f"{100 * f.together:.0f} % sure" + (
+        sure = f"{probable(f.together)} sure" + (
             f" {this_or(f.tie)}" if f.tie else
-            f"; or {title_of(rival.effect, rival.where)}: {100 * rival.confidence:.0f} %" if rival else "")
+            f"; or {title_of(rival.effect, rival.where)}: {probable(rival.confidence)}" if rival else "")
         told = max(f.parameters.values(), key=_bounded, default=None)
         numbers.append((title_of(f.effect, f.where), "is there" if told is None else _size(told), sure))
     for s in takes:
@@ -185,7 +186,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
 def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
-    if take.recorded.base == "free":
+    if any(c in BODY for c in take.channels):
         said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
@@ -206,15 +207,15 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
     parts: list[Part] = [Text(said)]
     if finding.evidence not in said:
         parts.append(Text(finding.evidence.removeprefix(said).strip()))
-    sure = f"{100 * finding.confidence:.0f} %"
+    sure = probable(finding.confidence)
     for a in finding.alternatives:
-        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {100 * a.confidence:.0f} %.** These recordings alone do not rule "
+        parts.append(Text(f"**Or {title_of(a.effect, a.where)}: {probable(a.confidence)}.** These recordings alone do not rule "
                           "that out."))
-        sure += f", or {title_of(a.effect, a.where)} {100 * a.confidence:.0f} %"
+        sure += f", or {title_of(a.effect, a.where)} {probable(a.confidence)}"
     if finding.tie:
-        sure += f": {100 * finding.together:.0f} % for one of the two"
+        sure += f": {probable(finding.together)} for one of the two"
     f = finding.family
-    family = [] if f is None else [["of its family", f"{f.name}: {100 * f.confidence:.0f} %"]]
+    family = [] if f is None else [["of its family", f"{f.name}: {probable(f.confidence)}"]]
     rows = [["how sure", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))

@@ -46,6 +46,11 @@ def _with_rival(f: Finding) -> str:
     return title_of(f.effect, f.where) + (f" (or {title_of(rival.effect, rival.where)})" if rival else "")
 
 
+def probable(p: float) -> str:
+    """A probability; none of them is as sure as certainty, as all are of models that somebody thought of."""
+    return "more than 99 %" if p > 0.99 else "less than 1 %" if p < 0.01 else f"{100 * p:.0f} %"
+
+
 def rival_of(finding: Finding) -> Alternative | None:
     """The alternative that is likely enough to be named wherever the finding is."""
     return next((a for a in finding.alternatives if a.confidence >= NAMED), None)
