@@ -377,7 +377,7 @@ def test_another_package_adds_an_effect(install):
 
 @pytest.mark.parametrize(("module", "name", "entry", "problem"), [
     ("gum_thief", "backlash", "EFFECT", "'backlash' is known already"),
-    ("gum_wrapper", "gum", "NOT_AN_EFFECT", "expected an Effect instance")])
+    ("gum_wrapper", "gum", "NOT_AN_EFFECT", "expected Effect, got int")])
 def test_a_plug_in_that_is_none_is_named(install, module, name, entry, problem):
     install(module, PLUGIN.format(name=name), entry)
     with pytest.raises(InputError, match=problem):

@@ -2,12 +2,15 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.recording_robot import write_robot
 from tests.shared_data import shared
+from workbench.compare.channels import channel_names
+from workbench.compare.comparison import noise_of
 from workbench.recording import Measurement, read_recording, register, take_from_recording, write_joint_log
 from workbench.robot import InputError, RobotModel
 
@@ -241,3 +244,21 @@ def test_a_log_of_several_programmes_makes_no_take(tmp_path, model):
     renamed = replace(both, channels={c.replace(".Jaw", ".tail"): v for c, v in both.channels.items() if c.endswith("Jaw")})
     with pytest.raises(InputError, match="choose one as FILE#PROGRAMME"):
         take_from_recording(renamed, Measurement(0.0), model)
+
+
+def test_a_count_shows_where_values_stay_though_rows_lie_between(tmp_path, model):
+    """A log that is on a clock of its own, of a servo at rest: what a count hides is its noise."""
+    count = np.radians(300 / 1023)
+    read = np.round(0.05 * np.sin(np.linspace(0, 12, 400)) / count) * count
+    time = np.arange(0.0, 7.9, 0.02) + 0.007
+    position = np.interp(time, np.arange(400) * 0.02, read)
+    joints = model.joints[:2]
+    channels = {"goal." + joints[0]: np.zeros(len(time)), "position." + joints[0]: position,
+                "goal." + joints[1]: np.zeros(len(time)), "position." + joints[1]: np.zeros(len(time))}
+    recording = read_recording(write_joint_log(tmp_path / "log.csv", time - time[0], channels))
+    measurement = register(recording, model, None)
+    assert measurement.noise[joints[0]] == pytest.approx(count / np.sqrt(12), rel=0.01)
+    assert measurement.noise[joints[1]] == pytest.approx(count / np.sqrt(12), rel=0.01)  # the same kind of servo
+    take = take_from_recording(recording, measurement, model, "log", "free")
+    assert noise_of([take]).joints[joints[1]] == pytest.approx(count / np.sqrt(12), rel=0.01)
+    assert channel_names(SimpleNamespace(recorded=take, model=model)) == joints  # its base is nowhere told

@@ -56,7 +56,7 @@ bool frame_feed(struct frame_reader *r, uint8_t byte) {
 bool frame_send(struct ring *to, uint8_t type, uint8_t number, const uint8_t *payload, uint32_t length) {
     uint8_t head[3] = {type, number, (uint8_t)length};
     uint16_t crc = 0xFFFF;
-    if (length > FRAME_PAYLOAD || ring_room(to) < length + FRAME_OVERHEAD) return false;
+    if (ring_room(to) < length + FRAME_OVERHEAD) return false;
     ring_put(to, 0xA5);
     ring_put(to, 0x5A);
     for (uint32_t k = 0; k < length + 3u; k++) {

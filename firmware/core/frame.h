@@ -22,7 +22,7 @@ struct frame_reader {
 /* Takes one byte; true when a whole frame with a right sum has ended with it. */
 bool frame_feed(struct frame_reader *r, uint8_t byte);
 
-/* Puts a frame into a ring, whole or not at all. */
+/* Puts a frame with at most FRAME_PAYLOAD bytes into a ring, whole or not at all. */
 bool frame_send(struct ring *to, uint8_t type, uint8_t number, const uint8_t *payload, uint32_t length);
 
 #endif

@@ -36,7 +36,6 @@
 #define RAMP_SLOWEST 10u      /* 7 degrees a second: below, a servo sticks; 0 would mean at once */
 #define RAMP_SPARE_MS 2000u   /* beyond the time that a ramp should take */
 #define RAMP_TOLERANCE 30u    /* counts, 9 degrees: droop under the robot's own weight is 2 degrees */
-#define RELEASE_PAUSE_MS 5u   /* between torque-off broadcasts, until every servo is read to be off */
 
 #define BUTTON_MS 20u         /* a button is pressed once it has been so for this long */
 #define HELD_MS 1500u         /* START held this long releases at once */

@@ -9,7 +9,6 @@ static void new_goals(struct robot *r) {
 void release(struct robot *r) {
     r->send_goals = false;
     r->send_release = true;
-    r->released_at = r->now - RELEASE_PAUSE_MS;
     for (uint32_t j = 0; j < r->joints; j++) r->servo[j].off = false;
 }
 
@@ -93,9 +92,8 @@ bool reserved(const struct robot *r, uint32_t ms) { return r->state == STATE_PLA
 
 /* Sends goals or torque-off if that is due; true where the bus is taken, or has to stay free for the next pose. */
 bool motion_send(struct robot *r) {
-    if (r->send_release && r->now - r->released_at >= RELEASE_PAUSE_MS) {
+    if (r->send_release) {
         static const uint8_t off = 0;
-        r->released_at = r->now;
         r->send_release = false; /* asked for again by whoever reads that a servo is still on */
         bus_ask(&r->bus, dxl_write(r->bus.tx, DXL_BROADCAST, DXL_TORQUE, &off, 1), 0, BUS_TIMEOUT_MS, r->now);
         return true;

@@ -181,7 +181,7 @@ void read_answer(struct robot *r) {
         advance(r);
         good(r, j, r->bus.rx + 5, r->bus.rx[4]);
     }
-    if (r->round_over && r->turn == 0 && r->tries == 0) {
+    if (r->round_over) {
         tell_log(r);
         judge_round(r);
         motion_round(r);

@@ -77,7 +77,7 @@ struct robot {
     uint32_t pose, cycle, next_pose; /* of the table that plays */
     bool send_goals, send_release, sending_read;
     uint8_t resends;
-    uint32_t ramp_ends, released_at;
+    uint32_t ramp_ends;
 
     uint32_t turn, tries, sweep_started, failed_row, garbled_row;
     uint8_t check_for; /* what follows when every servo has been asked: a ramp to hold, or one to let go */

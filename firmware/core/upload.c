@@ -59,7 +59,7 @@ uint8_t upload_frame(struct upload *u, const struct frame_reader *f, uint8_t lin
 
 static enum table_fault check_some(struct upload *u) {
     if (u->checked > 0) return table_check_pose(u->spare, u->checked - 1u);
-    if (u->running != u->crc) return TABLE_CRC;
+    if (u->running != u->crc || u->crc != CRC32_WITH_ITSELF) return TABLE_CRC;
     enum table_fault fault = table_check_head(u->spare, u->size);
     return fault ? fault : table_fits(u->spare, u->active);
 }

@@ -10,11 +10,13 @@ static void answer(const uint8_t *data, size_t size) {
     uint8_t copy[300];
     if (size < 8u || size > 280u) return;
     memcpy(copy, data, size);
-    copy[0] = copy[1] = 0xFF;
-    uint32_t n = (uint32_t)size, count = n - DXL_OVERHEAD;
+    uint32_t n = (uint32_t)size, count = n - DXL_OVERHEAD + (data[0] & 4u ? data[5] % 3u : 1u) - 1u; /* or one more or less was asked for */
+    if (!(data[0] & 8u)) copy[0] = 0xFF;
+    if (!(data[0] & 16u)) copy[1] = 0xFF;
     if (data[0] & 1u) copy[3] = (uint8_t)(count + 2u);
     if (data[0] & 2u) copy[n - 1u] = dxl_sum(copy, n);
-    if (dxl_status(copy, n, data[1], count) == DXL_OK && (copy[2] != data[1] || copy[3] != count + 2u || dxl_sum(copy, n) != copy[n - 1u])) abort();
+    bool right = copy[0] == 0xFF && copy[1] == 0xFF && copy[2] == data[1] && copy[3] == count + 2u && n == count + DXL_OVERHEAD;
+    if (dxl_status(copy, n, data[1], count) == DXL_OK && !(right && dxl_sum(copy, n) == copy[n - 1u])) abort();
 }
 
 static void frames(const uint8_t *data, size_t size) {

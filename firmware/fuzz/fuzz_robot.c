@@ -39,7 +39,7 @@ static void upload(struct sim *sim, struct script *s) {
     uint32_t size = table_bytes(), link = next(s) & 1u, changes = next(s) % 8u, shape = next(s);
     memcpy(table, fuzz_table, size);
     for (uint32_t k = 0; k < changes; k++) {
-        uint32_t at = (next(s) | (uint32_t)next(s) << 8) % (size - 4u);
+        uint32_t low = next(s), at = (low | (uint32_t)next(s) << 8) % (size - 4u);
         table[at] = next(s);
     }
     if (!(shape & 1u)) put32(table + size - 4u, crc32(0, table, size - 4u));
@@ -75,7 +75,7 @@ static void flood(struct sim *sim, struct script *s) {
 static void fault(struct sim *sim, struct script *s) {
     struct sim_servo *v = &sim->servo[next(s) % (sim->joints ? sim->joints : 1u)];
     uint8_t value = next(s);
-    switch (next(s) % 9u) {
+    switch (next(s) % 12u) {
     case 0: v->mute = value & 1; break;
     case 1: v->twin = value & 1; break;
     case 2: v->overload = value & 1; break;
@@ -84,8 +84,18 @@ static void fault(struct sim *sim, struct script *s) {
     case 5: sim->babble = value & 1; break;
     case 6: sim->glitch = value % 6u; break;
     case 7: v->table[next(s) % DXL_END] = value; break;
+    case 8: v->milli = 4000 * value; break;
+    case 9: v->held = value & 1; break;
+    case 10: v->powered = value & 1; break;
     default: sim->flip_from = sim->flip_to = 20u * value; break;
     }
+}
+
+/* More at once than is looked at in one step, or than there is room for. */
+static void burst(struct sim *sim, struct script *s) {
+    uint8_t bytes[255], n = (uint8_t)take(s, bytes, sizeof bytes), link = next(s) & 1u;
+    for (uint32_t times = next(s) % 4u; times < 4u; times++)
+        for (uint32_t k = 0; k < n; k++) ring_put(&sim->r.link[link].rx, bytes[k]);
 }
 
 static void bridge_packet(struct sim *sim, struct script *s) {
@@ -100,13 +110,23 @@ static void bridge_packet(struct sim *sim, struct script *s) {
     sim_send(sim, LINK_PC, p, n + DXL_OVERHEAD);
 }
 
+static void check_upload(const struct upload *u) {
+    MUST(u->size <= TABLE_BYTES && u->got <= u->size);
+    if (upload_ready(u)) MUST(table_check(u->spare, u->size) == TABLE_OK && table_fits(u->spare, fuzz_table) == TABLE_OK);
+}
+
 static void check(const struct sim *sim) {
     const struct robot *r = &sim->r;
     const uint8_t *t = r->upload.active;
-    MUST(sim->goal_errors == 0);
+    if (r->joints == 0) { /* a broken table is built in */
+        MUST(r->state == STATE_STILL && !r->bus.start && !r->bus.busy);
+        return;
+    }
+    MUST(sim->goal_errors == 0 || sim->flip_to); /* of any bounds that a servo may have been given */
     MUST(r->bus.tx_length <= BUS_BYTES && r->bus.expected <= BUS_BYTES && r->bus.rx_length <= BUS_BYTES);
     MUST(table_check(t, table_size(t)) == TABLE_OK && table_fits(t, fuzz_table) == TABLE_OK);
     MUST(r->state <= STATE_BRIDGE && r->reason < REASONS);
+    check_upload(&r->upload);
     MUST(r->turn < r->joints && r->joints == table_joints(t));
     MUST(r->state != STATE_PLAY || r->pose <= table_poses(t));
     for (uint32_t j = 0; torque_on(r) && j < r->joints; j++) {
@@ -118,11 +138,15 @@ static void check(const struct sim *sim) {
 
 static void one(struct sim *sim, struct script *s) {
     uint8_t bytes[256];
-    uint32_t n;
-    switch (next(s) % 13u) {
+    uint32_t n, link;
+    switch (next(s) % 14u) {
     case 0: sim_run(sim, 1u + next(s)); break;
     case 1: n = take(s, bytes, 200); sim_send(sim, next(s) & 1u, bytes, n); break;
-    case 2: n = take(s, bytes, FRAME_PAYLOAD); sim_frame(sim, next(s) & 1u, next(s), bytes, n); break;
+    case 2:
+        n = take(s, bytes, FRAME_PAYLOAD);
+        link = next(s) & 1u;
+        sim_frame(sim, link, next(s), bytes, n);
+        break;
     case 3: sim_remote(sim, 1u << next(s) % 10u); break;
     case 4: sim_remote(sim, 0); break;
     case 5: sim->r.start_pressed = next(s) & 1; break;
@@ -130,26 +154,29 @@ static void one(struct sim *sim, struct script *s) {
     case 7: fault(sim, s); break;
     case 8: bridge_packet(sim, s); break;
     case 9: sim_frame(sim, LINK_PC, (uint8_t)(1u + next(s) % 4u), bytes, 0); break;
-    case 12: flood(sim, s); break;
     case 10: sim_frame(sim, LINK_PC, (uint8_t)(FRAME_BRIDGE + (next(s) & 1u)), bytes, 0); break;
-    default: sim_run(sim, 3u * next(s)); break;
+    case 11: sim_run(sim, 4u * next(s)); break;
+    case 12: flood(sim, s); break;
+    default: burst(sim, s); break;
     }
-    for (uint32_t link = 0; link < LINKS; link++) sim_receive(sim, link, bytes, sizeof bytes);
+    for (link = 0; link < LINKS; link++) sim_receive(sim, link, bytes, sizeof bytes);
 }
 
-enum { FRESH, RESET, NEUTRAL, PLAYING, LIMP, BRIDGED, BEGINNINGS };
+enum { FRESH, RESET, NEUTRAL, PLAYING, LIMP, BRIDGED, BROKEN, BEGINNINGS };
 
 /* Where a script begins; made once, as a walk up to there takes far longer than what follows. */
 static void begin(struct sim *sim, uint32_t how) {
     static struct sim kept[BEGINNINGS];
     static bool made[BEGINNINGS];
     if (!made[how]) {
-        sim_boot(sim, fuzz_table, table_bytes(), how == RESET ? REASON_WATCHDOG : REASON_POWER_ON, how);
-        for (uint32_t k = 0; how >= NEUTRAL && k < 200u && sim->r.state != STATE_NEUTRAL; k++) sim_run(sim, 10);
+        uint32_t size = table_bytes() - (how == BROKEN);
+        bool still = how == FRESH || how == RESET || how == BROKEN;
+        sim_boot(sim, fuzz_table, size, how == RESET ? REASON_WATCHDOG : REASON_POWER_ON, how);
+        for (uint32_t k = 0; !still && k < 200u && sim->r.state != STATE_NEUTRAL; k++) sim_run(sim, 10);
         if (how == PLAYING) sim_frame(sim, LINK_PC, FRAME_PLAY, NULL, 0);
-        if (how >= LIMP) sim_frame(sim, LINK_PC, FRAME_RELEASE, NULL, 0);
-        if (how != FRESH && how != RESET) sim_run(sim, 100);
-        if (how == BRIDGED) sim_frame(sim, LINK_PC, FRAME_BRIDGE, NULL, 0);
+        if (how == LIMP || how == BRIDGED) sim_frame(sim, LINK_PC, FRAME_RELEASE, NULL, 0);
+        if (!still) sim_run(sim, 100);
+        if (how == BRIDGED) sim_frame(sim, LINK_PC, FRAME_BRIDGE, NULL, 0), sim_run(sim, 20);
         kept[how] = *sim;
         made[how] = true;
     }

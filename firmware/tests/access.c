@@ -19,7 +19,7 @@ static uint32_t *number(struct sim *s, const char *what) {
 static uint8_t *byte_of(struct sim *s, const char *what, uint32_t k) {
     const struct { const char *name; uint8_t *at; } fields[] = {
         {"state", &s->r.state}, {"reason", &s->r.reason}, {"servo_named", &s->r.servo_named}, {"table_fault", &s->r.table_fault},
-        {"volts", &s->volts}, {"heat", &s->servo[k].heat}, {"glitch", &s->glitch}, {"torque", &s->servo[k].table[DXL_TORQUE]},
+        {"volts", &s->volts}, {"heat", &s->servo[k].heat}, {"drop", &s->servo[k].drop}, {"glitch", &s->glitch}, {"torque", &s->servo[k].table[DXL_TORQUE]},
         {"slope", &s->servo[k].table[28]}, {"model", &s->servo[k].table[DXL_MODEL]}, {"id", &s->servo[k].table[DXL_ID]},
         {"upload_state", &s->r.upload.state}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
@@ -30,7 +30,7 @@ static uint8_t *byte_of(struct sim *s, const char *what, uint32_t k) {
 static bool *flag(struct sim *s, const char *what, uint32_t k) {
     const struct { const char *name; bool *at; } fields[] = {
         {"mute", &s->servo[k].mute}, {"twin", &s->servo[k].twin}, {"overload", &s->servo[k].overload}, {"babble", &s->babble},
-        {"start", &s->r.start_pressed}, {"powered", &s->servo[k].powered}};
+        {"start", &s->r.start_pressed}, {"powered", &s->servo[k].powered}, {"held", &s->servo[k].held}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
         if (!strcmp(what, fields[i].name)) return fields[i].at;
     return NULL;

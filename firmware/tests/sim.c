@@ -1,7 +1,8 @@
 #include "sim.h"
 
-
 #include "../core/crc.h"
+
+#define HEAT_LIMIT 11u /* register */
 
 uint32_t sim_random(struct sim *s, uint32_t below) {
     s->rng ^= s->rng << 13;
@@ -29,6 +30,7 @@ void sim_boot(struct sim *s, const uint8_t *table, uint32_t size, uint32_t cause
         struct sim_servo *v = &s->servo[j];
         v->milli = 1000 * (int64_t)(table_neutral(table, j) - 40u + sim_random(s, 80));
         v->heat = 30;
+        v->table[HEAT_LIMIT] = 70;
         v->table[DXL_ID] = table_id(table, j);
         put16(v->table + DXL_MODEL, table_model(table, j));
         put16(v->table + DXL_CW_LIMIT, table_low(table, j));
@@ -57,7 +59,7 @@ static void store(struct sim *s, struct sim_servo *v, uint32_t address, const ui
         uint32_t goal = get16(values + (DXL_GOAL - address));
         if (goal < get16(v->table + DXL_CW_LIMIT) || goal > get16(v->table + DXL_CCW_LIMIT)) return;
         v->table[DXL_TORQUE] = 1;
-        for (uint32_t j = 0; j < s->joints; j++)
+        for (uint32_t j = 0; j < s->joints && s->r.state != STATE_BRIDGE; j++)
             if (&s->servo[j] == v && (goal < table_low(playing(&s->r), j) || goal > table_high(playing(&s->r), j))) s->goal_errors++;
     }
     memcpy(v->table + address, values, n);
@@ -65,7 +67,7 @@ static void store(struct sim *s, struct sim_servo *v, uint32_t address, const ui
 
 static void sense(struct sim *s, struct sim_servo *v) {
     put16(v->table + DXL_POSITION, (uint32_t)(v->milli / 1000));
-    v->table[DXL_VOLTS] = s->volts;
+    v->table[DXL_VOLTS] = (uint8_t)(s->volts - v->drop);
     v->table[DXL_HEAT] = v->heat;
 }
 
@@ -84,7 +86,7 @@ static void spoil(struct sim *s) {
 }
 
 static void reply(struct sim *s, struct sim_servo *v, const uint8_t *parameters, uint32_t n) {
-    uint8_t error = (uint8_t)((v->heat >= 70 ? DXL_ERROR_HEAT : 0) | (v->overload ? DXL_ERROR_OVERLOAD : 0));
+    uint8_t error = (uint8_t)((v->heat >= v->table[HEAT_LIMIT] ? DXL_ERROR_HEAT : 0) | (v->overload ? DXL_ERROR_OVERLOAD : 0));
     if (error) put16(v->table + DXL_TORQUE_LIMIT, 0);
     if (v->mute) return;
     uint8_t *a = s->answer;
@@ -132,7 +134,7 @@ static void hear(struct sim *s) {
 static void move(struct sim *s) {
     for (uint32_t j = 0; j < s->joints; j++) {
         struct sim_servo *v = &s->servo[j];
-        if (!v->powered || !v->table[DXL_TORQUE] || !get16(v->table + DXL_TORQUE_LIMIT)) continue;
+        if (!v->powered || v->held || !v->table[DXL_TORQUE] || !get16(v->table + DXL_TORQUE_LIMIT)) continue;
         int64_t goal = 1000 * (int64_t)get16(v->table + DXL_GOAL), speed = get16(v->table + DXL_SPEED);
         if (speed == 0 || speed > FASTEST_SPEED) speed = FASTEST_SPEED;
         int64_t step = speed * SPEED_MILLI / 1000, way = goal - v->milli; /* counts a second are thousandths a millisecond */

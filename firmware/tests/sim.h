@@ -8,7 +8,8 @@ struct sim_servo {
     uint8_t table[DXL_END];
     int64_t milli; /* position, thousandths of a count */
     bool powered, mute, twin, overload;
-    uint8_t heat;
+    bool held;     /* something is in its way: it does not move */
+    uint8_t heat, drop; /* deg C; 0.1 V less than the others have */
 };
 
 enum { LOG_GOALS = 1, LOG_OFF = 2, LOG_STATE = 3 };

@@ -13,15 +13,20 @@ from workbench.robot import puppy_model
 from workbench.robot.servo_profile_file import servo_profile
 
 
-@needs_compiler
-def test_the_bus_through_the_flashed_image():
+def bridged() -> tuple[Robot, PcLinkPort, Bus]:
+    """A robot whose controller is a bridge, the port that leads to it, and the servos' bus over that."""
     r = Robot()
     r.run(300)
     r.board.send(r.board.pc, frame(FrameType.RELEASE))
     r.run(100)
     port = PcLinkPort(r.board)
     enter_bridge(port)
-    bus = Bus(port, servo_profile("AX-12A"))
+    return r, port, Bus(port, servo_profile("AX-12A"))
+
+
+@needs_compiler
+def test_the_bus_through_the_flashed_image():
+    r, port, bus = bridged()
     found = survey(bus, puppy_model(), ids=())
     assert sorted(found.found) == sorted(IDS)
     assert found.problems() == ()
@@ -42,13 +47,7 @@ def test_the_bus_through_the_flashed_image():
 @needs_compiler
 def test_silence_on_the_bridge_ends_with_torque_off():
     """What a killed program, or a pulled plug, comes to."""
-    r = Robot()
-    r.run(300)
-    r.board.send(r.board.pc, frame(FrameType.RELEASE))
-    r.run(100)
-    port = PcLinkPort(r.board)
-    enter_bridge(port)
-    bus = Bus(port, servo_profile("AX-12A"))
+    r, _, bus = bridged()
     bus.sync_write({i: {"goal_position": 540, "moving_speed": 100} for i in IDS})
     r.run(500)
     assert all(s["torque_enable"] for s in r.servos.values())

@@ -12,7 +12,7 @@ from workbench.device.bus.survey import survey
 from workbench.device.play import PlayOptions, finish_log, perform
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
-from workbench.device.virtual import bit_flips, seconds
+from workbench.device.virtual import MICROSECOND, bit_flips, seconds
 from workbench.motion import Motion
 from workbench.recording.formats.read import read_recording
 from workbench.robot import InputError
@@ -140,6 +140,21 @@ def test_what_stops_a_motion(tmp_path, action, said, within):
     last = max(t for t, v in speeds if v != ramp)
     assert last - when[0] < within + 0.15, "the last pose, after which all is on the way to neutral"
     assert all(not s["torque_enable"] for j, s in r.servos.items() if j != "two")
+
+
+def test_a_babbling_servo_stops_it_and_what_is_sent_once_it_is_quiet_is_heard(tmp_path):
+    """Nobody's answer can be read; nor does anybody hear while it lasts."""
+    r = robot(angles=START, model=arm(tmp_path))
+    clock = r.wire.clock
+
+    def babble():
+        for k in range(3000):
+            clock.at(clock.now + k * 330 * MICROSECOND, lambda: r.wire.talk("babbler", bytes(range(32)), 1_000_000, clock.now))
+
+    r.at(2.5, babble)
+    result = played(tmp_path, r, 40)
+    assert "silent for 0.3 s" in result.stopped
+    assert limp(r)
 
 
 @pytest.mark.parametrize("glitch", [

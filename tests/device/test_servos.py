@@ -1,14 +1,16 @@
 """What hangs on the bus against the model, as a verb and as evidence."""
 
+from dataclasses import replace
+
 import pytest
 
 from tests.command import refused
 from tests.device.servos import FAMILIES, arm, robot
 from workbench.device.bus import BusError
-from workbench.device.bus.setup import set_id, set_up
+from workbench.device.bus.setup import set_id, set_up, wider_limits
 from workbench.device.bus.survey import survey
 from workbench.device.virtual import VirtualServo
-from workbench.robot import InputError
+from workbench.robot import InputError, bus_ids
 from workbench.robot.servo_registers import load_registers, save_registers
 
 
@@ -50,6 +52,24 @@ def test_registers_that_differ_are_evidence(tmp_path):
     assert len(effects) == 3
     said = [str(d) for d in registers.departures(r.model)]
     assert "blb: torque_limit is 512, the model has 1023 (torque_ceiling, torque 0.694)" in said
+
+
+def test_limits_wider_than_the_model_are_told(tmp_path):
+    r = robot(model=arm(tmp_path))
+    bus = r.bus()
+    list(set_up(bus, r.model, survey(bus, r.model, ids=())))
+    assert wider_limits(r.model, survey(bus, r.model, ids=())) == ()
+    r.servos["two"]["ccw_angle_limit"] = 1023
+    r.servos["three"]["cw_angle_limit"] += 30  # narrower: the controller will not walk with it
+    (line,) = wider_limits(r.model, survey(bus, r.model, ids=()))
+    assert line.startswith("servo 2 (two): turns from ")
+    assert " to 1023, the model's joint from " in line
+
+
+def test_a_robot_without_bus_ids_takes_nobody_elses(tmp_path):
+    with pytest.raises(InputError, match="joint one has no bus ID; give them as"):
+        bus_ids(replace(arm(tmp_path), bus_ids={}))
+    assert bus_ids(replace(robot().model, bus_ids={}))["flm"] == 7  # the puppy's, by name
 
 
 def test_gains_of_other_families(tmp_path):

@@ -17,7 +17,7 @@ from workbench.motion import PoseTable
 from workbench.robot import InputError
 
 TABLE = walk()
-LIMP, NEUTRAL, PLAY = 1, 4, 5
+LIMP, CHECK, NEUTRAL, PLAY = 1, 2, 4, 5
 
 
 def until(sim: Sim, wanted: set[int], most: int = 4000) -> int:
@@ -223,3 +223,47 @@ def test_torque_off_is_told_again_to_a_servo_that_missed_it_but_not_all_the_time
     offs = [sim.get("event_us", k) for k in range(sim.get("events")) if sim.get("event_kind", k) == 2]
     assert 2 <= len(offs) <= 6
     assert min(np.diff(offs)) >= 5000
+
+
+@pytest.mark.parametrize(("few", "reason"), [(7, 7), (8, 15)])
+def test_the_battery_is_low_where_more_than_half_of_the_servos_say_so(few: int, reason: int) -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    for k in range(few):
+        sim.set("drop", 20, k)
+    sim.run(1900)
+    assert sim.get("reason") == reason
+    sim = Sim(TABLE)
+    for k in range(few):
+        sim.set("drop", 20, k)
+    sim.run(300)
+    assert (sim.get("state") == LIMP) == (reason == 15)
+
+
+def test_data_beyond_the_size_that_was_said_are_refused() -> None:
+    sim = Sim(TABLE)
+    sim.to_neutral()
+    sim.send(frame(FrameType.BEGIN, struct.pack("<IIBB", 250, 0, 1, 0)))
+    sim.send(frame(FrameType.DATA, struct.pack("<H", 0) + bytes(200)))
+    sim.run(5)
+    sim.messages()
+    sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
+    sim.run(5)
+    assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]
+
+
+@pytest.mark.parametrize(("sent", "moved"), [
+    (packet(9, 4, bytes([30, 88, 2])), True), (packet(9, 5), True), (packet(9, 3, bytes([24, 1])), True),
+    (packet(9, 3, bytes([47, 0])), False), (packet(9, 3, bytes([48, 40, 0])), False), (packet(9, 2, bytes([30, 2])), False)])
+def test_what_counts_as_moving_a_servo_through_the_bridge(sent: bytes, moved: bool) -> None:
+    sim = bridged()
+    sim.send(sent)
+    until(sim, {LIMP, CHECK})  # after silence: whoever was moved is asked where it is, and brought back
+    assert sim.get("state") == (CHECK if moved else LIMP)
+
+
+def test_a_write_of_one_large_byte_is_answered_through_the_bridge() -> None:
+    sim = bridged()
+    sim.send(packet(9, 3, bytes([27, 200])))
+    sim.run(4)
+    assert sim.received() == packet(9, 0)

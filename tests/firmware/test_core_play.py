@@ -101,6 +101,17 @@ def test_flips_in_answers_stop_nothing() -> None:
     assert (sim.get("state"), sim.get("reason")) == (5, 7)
 
 
+@pytest.mark.slow
+def test_flips_in_answers_stop_nothing_in_ten_thousand_poses() -> None:
+    sim = Sim(TABLE, seed=4)
+    sim.play()
+    sim.set("flip_from", 1000)
+    while sim.get("poses") < 10_000:
+        sim.run(50)
+        sim.received()
+        assert (sim.get("state"), sim.get("reason")) == (5, 7)
+
+
 def test_settings_that_a_broken_packet_changed_are_put_back() -> None:
     sim = Sim(TABLE)
     sim.play()
@@ -230,6 +241,7 @@ def test_stale_foreign_big_and_broken_uploads_are_refused_with_the_reason() -> N
     sim.send(frame(FrameType.BEGIN, struct.pack("<IIBB", 5000, 0, 7, 0)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["too big"]
+    assert upload(sim, changed(10)[:-1] + b"\0", 7).result == "CRC"  # its own, in a frame that is right
     frames = upload_frames(changed(10, poses=16), 8)
     for data in [*frames[:2], *frames[3:]]:
         sim.send(data)
@@ -270,7 +282,7 @@ def uploads(count: int, seed: int) -> None:
         if sim.get("state") == 5 and sim.get("poses"):
             assert tuple(sim.get("goal", j) for j in range(15)) in goals
     assert sim.get("state") in (3, 5)
-    assert taken > count / 20
+    assert taken > count / 40  # one number in five jumps by 200: what follows is stale until the numbers have come round
 
 
 def test_only_whole_and_fitting_uploads_ever_play() -> None:

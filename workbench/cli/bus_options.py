@@ -47,7 +47,8 @@ def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot 
     from workbench.device.bus import Bus, open_port
     from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
     from workbench.device.bus.ports import GONE
-    from workbench.device.bus.survey import bus_ids, family_of
+    from workbench.device.bus.survey import family_of
+    from workbench.robot import bus_ids
 
     profile = family_of(model)
     joints = {i: joint for joint, i in bus_ids(model).items()}

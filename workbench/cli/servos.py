@@ -32,7 +32,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Surveys, writes what is asked for, and says what there is; 2 where something has to be mended."""
     from workbench.cli.progress import Progress
-    from workbench.device.bus.setup import set_id, set_up
+    from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey
     from workbench.robot.servo_registers import save_registers
 
@@ -50,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
     registers = found.registers()
     for departure in registers.departures(model):
         print(f"differs from the model: {departure}")
+    for line in wider_limits(model, found):
+        print(f"wider than the model: {line}; --write narrows it")
     if args.out is not None:
         print(f"wrote {save_registers(registers, args.out / 'registers.yaml')}")
     for problem in found.problems():

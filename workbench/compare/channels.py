@@ -79,4 +79,5 @@ def channel_names(t: RegisteredTake) -> tuple[str, ...]:
             axis = np.abs(neutral[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent)  # in the base's axes
             if np.isfinite(t.recorded.off_axis[:, i]).any():
                 across += [f"{j}{ACROSS}{'xyz'[k]}" for k in np.sort(np.argsort(axis)[:2])]
-    return (*joints, *across, *(BODY if t.recorded.base == "free" else ()))
+    body = t.recorded.base == "free" and t.recorded.p_WB is not None  # a servo log of a walk shows joints alone
+    return (*joints, *across, *(BODY if body else ()))

@@ -59,15 +59,15 @@ class Noise:
 
 
 def noise_of(takes: Sequence[Take]) -> Noise:
-    """The noise of a capture from all takes made with it, each about its own rest; of logs, which need not begin with a rest,
-    what their takes say of their angles."""
+    """The noise of a capture from all takes made with it, each about its own rest; of logs no less than what their takes say of
+    their angles: they need not begin with a rest, and at rest a count does not change."""
     joints = {}
     for joint in dict.fromkeys(j for t in takes for j in t.joints):
         seen = [t for t in takes if joint in t.joints]
         joints[joint] = float(metrics.noise_at_rest([t.q[t.resting, t.column(joint)][:, None] for t in seen])[0])
         told = [t.q_sigma[:, t.column(joint)] for t in seen if t.q_sigma is not None and not t.zeroed]
-        if np.isnan(joints[joint]) and told and np.isfinite(np.concatenate(told)).any():
-            joints[joint] = float(np.nanmedian(np.concatenate(told)))
+        if told and np.isfinite(np.concatenate(told)).any():
+            joints[joint] = float(np.fmax(joints[joint], np.nanmedian(np.concatenate(told))))
     paths = [t.p_WB[t.resting] for t in takes if t.p_WB is not None]
     return Noise(joints, float(np.linalg.norm(metrics.noise_at_rest(paths))) if paths else NAN)
 

@@ -15,7 +15,7 @@ from workbench.device.limits import Violation, refuse_broken_limits
 from workbench.device.table_file import JointBounds, TableFile, bounds_of, encode_table
 from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
-from workbench.robot import BUS_IDS, InputError, RobotModel
+from workbench.robot import BUS_IDS, InputError, RobotModel, bus_ids
 from workbench.robot.files import read_text, write_together
 from workbench.robot.numerals import whole_of
 
@@ -44,12 +44,11 @@ def export(
     """
     table = motion.as_table()
     violations = refuse_broken_limits(table, model, force, simulated, "not exported")
-    ids = model.bus_ids or BUS_IDS
-    return Export(tuple(write_tables(table, out_dir, ids, lambda: bounds_of(table, model))), tuple(violations))
+    return Export(tuple(write_tables(table, out_dir, bus_ids(model), lambda: bounds_of(table, model))), tuple(violations))
 
 
 def write_tables(
-    table: PoseTable, folder: str | Path, bus_ids: Mapping[str, int] = BUS_IDS,
+    table: PoseTable, folder: str | Path, ids: Mapping[str, int] = BUS_IDS,
     bounds: Callable[[], tuple[JointBounds, ...]] | None = None,
 ) -> list[Path]:
     """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where the joints' bounds are known, motion.table; all or none.
@@ -58,11 +57,11 @@ def write_tables(
     line that says the order of joints, the same in all files. InputError for a joint without a bus ID.
     """
     for joint in table.joints:
-        if joint not in bus_ids:
-            raise InputError(table.source, f"joint {joint} has no bus ID; those that have: {' '.join(bus_ids)}")
-    shared = [j for j in table.joints if [bus_ids[k] for k in table.joints].count(bus_ids[j]) > 1]
+        if joint not in ids:
+            raise InputError(table.source, f"joint {joint} has no bus ID; those that have: {' '.join(ids)}")
+    shared = [j for j in table.joints if [ids[k] for k in table.joints].count(ids[j]) > 1]
     if shared:
-        raise InputError(table.source, f"joints {' and '.join(shared)} share bus ID {bus_ids[shared[0]]}")
+        raise InputError(table.source, f"joints {' and '.join(shared)} share bus ID {ids[shared[0]]}")
     order = f"{ORDER} {' '.join(table.joints)}"
 
     def text(rows: Counts) -> str:
@@ -73,7 +72,7 @@ def write_tables(
         GOALS: text(table.goals),
         SPEEDS: text(table.speeds),
         DWELLS: text(table.dwells_ms[:, None]),
-        HEADER: _c_header(table, bus_ids),
+        HEADER: _c_header(table, ids),
         **binary,
     })
 
@@ -115,10 +114,10 @@ def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], Counts
     return joints, np.array(rows[1:], dtype=np.int64)
 
 
-def _c_header(table: PoseTable, bus_ids: Mapping[str, int]) -> str:
+def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
     """Constant arrays for the controller's program; rows are poses, columns are joints in the order of motion_joints."""
     names = ", ".join(json.dumps(joint) for joint in table.joints)
-    ids = _listed([bus_ids[joint] for joint in table.joints], ", ")
+    ids = _listed([numbers[joint] for joint in table.joints], ", ")
 
     def rows(counts: Counts) -> str:
         return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)

@@ -13,7 +13,7 @@ import numpy as np
 
 from workbench.motion import PoseTable
 from workbench.motion.table import CENTRE, LARGEST
-from workbench.robot import BUS_IDS, COUNT, SPEED_UNIT, InputError, RobotModel
+from workbench.robot import BUS_IDS, COUNT, SPEED_UNIT, InputError, RobotModel, bus_ids
 from workbench.robot.ranges import joint_ranges
 
 MAGIC = b"WBTB"
@@ -58,7 +58,7 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
 
     numbers: model number of each joint's servo (default: the AX-12A's).
     """
-    ids, ranges = model.bus_ids or BUS_IDS, joint_ranges(model)
+    ids, ranges = bus_ids(model), joint_ranges(model)
     bounds = []
     for i, joint in enumerate(table.joints):
         servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)

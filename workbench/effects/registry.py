@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
-from importlib.metadata import entry_points
-from pkgutil import iter_modules
 
 from workbench.effects.base import Effect, Estimator
 from workbench.robot import InputError
+from workbench.robot.plug_ins import of_folder, with_plug_ins
 
 ENTRY_POINT_GROUP = "workbench.effects"
 
@@ -18,19 +16,8 @@ def known_effects() -> dict[str, Effect]:
     """Effects by name; an installed plug-in may not take the name of another effect."""
     import workbench.effects.library as room
 
-    found: dict[str, Effect] = {}
-    for module in iter_modules(room.__path__):
-        effect = getattr(import_module(f"{room.__name__}.{module.name}"), "EFFECT", None)
-        if isinstance(effect, Effect):
-            found[effect.name] = effect
-    for entry in entry_points(group=ENTRY_POINT_GROUP):
-        effect = entry.load()
-        if not isinstance(effect, Effect):
-            raise InputError(entry.value, f"entry point '{entry.name}' of group {ENTRY_POINT_GROUP}: expected an Effect instance")
-        if effect.name in found:
-            raise InputError(entry.value, f"effect '{effect.name}' is known already")
-        found[effect.name] = effect
-    return found
+    own = {effect.name: effect for effect in of_folder(room, "EFFECT", Effect)}
+    return with_plug_ins(own, ENTRY_POINT_GROUP, Effect, "effect", lambda effect: (effect.name, effect))
 
 
 def estimated_by(estimator: Estimator) -> tuple[Effect, ...]:

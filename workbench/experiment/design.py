@@ -102,7 +102,7 @@ def _worth(separations: Iterable[Separation]) -> float:
 
 
 def _better_base(pair: Pair, nominal: RobotModel) -> Base:
-    """The ground, and what the base itself carries, show on a free base alone; what acts in a joint shows best on a held one."""
+    """The ground, and what the base itself carries, show on a free base alone; what acts in a joint shows best on a fixed one."""
     ground = any(effect_named(e.effect).layer == "ground" for e in pair.effects)
     carried = any(w in (nominal.base, *_trunk(nominal)) for e in pair.effects for w in e.where)
     return "free" if ground or carried else "fixed"
@@ -164,7 +164,7 @@ class _Bench:
         kept = [[s] for s, *_ in best]
         beside = self.runs.played(pair.neighbours, kept, what) if pair.neighbours else [[] for _ in kept]
         finer: list[Take | None] = [None for _ in kept]
-        if self.base == "free":  # a robot on its feet multiplies small errors; a held one hardly does
+        if self.base == "free":  # a robot on its feet multiplies small errors; one on a stand hardly does
             finer = [fine for fine, in self.runs.played(pair.models[:1], kept, what, EXPERIMENT.time_step / 2)]
         return {s.name: shown(pair, [*of, *more], self.sight, fine)
                 for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}

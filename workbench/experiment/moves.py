@@ -53,7 +53,7 @@ class Path:
 
 
 class JointMoves:
-    """Segments for joints of a robot whose base is held, that show what acts in the joints of `focus`."""
+    """Segments for joints of a robot whose base is fixed, that show what acts in the joints of `focus`."""
 
     def __init__(self, model: RobotModel, reach: Reach, focus: Sequence[str]) -> None:
         self.model, self.reach, self.focus = model, reach, tuple(focus)
@@ -166,7 +166,7 @@ class JointMoves:
 
 
 def long_runs(model: RobotModel, reach: Reach, focus: Sequence[str], seconds: float) -> list[Segment]:
-    """Segments of a given length on a held base: hard work for time to show in, and uneven dwells for clocks."""
+    """Segments of a given length on a fixed base: hard work for time to show in, and uneven dwells for clocks."""
     path = Path(model.joints, reach.speeds)
     sizes = itertools.cycle((40, -40, 20, -20, 40, 0))
     while path.times[-1] < seconds - 1.5:

@@ -41,6 +41,8 @@ IN_HAND = 0.02
 """By which a search goes beyond the speed asked for: twice what 2 ms and 1 ms differ by."""
 DRIFT_SHARE = 0.6
 """Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
+SPREAD_SHARE = 0.7
+"""Of the drift over draws allowed, likewise: other robots are drawn for the certificate."""
 FIRST_LOOK = Budget(seeds=80, generations=6, robust=0, draws=0)
 """Beside a refusal: what works instead, in half a minute."""
 BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5)
@@ -88,6 +90,10 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             progress("planning seeds", 0.0)
         planned = planned_seeds(machine, request) if options.planned else ()
         found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
+        if not found.best.good:  # it may keep what was asked for all the same, with less in hand than the search wanted
+            again = Evaluator(machine, request, draws, memory, options.n_jobs)
+            (best,) = again.judged([found.best.shape], options.budget.draws, list)
+            found = replace(found, best=best) if best.good else found
         chosen = found.best if found.best.good else found.nearest
         if chosen is None:
             return Optimized(request, False, _unmet(request, found, None), None, None, found)
@@ -112,7 +118,8 @@ def _briefly(options: CertifyOptions) -> CertifyOptions:
 def sought(request: Request) -> Request:
     """What a search is asked, so that its gait keeps the request in the certificate's longer and finer runs, too."""
     speed = None if request.speed is None else request.speed * (1 + IN_HAND)
-    return replace(request, speed=speed, limits=replace(request.limits, drift=DRIFT_SHARE * request.limits.drift))
+    return replace(request, speed=speed, limits=replace(
+        request.limits, drift=DRIFT_SHARE * request.limits.drift, spread=SPREAD_SHARE * request.limits.spread))
 
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,

@@ -23,9 +23,9 @@ Key = tuple[str, tuple[str, ...]]
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
-    speed at which friction fades) x is the number of doublings. held: by number, whether it is no matter of fitting (an axis that
-    was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there; numbers of
-    others are none of its numbers."""
+    speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
+    that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there; numbers
+    of others are none of its numbers."""
 
     effect: Effect
     where: tuple[str, ...]

@@ -96,7 +96,7 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
         noise[across] = np.nanmedian(noise[across])
     sigma = np.sqrt(np.nan_to_num(noise) ** 2 + floor**2 + spread**2)
     weight = np.ones(len(names))
-    if t.recorded.base == "free":  # neighbouring frames of the body tell nearly the same
+    if BODY[0] in names:  # neighbouring frames of the body tell nearly the same
         body = [names.index(c) for c in BODY]
         sigma[body] = np.maximum(sigma[body], PROBLEM.least_body_sigma)
         weight[body] = 1.0 / max(1.0, COMPARE.gain_span / float(np.median(np.diff(t.recorded.time))))

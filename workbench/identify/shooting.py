@@ -24,7 +24,7 @@ def edges(since: Array) -> Array:
 
 
 def base_states(recorded: Take) -> BaseStates | None:
-    """Where the base of a walk was at its windows' beginnings; None where it is held or was not tracked. A window
+    """Where the base of a walk was at its windows' beginnings; None where it is fixed or was not tracked. A window
     whose beginning no camera saw is left out: the one before goes on."""
     if recorded.base != "free" or recorded.p_WB is None or recorded.quat_WB is None:
         return None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
-from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel
+from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel, bus_ids
 from workbench.robot.files import write_whole
 from workbench.robot.numerals import number_of
 from workbench.robot.tables import plain_text
@@ -31,7 +31,7 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
-        return load_mtn(file).motion(page or None, (model.bus_ids if model else None) or BUS_IDS)
+        return load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS)
     return _parse(path, plain_text(path), model)
 
 

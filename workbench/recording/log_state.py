@@ -11,6 +11,8 @@ from workbench.recording.recording import Recording
 
 Array = NDArray[np.float64]
 _FEW_STEPS = 10  # that tell no count
+_ROUNDED = 1e-6
+"""Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""
 _SPAN = 0.03
 """Of positions from which a velocity is told where a log tells none [s]."""
 
@@ -25,6 +27,15 @@ def resolution(values: Array) -> float:
     steps = np.abs(np.diff(values[np.isfinite(values)]))
     steps = steps[steps > 1e-9]
     return float(steps.min()) if len(steps) else 0.0
+
+
+def count_that_stays(values: Array) -> float:
+    """One count of what measured values (N,), told by those that stay for two rows: a log on a clock of its own may hold, where
+    values change, what lies between two counts. NaN where few stay."""
+    values = values[np.isfinite(values)]
+    steps = np.diff(np.unique(values[:-1][np.diff(values) == 0]))
+    steps = steps[steps > _ROUNDED]
+    return float(steps.min()) if len(steps) >= _FEW_STEPS else float("nan")
 
 
 def count_of(values: Array, off: float = 0.02) -> float:

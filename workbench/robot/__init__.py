@@ -1,5 +1,6 @@
 """The machine as it should be, as plain data."""
 
+from workbench.robot.bus_ids import bus_ids
 from workbench.robot.errors import InputError
 from workbench.robot.feet import foot_points, legs
 from workbench.robot.kinematics import JointFrame, Kinematics
@@ -12,6 +13,6 @@ from workbench.robot.servo_constants import COUNT, SPEED_UNIT, ServoConstants, l
 __all__ = [
     "BUS_IDS", "COUNT", "GRAVITY", "JOINTS", "PUPPY", "RIGID_BODIES", "ROBOTS", "SPEED_UNIT", "ConfigurePackageMap",
     "ConfigureParser", "EffectSpec", "Ground", "InputError", "JointFrame", "Kinematics", "ModelFile", "Posterior",
-    "RobotModel", "ServoConstants", "data_file", "foot_points", "legs", "load_model", "load_model_file",
+    "RobotModel", "ServoConstants", "bus_ids", "data_file", "foot_points", "legs", "load_model", "load_model_file",
     "load_servo_constants", "puppy_model", "resolve_model", "resource_dir", "save_model",
 ]

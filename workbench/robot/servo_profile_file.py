@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import cache
-from importlib.metadata import entry_points
-from pathlib import Path
+from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import Any
 
 from workbench.robot.errors import InputError
+from workbench.robot.plug_ins import with_plug_ins
 from workbench.robot.resources import resource_dir
 from workbench.robot.servo_profile import LAW_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
 from workbench.robot.yaml_file import Fields, read_yaml
@@ -23,7 +23,7 @@ _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_lim
            "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
 
 
-def load_profile(path: str | Path) -> ServoProfile:
+def load_profile(path: str | PurePath) -> ServoProfile:
     """Reads a profile; InputError names the file, the key and what was expected."""
     path = Path(path)
     top = Fields(path, read_yaml(path))
@@ -60,9 +60,13 @@ def load_profile(path: str | Path) -> ServoProfile:
 def servo_profiles() -> Mapping[str, ServoProfile]:
     """The families that ship with the workbench, by name, and those of other packages: an entry point of the group
     `workbench.servos` names the path of a profile."""
-    shipped = sorted((resource_dir("data") / "servos").glob("*.yaml"))
-    found = [load_profile(path) for path in (*shipped, *(entry.load() for entry in entry_points(group=ENTRY_POINT_GROUP)))]
-    return MappingProxyType({p.name: p for p in found})
+    shipped = map(load_profile, sorted((resource_dir("data") / "servos").glob("*.yaml")))
+
+    def named(path: PurePath) -> tuple[str, ServoProfile]:
+        profile = load_profile(path)
+        return profile.name, profile
+
+    return MappingProxyType(with_plug_ins({p.name: p for p in shipped}, ENTRY_POINT_GROUP, PurePath, "servo family", named))
 
 
 def servo_profile(model: str) -> ServoProfile:

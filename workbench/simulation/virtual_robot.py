@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.device.bus.survey import bus_ids, family_of
+from workbench.device.bus.survey import family_of
 from workbench.device.capture.virtual_motive import Pose, Scene
 from workbench.device.virtual import (
     AX12A,
@@ -26,7 +26,7 @@ from workbench.effects.apply import physics_of, played, resolved, seen
 from workbench.effects.base import Effect
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Take, observe
-from workbench.robot import InputError, RobotModel
+from workbench.robot import InputError, RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation

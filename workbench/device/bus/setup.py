@@ -7,9 +7,12 @@ from collections.abc import Iterator
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError
-from workbench.device.bus.survey import Survey, bus_ids
-from workbench.robot import InputError, RobotModel
+from workbench.device.bus.survey import Survey
+from workbench.robot import InputError, RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
+
+ROUNDING = 2
+"""Counts by which limits may differ that were written from degrees."""
 
 
 def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> dict[str, int]:
@@ -17,6 +20,21 @@ def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> di
     frame = model.kinematics.frames[joint]
     lowest, highest = _limit(frame.lower, profile), _limit(frame.upper, profile)
     return {"return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
+
+
+def wider_limits(model: RobotModel, found: Survey) -> tuple[str, ...]:
+    """A line for each servo that may turn further than the model's joint: it does not stop a goal that came in broken."""
+    out = []
+    for servo in found.found.values():
+        if servo.joint is None or servo.number not in found.profile.models:
+            continue
+        wanted = wanted_registers(model, servo.joint, found.profile)
+        low, high = servo.registers["cw_angle_limit"], servo.registers["ccw_angle_limit"]
+        lowest, highest = wanted["cw_angle_limit"], wanted["ccw_angle_limit"]
+        if low < lowest - ROUNDING or high > highest + ROUNDING:
+            out.append(f"servo {servo.id} ({servo.joint}): turns from {low} to {high}, the model's joint from {lowest} to "
+                       f"{highest}")
+    return tuple(out)
 
 
 def set_up(bus: Bus, model: RobotModel, found: Survey) -> Iterator[str]:

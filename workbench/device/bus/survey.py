@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
-from workbench.robot import BUS_IDS, InputError, RobotModel
+from workbench.robot import InputError, RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profile
 from workbench.robot.servo_registers import ServoReading, ServoRegisters
@@ -81,15 +81,6 @@ class Survey:
 COOLER = 10
 """How far below its limit a servo has to be before it starts to move [deg C]: one minute at stall warms an AX-12 by about as
 much."""
-
-
-def bus_ids(model: RobotModel) -> Mapping[str, int]:
-    """IDs by joint; InputError where the model does not say them."""
-    ids = dict(model.bus_ids or {j: i for j, i in BUS_IDS.items() if j in model.joints})
-    missing = [joint for joint in model.joints if joint not in ids]
-    if missing:
-        raise InputError(model.description, f"joint {missing[0]} has no bus ID; give them as robot.bus_ids in a session.yaml")
-    return ids
 
 
 def family_of(model: RobotModel) -> ServoProfile:

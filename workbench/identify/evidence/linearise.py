@@ -23,8 +23,6 @@ AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 nothing until it is met."""
 SHAPES = (0.0, 2.0, -2.0)
 """Doublings of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
-LED = 2
-"""Moves of two effects that the same one leads."""
 BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
 """Shares of the way between two sizes that were seen, and beyond the last and to the other side, at which lines are read."""
 
@@ -91,7 +89,7 @@ def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceO
     out, led = list(alone[:options.beam]), Counter[object]()
     for m in both:
         leads = (m.added[0].key, m.added[0].options)
-        if len(out) < options.refined and led[leads] < LED:
+        if len(out) < options.refined and led[leads] < options.led:
             out.append(m)
             led[leads] += 1
     return out

@@ -16,20 +16,20 @@ class EvidenceOptions:
 
     The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
     prior with heavy tails); doublings: standard deviation of a number that only shapes an effect, a factor of four either way.
-    expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having
-    searched many.
+    expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having searched
+    many.
 
     The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
     leave is correlated for longer. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip
     answers smaller ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that are
-    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are;
-    paired: of the best moves, those that are also foretold two at a time. most: effects of one joint. seconds: of all takes
+    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are, led of these by the same
+    one; paired: of the best moves, those that are also foretold two at a time. most: effects of one joint. seconds: of all takes
     together that the search looks at, their beginnings; the last fit sees all.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
-    effect to take it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name, and
-    refuted: the share of an effect's typical size that it then rules out, which no recording would show.
+    effect to take it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name, and refuted:
+    the share of an effect's typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -44,6 +44,7 @@ class EvidenceOptions:
     polish: int = 4
     beam: int = 3
     refined: int = 9
+    led: int = 2
     paired: int = 10
     most: int = 6
     explored: float = 0.15

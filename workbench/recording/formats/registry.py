@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
-from pkgutil import iter_modules
 
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
+from workbench.robot.plug_ins import of_folder, with_plug_ins
 
 ENTRY_POINT_GROUP = "workbench.formats"
 
@@ -42,18 +39,8 @@ def known_formats() -> tuple[RecordingFormat, ...]:
     """All formats, in the order in which they are asked; an installed plug-in may not take the name of another format."""
     import workbench.recording.formats as room
 
-    found: dict[str, RecordingFormat] = {}
-    for module in iter_modules(room.__path__):
-        known = getattr(import_module(f"{room.__name__}.{module.name}"), "FORMAT", None)
-        if isinstance(known, RecordingFormat):
-            found[known.name] = known
-    for entry in entry_points(group=ENTRY_POINT_GROUP):
-        known = entry.load()
-        if not isinstance(known, RecordingFormat):
-            raise InputError(entry.value, f"entry point '{entry.name}' of group {ENTRY_POINT_GROUP}: expected a RecordingFormat")
-        if known.name in found:
-            raise InputError(entry.value, f"format '{known.name}' is known already")
-        found[known.name] = known
+    own = {known.name: known for known in of_folder(room, "FORMAT", RecordingFormat)}
+    found = with_plug_ins(own, ENTRY_POINT_GROUP, RecordingFormat, "format", lambda known: (known.name, known))
     return tuple(sorted(found.values(), key=lambda f: (f.priority, f.name)))
 
 

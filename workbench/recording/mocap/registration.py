@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.joint_names import named_by_model
-from workbench.recording.log_state import first_command, resolution
+from workbench.recording.log_state import count_that_stays, first_command, resolution
 from workbench.recording.mocap.angles import Angles, joint_angles
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.pivots import base_origin, find_pivots
@@ -65,12 +65,16 @@ def register(recording: Recording, model: RobotModel, commands: Commands | None,
 def _register_log(recording: Recording, model: RobotModel, starts_at: float | None) -> Measurement:
     """A log's clock is its own; SAGE's first command may come before or after the first measurement."""
     recording = named_by_model(recording, model)
+    positions = {j: recording.channels[f"position.{j}"] for j in model.joints if f"position.{j}" in recording.channels}
+    counts: dict[str, float] = {}  # servos of one kind count alike
+    for joint, position in positions.items():
+        kind = model.servo(joint).model
+        counts[kind] = float(np.fmin(counts.get(kind, np.nan), count_that_stays(position)))
     noise = {}
-    for joint in model.joints:
-        position = recording.channels.get(f"position.{joint}")
-        if position is not None:
-            still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
-            noise[joint] = float(np.fmax(still, resolution(position) / np.sqrt(12)))
+    for joint, position in positions.items():
+        still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
+        count = np.fmax(resolution(position), counts[model.servo(joint).model])
+        noise[joint] = float(np.fmax(still, count / np.sqrt(12)))
     return Measurement(starts_at=first_command(recording, starts_at), noise=noise)
 
 

@@ -113,7 +113,7 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     if takes:
         what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
                     "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
-    if any(s.recorded.base == "free" for s in takes):
+    if any(c in BODY for s in takes for c in s.channels):
         what.append(
             f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
             "paths and 3D show it left to itself."
@@ -186,7 +186,7 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
 def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
             "Green on top: stretches that no choice saw. Grey: not seen")
-    if take.recorded.base == "free":
+    if any(c in BODY for c in take.channels):
         said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
 
