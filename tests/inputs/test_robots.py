@@ -50,11 +50,10 @@ def _record(folder: Path, made: Made, model: RobotModel, motion: Path) -> str:
     take = Simulation(worn, SimulationConfig(base="fixed")).run(commands)
     at = np.arange(take.starts_at, take.time[-1], 1 / 50)
     channels = {}
+    latest = np.maximum(np.searchsorted(commands.times, at - take.starts_at + 1e-6, side="right") - 1, 0)
     for name in take.joints:
-        channels[f"goal.{name}"] = commands.goals[np.maximum(
-            np.searchsorted(commands.times, at - take.starts_at, side="right") - 1, 0), commands.column(name)]
-        channels[f"speed.{name}"] = commands.speeds[np.maximum(
-            np.searchsorted(commands.times, at - take.starts_at, side="right") - 1, 0), commands.column(name)]
+        channels[f"goal.{name}"] = commands.goals[latest, commands.column(name)]
+        channels[f"speed.{name}"] = commands.speeds[latest, commands.column(name)]
         channels[f"position.{name}"] = np.round(np.interp(at, take.time, take.q[:, take.column(name)]) / COUNT) * COUNT
     write_joint_log(folder / "log.csv", at - at[0], channels)
     content = {"format": 1, "robot": {"model": f"urdf/{made.name}.urdf", "servos": "servo.yaml"}, "ground": {"friction": 0.6},
@@ -83,7 +82,7 @@ def test_it_goes_through_the_verbs(made: Made, tmp_path: Path, capsys: pytest.Ca
     assert "turned" in said
     succeeds(capsys, "compare", str(tmp_path), "--out", str(tmp_path / "compare"), "--jobs", "1")
     (take,) = json.loads((tmp_path / "compare" / "comparison.json").read_text())["takes"]
-    assert max(take["joints"], key=lambda j: take["joints"][j]["error"]) == joint
+    assert take["joints"][joint]["error"] > 1.3 * np.hypot(take["joints"][joint]["noise"], take["joints"][joint]["floor"])
     succeeds(capsys, "diagnose", str(tmp_path), "--out", str(tmp_path / "diagnose"), "--jobs", "1")
     findings = json.loads((tmp_path / "diagnose" / "findings.json").read_text())
     (found,) = findings["findings"]

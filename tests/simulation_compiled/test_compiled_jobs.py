@@ -98,13 +98,13 @@ def test_a_whole_log_has_the_same_torques_and_ground_forces(robot):
     assert max(np.abs(f).max() for f in compiled.contact.values()) > 1.0
 
 
-@pytest.mark.parametrize("logged", [False, True])
-def test_a_log_that_begins_in_motion_with_a_servo_switched_off(tmp_path, logged):
+@pytest.mark.parametrize(("logged", "first"), [(False, 0.0), (True, 0.0), (True, 2.0)])
+def test_a_log_that_begins_in_motion_with_a_servo_switched_off(tmp_path, logged, first):
     servo = ServoConstants(compliance_slope=None, compliance_margin=None, punch=None, proportional_gain=8.0)
     rig = rig_model(tmp_path, servo, 0.1).with_effect(EffectSpec("zero_offset", ("j",), {"angle": 5.0}))
     times = np.array([0.0, 0.1, 0.2503, 0.6])
     on = np.array([[True], [True], [False], [True]])
-    goals, speeds = np.array([[0.2], [0.9], [0.9], [-0.4]]), np.array([[0.0], [3.0], [0.0], [2.0]])
+    goals, speeds = np.array([[0.2], [0.9], [0.9], [-0.4]]), np.array([[first], [3.0], [0.0], [2.0]])
     commands = Commands(times, rig.joints, goals, speeds, on, 1.0, np.full(4, -1))
     config = SimulationConfig(base="fixed", time_step=1e-3, settle=0.2, contact_period=0.0)
     start = Start(np.array([0.3]), np.array([-1.0]), logged)

@@ -62,6 +62,8 @@ def session_check(session: Session) -> SessionCheck:
             try:
                 found[name], seconds[name] = (_take_problems(entry, session) if isinstance(entry, TakeSpec)
                                               else _prediction_problems(entry, session))
+                if entry.servos:
+                    found[name] += sorted({text for servo in session.model_of(entry).servos.values() for text in servo.doubts})
             except InputError as e:
                 found[name] = [str(e)]
                 damaged.add(name)

@@ -19,6 +19,7 @@ from workbench.effects.apply import physics_of, resolved
 from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, InputError, RobotModel
 from workbench.robot.kinematics import cross, rotation_about
+from workbench.robot.model_source.checks import quiet_drake
 
 Array = NDArray[np.float64]
 
@@ -63,10 +64,11 @@ class Machine:
         loaded = replace(model, effects=tuple(spec for effect, spec, _ in resolved(model) if effect.layer == "inertia"))
         self.left_out = tuple(spec.effect for spec in model.effects if spec not in loaded.effects)
         description = physics_of(loaded).description
-        if description is None:
-            parser.AddModels(str(model.path))
-        else:
-            parser.AddModelsFromString(description, "sdf")
+        with quiet_drake():
+            if description is None:
+                parser.AddModels(str(model.path))
+            else:
+                parser.AddModelsFromString(description, "sdf")
         self.mount = _unmount(plant, model.base)
         for index in plant.GetJointIndices():
             joint = plant.get_mutable_joint(index)

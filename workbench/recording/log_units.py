@@ -79,10 +79,16 @@ def unit_problems(r: Recording, c: UnitChecks = UNITS) -> Iterator[str]:
 
 
 def _reach(r: Recording, c: UnitChecks, joint: str, position: Array) -> Iterator[str]:
+    goal = r.channels.get(f"goal.{joint}")
+    asked = float(np.nanmax(np.abs(goal))) if goal is not None and np.isfinite(goal).any() else 0.0
     most, least = float(np.nanmax(np.abs(position))), float(np.nanmin(np.abs(position)))
     if most > 2 * np.pi * c.turns:
         other = "degrees" if r.units == "radians" and most < 2 * np.pi * 180 else "another unit (counts)"
         yield f"position.{joint}: reaches {np.rad2deg(most):.0f} deg, more than {c.turns:g} turns; is it in {other}?"
+    elif asked > 2 * np.pi * c.turns:
+        row = int(np.nanargmax(np.abs(goal)))  # type: ignore[arg-type]  # there is one, as asked tells
+        yield (f"goal.{joint}: reaches {np.rad2deg(asked):.0f} deg at {r.time[row]:.3f} s, more than {c.turns:g} turns; is it in "
+               "another unit, or a slip?")
     elif np.rad2deg(least) > c.far:
         yield (f"position.{joint}: never comes nearer than {np.rad2deg(least):.0f} deg to its servo's centre: is it in counts, "
                "or counted from another zero?")

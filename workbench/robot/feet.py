@@ -70,13 +70,15 @@ def _shapes(path: Path) -> Mapping[str, Points]:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
+    from workbench.robot.model_source.checks import quiet_drake
     from workbench.robot.resources import ConfigureParser
 
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     ConfigureParser(parser)
-    (instance,) = parser.AddModels(path)
+    with quiet_drake():
+        (instance,) = parser.AddModels(path)
     plant.Finalize()
     inspector = scene_graph.model_inspector()
     shapes: dict[str, Points] = {}

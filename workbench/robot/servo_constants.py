@@ -130,6 +130,9 @@ class ServoConstants:
             v = getattr(self, name)
             if v is not None and v > likely:
                 out.append(f"{name}: {v:g} {unit} is more than any hobby servo has ({likely:g} {unit}); is it in {other}?")
+        for name, (least, unit) in _LEAST.items():
+            if (v := getattr(self, name)) < least:
+                out.append(f"{name}: {v:g} {unit} is less than any hobby servo has ({least:g} {unit}); is it in another unit?")
         return tuple(out)
 
 
@@ -147,8 +150,12 @@ _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "r
 """Ten times beyond what any servo of a small robot has; what is larger is another unit or a slip."""
 _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
            "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
-           "coulomb_friction": (2.0, "N m", "kg cm"), "reflected_inertia": (0.2, "kg m^2", "another unit")}
+           "coulomb_friction": (2.0, "N m", "kg cm"), "viscous_friction": (1.0, "N m s/rad", "another unit"),
+           "reflected_inertia": (0.2, "kg m^2", "another unit")}
 """XH540 (11.7 N m), fast hobby servos (0.06 s/60 deg, 17 rad/s), six cells (25 V)."""
+_LEAST = {"stall_torque": (0.02, "N m"), "no_load_speed": (0.5, "rad/s"), "rated_voltage": (2.0, "V"),
+          "supply_voltage": (2.0, "V")}
+"""Servos of 2 g (0.05 N m), geared down to a turn in ten seconds, one cell."""
 _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
 
 

@@ -51,13 +51,19 @@ class Start(NamedTuple):
     """State of the robot at the first command: angles q and velocities v (n,) [rad, rad/s] in the model's order of joints.
 
     logged: the servos' own, as their sensors tell them (a log's), else the links'. base: where a free base is and how it moves.
-    reference: (n,) [rad] where the servos' ramps are; None: at their first goals."""
+    reference: (n,) [rad] where the servos' ramps are; None: `first_reference`."""
 
     q: Array
     v: Array
     logged: bool = False
     base: BaseState | None = None
     reference: Array | None = None
+
+
+def first_reference(commands: Commands, servos: Array, zero: Array) -> Array:
+    """Where ramps (n,) [rad] are as the first command comes to servos that stand at `servos` [rad]: at a goal without a moving
+    speed, which may have been sent long before; else where the servo stands, as the ramp sets out from there."""
+    return np.asarray(np.where(commands.speeds[0] > 0, servos, commands.goals[0] + zero))
 
 
 class Simulation:
@@ -299,7 +305,7 @@ class Simulation:
         if self.config.drive == "servo":
             reference = start.reference
             if reference is None:
-                reference = servos if commands is None else commands.goals[0] + self._zero
+                reference = servos if commands is None else first_reference(commands, servos, self._zero)
             bank, context = self._bank()
             bank.SetReference(context, np.asarray(reference, dtype=float))
             if start.reference is not None:  # held until the first command

@@ -22,6 +22,7 @@ from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 from workbench.effects.apply import Physics, physics_of
 from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import ConfigureParser, InputError, RobotModel
+from workbench.robot.model_source.checks import quiet_drake
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints
 from workbench.simulation.boxes import AddBoxes
@@ -98,9 +99,10 @@ def _check_ends(config: SimulationConfig, physics: Physics) -> None:
 def _add_model(builder: RobotDiagramBuilder, model: RobotModel, physics: Physics) -> ModelInstanceIndex:
     parser = builder.parser()
     ConfigureParser(parser)
-    if physics.description is not None:
-        return parser.AddModelsFromString(physics.description, "sdf")[0]
-    return parser.AddModels(str(model.path))[0]
+    with quiet_drake():
+        if physics.description is not None:
+            return parser.AddModelsFromString(physics.description, "sdf")[0]
+        return parser.AddModels(str(model.path))[0]
 
 
 def _feet(model: RobotModel, friction: Mapping[str, float]) -> dict[str, float]:

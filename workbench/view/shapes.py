@@ -16,6 +16,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
+from workbench.robot.model_source.checks import quiet_drake
 from workbench.robot.resources import ConfigureParser
 
 Array = NDArray[np.float64]
@@ -61,7 +62,8 @@ def robot_shapes(model: RobotModel) -> RobotShapes:
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     parser = Parser(plant)
     ConfigureParser(parser)
-    parser.AddModels(str(model.path))
+    with quiet_drake():
+        parser.AddModels(str(model.path))
     plant.Finalize()
     inspector = scene_graph.model_inspector()
     kinematics = model.kinematics

@@ -64,9 +64,14 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
     speed, said = np.gradient(q, time), np.gradient(q - r, time)
     register = e.take.recording.channels.get(f"duty.{joint}")
     duty = np.full(len(time), np.nan) if register is None else np.interp(time, e.take.recording.time, register)
-    with np.errstate(all="ignore"):
-        middle = [float(np.nanmedian(x[at])) for x in (q, np.abs(speed), np.abs(said), duty)]
-        return _Event(float(time[at][0]), float(np.sqrt(np.nanmean(np.square(r[at])))), *middle)
+    middle = [_middle(x[at]) for x in (q, np.abs(speed), np.abs(said), duty)]
+    return _Event(float(time[at][0]), float(np.sqrt(np.mean(np.square(np.nan_to_num(r[at]))))), *middle)
+
+
+def _middle(x: Array) -> float:
+    """Median of what was seen, NaN where nothing was."""
+    seen = x[np.isfinite(x)]
+    return float(np.median(seen)) if len(seen) else float("nan")
 
 
 def _told(event: _Event) -> str:

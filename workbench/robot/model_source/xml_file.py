@@ -58,6 +58,10 @@ def read_xml(path: Path) -> Element:
     return root
 
 
+_SIZES = ("size", "radius", "length")
+"""Of shapes; in place of others Drake takes 1 m."""
+
+
 def _bound_prefix(content: bytes) -> bytes:
     """With Drake's prefix bound, which Drake itself does not ask for."""
     if b"drake:" in content and b"xmlns:drake" not in content:
@@ -104,3 +108,5 @@ def _check(path: Path, owner: Element, what: str, text: str) -> None:
         bad = value is None or abs(value) > _LARGEST or 0 < abs(value) < _SMALLEST
         if bad and not endless and not (what in _ENDLESS and value is not None):
             raise InputError(path, f"{place}: expected finite numbers of a usual size, found '{word[:40]}'")
+        if what in _SIZES and value is not None and value <= 0:
+            raise InputError(path, f"{place}: expected a size above 0, found '{word[:40]}'")

@@ -21,7 +21,7 @@ from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
 from workbench.simulation.compiled.tables import NotCoveredError, Tables, tables_of
 from workbench.simulation.job import Job
-from workbench.simulation.rollout import Start
+from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
 
 ENDED = {TOUCHED: "shapes touch that are no foot on the floor"}
@@ -182,7 +182,7 @@ class CompiledJob:
             state.base[:4] = start.base.quat_WB / np.linalg.norm(start.base.quat_WB)
             state.base[4:], state.v[:3], state.v[3:6] = start.base.p_WB, start.base.w_WB, start.base.v_WB
         commands = self.plan.commands
-        state.reference[:] = servos if commands is None else commands.goals[0] + self.physics.zero
+        state.reference[:] = servos if commands is None else first_reference(commands, servos, self.physics.zero)
         if start.reference is not None:
             state.reference[:] = state.goal[:] = start.reference
         state.memory[:], state.stepped[:] = 0.0, 0.0
