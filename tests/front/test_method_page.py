@@ -17,7 +17,7 @@ QUESTIONS = {
     "where does a new recording format go": ("recording/formats/", "FORMAT"),
     "where are rollouts remembered": ("identify/rollouts.py", "def _keep"),
     "where are the report's sentences made": ("view/report/words.py", "def in_words"),
-    "who chooses the next experiment": ("experiment/next_experiment.py", "design_experiment"),
+    "who chooses the next experiment": ("experiment/design.py", "def design_experiment"),
     "what must a plug-in effect say": ("effects/base.py", "class Effect"),
 }
 
