@@ -79,6 +79,8 @@ def _evidence(t: RegisteredTake, r: Rollouts, noise_of_joints: Mapping[str, floa
     moving = t.recorded.time >= t.measurement.starts_at
     if steadied is not None:
         moving &= ~unsettled(steadied, t.recorded.since_start)
+    if t.start_state() is not None:
+        moving &= t.recorded.since_start >= PROBLEM.forgets
     nominal = channels_of(t.observed(r.nominal), names)
     finer = [channels_of(t.observed(f), names) for f in r.finer]
     finest = finer[-1] if finer else nominal

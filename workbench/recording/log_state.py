@@ -13,8 +13,11 @@ Array = NDArray[np.float64]
 _FEW_STEPS = 10  # that tell no count
 _ROUNDED = 1e-6
 """Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""
-_SPAN = 0.03
-"""Of positions from which a velocity is told where a log tells none [s]."""
+_CERTAIN = 3.0
+"""Standard errors by which a velocity is told from none."""
+_SPAN = 0.05
+"""Of positions from which a velocity is told where a log tells none [s]: a servo's rise time. Their parabola is taken, as a first goal
+that is far off makes a servo that stood still as fast in that time as it gets."""
 
 
 def first_command(recording: Recording, starts_at: float | None = None) -> float:
@@ -74,11 +77,27 @@ def _at(time: Array, values: Array, when: float) -> float:
 
 
 def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
-    """As logged, else the slope of the first positions."""
+    """As logged, else the slope of the first positions where that is more than their noise: a robot that is not seen to move stands
+    still, and one that is stuck in its friction keeps what an error of its start moves it by."""
     speed = recording.channels.get(f"velocity.{joint}")
     if speed is not None and np.isfinite(speed).any():
         return _at(recording.time, speed, time)
     known = np.isfinite(position) & (recording.time >= time - 1e-9)
     t, q = recording.time[known], position[known]
     near = t <= t[0] + _SPAN if len(t) else np.zeros(0, dtype=bool)
-    return float(np.polyfit(t[near] - t[0], q[near], 1)[0]) if near.sum() >= 3 else 0.0
+    if near.sum() < 3:
+        return 0.0
+    order = 2 if near.sum() >= 5 else 1
+    fit, spread = np.polyfit(t[near] - t[0], q[near], order, cov="unscaled")
+    v, error = float(fit[order - 1]), white_noise(position) * float(np.sqrt(spread[order - 1, order - 1]))
+    return v if abs(v) > _CERTAIN * error else 0.0
+
+
+def white_noise(values: Array) -> float:
+    """Standard deviation of what in values (N,) is new with each row: of third differences, in which a motion is next to nothing;
+    at least that of rounding to the smallest step."""
+    known = values[np.isfinite(values)]
+    rounding = resolution(known) / np.sqrt(12.0)
+    if len(known) < 8:
+        return float(rounding)
+    return float(max(rounding, 1.4826 * np.median(np.abs(np.diff(known, 3))) / np.sqrt(20.0)))

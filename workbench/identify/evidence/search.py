@@ -20,6 +20,8 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
+NOTHING = 1e-6
+"""Typical sizes of an effect that is not there: an end of its range at which a fit stopped."""
 Key = frozenset[Term]
 Report = Callable[[str, float | None], None]
 
@@ -106,16 +108,15 @@ def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """Where the best fit cannot be extended to a better one: without each of its effects in turn, and with others in its
-    place."""
+    """Where the best fit cannot be extended to a better one: without each of its effects in turn, fitted from where it stands, as
+    what an earlier fit of the smaller model missed is no reason for an effect; and with others in its place."""
     if found.best.hypothesis.key not in found.extended:
         return found
     best, region = found.best, found.region
     states = [without(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
-    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J)
-                                    for h, J in states if h.key not in found.fits])
-    found = replace(found, fits={**found.fits, **{f.hypothesis.key: f for f in made}})
-    return (yield from _extended(found, options, [found.fits[h.key] for h, _ in states], options.beam))
+    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J) for h, J in states])
+    fits = found.fits | {f.hypothesis.key: max(f, found.fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior) for f in made}
+    return (yield from _extended(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
@@ -134,8 +135,19 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f, options.polish) for f in ahead])
-    fits |= {f.hypothesis.key: max(f, fits[f.hypothesis.key], key=lambda g: g.log_posterior) for f in better}
+    for f in (*better, *(reduced(region, options, f) for f in (*made, *better))):
+        fits[f.hypothesis.key] = max(f, fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
+
+
+def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
+    """A fit without the effects that came to nothing in it: the smaller model must not lose to a larger one by less of a search."""
+    def vanished(c: Candidate) -> bool:
+        x = f.hypothesis.theta[f.hypothesis.slices()[f.hypothesis.effects.index(c)]]
+        return bool(np.all(np.abs(x[~c.shapes]) < NOTHING))
+
+    h, J = without(f, vanished)
+    return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
 def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
