@@ -28,8 +28,8 @@ class ProblemOptions:
     settles: float = 0.1
     """After a base reset, until feet have found the floor again [s]: a millimetre's fall takes 15 ms."""
     forgets: float = 0.3
-    """For so long after the first command of a log that does not begin at rest in neutral nothing is judged [s]: its velocity there
-    is told by a few noisy positions, and a servo takes two or three times its rise time to forget what that was wrong by."""
+    """For so long after the first command of a log that does not begin at rest in neutral nothing is judged [s]: its velocity
+    there is told by a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
     pose_frames: int = 7
     """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
     block: float = 0.4

@@ -16,8 +16,8 @@ _ROUNDED = 1e-6
 _CERTAIN = 3.0
 """Standard errors by which a velocity is told from none."""
 _SPAN = 0.05
-"""Of positions from which a velocity is told where a log tells none [s]: a servo's rise time. Their parabola is taken, as a first goal
-that is far off makes a servo that stood still as fast in that time as it gets."""
+"""Of positions from which a velocity is told where a log tells none [s]: a servo's rise time. Their parabola is taken, as a first
+goal that is far off makes a servo that stood still as fast in that time as it gets."""
 
 
 def first_command(recording: Recording, starts_at: float | None = None) -> float:
@@ -77,8 +77,8 @@ def _at(time: Array, values: Array, when: float) -> float:
 
 
 def _velocity(recording: Recording, joint: str, position: Array, time: float) -> float:
-    """As logged, else the slope of the first positions where that is more than their noise: a robot that is not seen to move stands
-    still, and one that is stuck in its friction keeps what an error of its start moves it by."""
+    """As logged, else the slope of the first positions where that is more than their noise: a robot that is not seen to move
+    stands still, and one that is stuck in its friction keeps what an error of its start moves it by."""
     speed = recording.channels.get(f"velocity.{joint}")
     if speed is not None and np.isfinite(speed).any():
         return _at(recording.time, speed, time)

@@ -20,8 +20,6 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
-NOTHING = 1e-6
-"""Typical sizes of an effect that is not there: an end of its range at which a fit stopped."""
 Key = frozenset[Term]
 Report = Callable[[str, float | None], None]
 
@@ -114,8 +112,9 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
         return found
     best, region = found.best, found.region
     states = [without(best, lambda c, gone=gone: c is gone) for gone in best.hypothesis.effects]
-    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J) for h, J in states])
-    fits = found.fits | {f.hypothesis.key: max(f, found.fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior) for f in made}
+    made = yield from side_by_side([fitting(region, options, h, best.discrepancy, options.iterations, None, J)
+                                    for h, J in states])
+    fits = _with_better(found.fits, made)
     return (yield from _extended(replace(found, fits=fits), options, [fits[h.key] for h, _ in states], options.beam))
 
 
@@ -135,16 +134,23 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f, options.polish) for f in ahead])
-    for f in (*better, *(reduced(region, options, f) for f in (*made, *better))):
-        fits[f.hypothesis.key] = max(f, fits.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
+    fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
 
+def _with_better(fits: Mapping[Key, Fitted], more: Sequence[Fitted]) -> dict[Key, Fitted]:
+    """Of each set of effects the likelier fit."""
+    out = dict(fits)
+    for f in more:
+        out[f.hypothesis.key] = max(f, out.get(f.hypothesis.key, f), key=lambda g: g.log_posterior)
+    return out
+
+
 def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
-    """A fit without the effects that came to nothing in it: the smaller model must not lose to a larger one by less of a search."""
+    """A fit without the effects that came to nothing in it: a smaller model must not lose because it was searched for less."""
     def vanished(c: Candidate) -> bool:
         x = f.hypothesis.theta[f.hypothesis.slices()[f.hypothesis.effects.index(c)]]
-        return bool(np.all(np.abs(x[~c.shapes]) < NOTHING))
+        return bool(np.allclose(x[~c.shapes], 0.0))  # at the end of its range
 
     h, J = without(f, vanished)
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
