@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.recording import Recording
+from workbench.recording.white_noise import white_noise
 
 Array = NDArray[np.float64]
 _FEW_STEPS = 10  # that tell no count
@@ -89,15 +90,6 @@ def _velocity(recording: Recording, joint: str, position: Array, time: float) ->
         return 0.0
     order = 2 if near.sum() >= 5 else 1
     fit, spread = np.polyfit(t[near] - t[0], q[near], order, cov="unscaled")
-    v, error = float(fit[order - 1]), white_noise(position) * float(np.sqrt(spread[order - 1, order - 1]))
+    noise = np.fmax(resolution(position) / np.sqrt(12.0), white_noise(position))  # at least that of rounding
+    v, error = float(fit[order - 1]), float(noise * np.sqrt(spread[order - 1, order - 1]))
     return v if abs(v) > _CERTAIN * error else 0.0
-
-
-def white_noise(values: Array) -> float:
-    """Standard deviation of what in values (N,) is new with each row: of third differences, in which a motion is next to nothing;
-    at least that of rounding to the smallest step."""
-    known = values[np.isfinite(values)]
-    rounding = resolution(known) / np.sqrt(12.0)
-    if len(known) < 8:
-        return float(rounding)
-    return float(max(rounding, 1.4826 * np.median(np.abs(np.diff(known, 3))) / np.sqrt(20.0)))

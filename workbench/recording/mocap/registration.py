@@ -20,6 +20,7 @@ from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets,
 from workbench.recording.mocap.yaw import YawEstimate, yaw_of
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
+from workbench.recording.white_noise import white_noise
 from workbench.robot import InputError, RobotModel
 
 Array = NDArray[np.float64]
@@ -91,18 +92,12 @@ def _start(recording: Recording, tracks: Tracks, angles: Angles, commands: Comma
 
 
 def noise_at_rest(q: Array, resting: NDArray[np.bool_]) -> Array:
-    """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; where there is too little rest, from third
-    differences of the whole (white noise e has third differences of variance 20 e^2, motion hardly any)."""
-    with np.errstate(invalid="ignore"):
-        differences = np.abs(np.diff(q, n=3, axis=0))
+    """Standard deviation (n,) [rad] of columns q (N, n) about their mean at rest; where there is too little rest, their white
+    noise on the whole."""
     out = np.full(q.shape[1], np.nan)
     for c in range(q.shape[1]):
         rest = q[resting, c][np.isfinite(q[resting, c])]
-        if len(rest) >= _FEW:
-            out[c] = rest.std(ddof=1)
-        else:
-            d = differences[:, c][np.isfinite(differences[:, c])]
-            out[c] = 1.4826 * np.median(d) / np.sqrt(20) if len(d) else np.nan
+        out[c] = rest.std(ddof=1) if len(rest) >= _FEW else white_noise(q[:, c])
     return out
 
 
