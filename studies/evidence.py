@@ -64,7 +64,7 @@ def evidence(out: Path, quick: bool, progress: Callable[[str, float | None], Non
             h = h.with_effect(c, np.ones(c.size))
         s = region.likelihood.discrepancy(rollouts.answers([(0, h)])[0])
         for _ in range(2):
-            region = region.correlated(region.correlation(rollouts.answers([(0, h)])[0], OPTIONS))
+            region = region.correlated(region.correlation(rollouts.answers([(0, h)])[0]))
             rollouts = replace(rollouts, regions=(region,))
             fit: Fitted = lockstep(rollouts, {0: fitting(region, OPTIONS, h, s, OPTIONS.iterations)})[0]
             h, s = fit.hypothesis, fit.discrepancy

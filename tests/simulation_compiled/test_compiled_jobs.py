@@ -15,6 +15,7 @@ from workbench.robot import EffectSpec, Ground, InputError, RobotModel, ServoCon
 from workbench.simulation import Job, SimulationConfig, Start, simulate_batch
 from workbench.simulation.batch import run_job
 from workbench.simulation.compiled import covers
+from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.rollout import BaseState
 from workbench.simulation.steady import BaseStates
 
@@ -54,6 +55,24 @@ def test_a_held_robot_plays_the_same(robot, effect):
     assert np.abs(drake.v - compiled.v).max() < 1e-8
     if effect is not None and effect.effect in ("backlash", "zero_offset"):
         assert np.abs(drake.servo_q - compiled.servo_q).max() < HELD
+
+
+def test_angles_alone_are_those_of_whole_jobs_whatever_ran_before(robot):
+    """A configuration that is gone may leave its address to another; its schedule is not for that one."""
+    commands = load_motion(data_file("robotis_walk.csv"), robot).commands(1)
+
+    def angles(step: float) -> np.ndarray:
+        config = replace(config_for("fixed"), engine="compiled", time_step=step)
+        (q,) = servo_angles([Job(robot, config, commands, 1.0, times=TIMES[2:], lead=0.0, start=(np.zeros(15), np.zeros(15)))])
+        return q
+
+    def alone(step: float) -> np.ndarray:
+        config = replace(config_for("fixed"), engine="compiled", time_step=step)
+        return run_job(Job(robot, config, commands, 1.0, times=TIMES[2:], lead=0.0, start=(np.zeros(15), np.zeros(15)))).q
+
+    expected, ran = {step: alone(step) for step in (0.002, 0.001)}, TIMES[2:] <= 1.0
+    for step in [0.002, 0.001] * 8:
+        np.testing.assert_allclose(angles(step)[ran], expected[step][ran], atol=1e-9)
 
 
 def put_back(times: tuple[float, ...]) -> BaseStates:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import Residuals, change, estimates, value_slopes
-from workbench.identify.evidence.fit import Asks, Fitted, fitting
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.nuisance import (
@@ -207,8 +207,9 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     (r,) = yield [best.hypothesis]
     region = entire.correlated(found.region.likelihood.tau)
     s = region.likelihood.discrepancy(r)
-    fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.polish, r)
-    fit = replace(fit, log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
+    J = yield from regressed(region, options, fit)
+    fit = replace(fit, J=J, log_evidence=best.log_evidence, log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
@@ -85,9 +86,25 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
     return judged(region, options, there, left, J_there)
 
 
-def polished(region: Region, options: EvidenceOptions, f: Fitted, iterations: int) -> Asks[Fitted]:
+def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
     """A fit gone on with at its own discrepancy, with slopes measured anew."""
-    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, iterations, f.r))
+    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
+
+
+def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Array]:
+    """A fit's slopes J (n, k) by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of
+    a Hadamard matrix, so that each number is told by all of them (R. Plackett and J. Burman, Biometrika 33, 1946).
+
+    A joint that sticks answers a small move with noise, which differences of one number after the other take for slopes, and
+    their square for information: two numbers that do the same would seem to be told apart, and both to be well known.
+    """
+    h, k = f.hypothesis, len(f.hypothesis.theta)
+    low, high = h.bounds()
+    signs = hadamard(1 << (4 * k).bit_length())[:, 1:k + 1]  # pairs of moves, four and more to a number
+    there, back = (np.clip(h.theta + way * options.spread * signs, low, high) for way in (1, -1))
+    left = yield [h.at(theta) for theta in (*there, *back)]
+    r = np.array(left)
+    return np.asarray(np.linalg.lstsq(there - back, r[:len(signs)] - r[len(signs):], rcond=None)[0].T)
 
 
 def renewed(region: Region, options: EvidenceOptions, f: Fitted, r: Array) -> Fitted:

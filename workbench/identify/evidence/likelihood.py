@@ -98,10 +98,10 @@ class Likelihood:
         return -float(found.fun), float(np.exp(found.x))
 
 
-def correlation_time(parts: list[tuple[Array, float]], window: float) -> float:
+def correlation_time(parts: list[tuple[Array, float]], window: float = 5.0) -> float:
     """Integrated autocorrelation time [s] of residuals, of takes (values with NaN where unseen, time between frames [s])
     together: half the frame time where frames are independent. Summed until it is `window` correlation times long (A. Sokal,
-    Monte Carlo methods in statistical mechanics, 1997)."""
+    Monte Carlo methods in statistical mechanics, 1997, section 3)."""
     frame = float(np.median([dt for _, dt in parts]))
     longest = max(len(x) for x, _ in parts)
     products, pairs = np.zeros(longest), np.zeros(longest)

@@ -11,8 +11,7 @@ class EvidenceOptions:
 
     The likelihood. tails: degrees of freedom of Student's t, so that a few events (an arm that sticks) do not decide; 4 is the
     usual choice for robust regression (K. Lange et al., JASA 84, 1989). least_discrepancy, most_discrepancy [rad]: between them
-    its size is looked for, from a tenth of a servo's count to a lost arm. window: of the autocorrelation, in correlation times
-    (A. Sokal, 1997, section 3: 5).
+    its size is looked for, from a tenth of a servo's count to a lost arm.
 
     The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
     prior with heavy tails); doublings: standard deviation of a number that only shapes an effect, a factor of four either way.
@@ -21,10 +20,11 @@ class EvidenceOptions:
 
     The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
     leave is correlated for longer. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip
-    answers smaller ones with noise. iterations, polish: most steps of a first fit, and of one that ends it. beam: states that are
-    extended, and moves of one effect that are fitted of each; refined: moves of one or two that are, led of these by the same
-    one; paired: of the best moves, those that are also foretold two at a time. most: effects of one joint. seconds: of all takes
-    together that the search looks at, their beginnings; the last fit sees all.
+    answers smaller ones with noise; spread: of the moves that tell the last slopes, likewise: half of what was known before.
+    iterations: most steps of a fit. beam: states that are extended, and moves of one effect that are fitted of each; refined:
+    moves of one or two that are, led of these by the same one; paired: of the best moves, those that are also foretold two at a
+    time. most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit
+    sees all.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
@@ -35,13 +35,12 @@ class EvidenceOptions:
     tails: float = 4.0
     least_discrepancy: float = 1.5e-4
     most_discrepancy: float = 0.3
-    window: float = 5.0
     width: float = 3.0
     doublings: float = 2.0
     expected: float = 2.0
     stride: float = 0.15
+    spread: float = 0.5
     iterations: int = 5
-    polish: int = 4
     beam: int = 3
     refined: int = 9
     led: int = 2

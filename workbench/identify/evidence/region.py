@@ -77,14 +77,14 @@ class Region:
         """Which residuals are of some takes (n,)."""
         return np.asarray(np.isin(self.takes, takes))
 
-    def correlation(self, r: Array, options: EvidenceOptions) -> float:
+    def correlation(self, r: Array) -> float:
         """Correlation time [s] of residuals (n,); the largest are cut, as an event is none of it."""
         series, at = [], 0
         most = 4 * float(np.median(np.abs(r))) + 1e-12
         for p in self.parts:
             series += [(x, p.span) for x in p.series(np.clip(r[at:at + p.size], -most, most))]
             at += p.size
-        return correlation_time(series, options.window)
+        return correlation_time(series)
 
     def correlated(self, tau: float) -> Region:
         """The region with a correlation time [s]."""

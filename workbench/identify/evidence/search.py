@@ -94,7 +94,7 @@ def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
     """The nominal law recalibrated."""
     h = start(region.numbers)
     (r,) = yield [h]
-    region = region.correlated(min(options.explored, region.correlation(r, options)))
+    region = region.correlated(min(options.explored, region.correlation(r)))
     s = region.likelihood.discrepancy(r)
     fit = yield from fitting(region, options, h, s, options.iterations, r)
     return region, fit
@@ -133,7 +133,7 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
     fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
-    better = yield from side_by_side([polished(region, options, f, options.polish) for f in ahead])
+    better = yield from side_by_side([polished(region, options, f) for f in ahead])
     fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
@@ -173,7 +173,7 @@ def _renewed(found: Found, options: EvidenceOptions, exploring: bool) -> Asks[Fo
     near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
     left = yield [f.hypothesis for f in near]
     closest = sorted(left, key=found.region.likelihood.discrepancy)[:options.beam]
-    tau = float(np.median([found.region.correlation(r, options) for r in closest]))
+    tau = float(np.median([found.region.correlation(r) for r in closest]))
     region = found.region.correlated(min(tau, options.explored) if exploring else tau)
     fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)

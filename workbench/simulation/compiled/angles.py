@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,13 +43,14 @@ def servo_angles(jobs: Sequence[Job]) -> list[Array]:
 def _schedule(compiled: CompiledJob) -> Schedule:
     """Of a job; made once for the same commands."""
     job, plan, config = compiled.job, compiled.plan, compiled.config
-    if plan.heard_as_sent and job.commands is not None:
-        key = (id(job.commands), id(config), compiled.model.joints, plan.lead, plan.duration)
-        if key in _schedules:
-            return _schedules[key][1]
+    kept = plan.heard_as_sent and job.commands is not None and job.steadied is None
+    key = (id(job.commands), replace(config), compiled.model.joints, plan.lead, plan.duration, job.elapsed)
+    if kept and key in _schedules:
+        return _schedules[key][1]
     schedule = schedule_of(config, plan.commands, plan.lead, plan.duration, job.elapsed, job.steadied)
-    if plan.heard_as_sent and job.commands is not None:
-        _schedules[key] = (job.commands, schedule)
+    if kept:
+        assert job.commands is not None
+        _schedules[key] = (job.commands, schedule)  # holds the commands, so that their id stays theirs
         while len(_schedules) > KEPT:
             _schedules.popitem(last=False)
     return schedule
