@@ -39,10 +39,11 @@ def region(candidates: Sequence[Candidate], n: int = 400, takes: int = 4, noise:
 @dataclass(frozen=True)
 class Linear(Rollouts):
     """truth (n,): what the nominal law leaves; does: by effect and number of the nominal law, what a unit of it takes off
-    (n,)."""
+    (n,); sticks [rad]: RMS of what jumps, by chance, at each change of theta however small."""
 
     truth: np.ndarray = field(default_factory=lambda: np.empty(0))
     does: Mapping[str, np.ndarray] = field(default_factory=dict)
+    sticks: float = 0.0
 
     def answers(self, wants):
         return [self.left(h) for _, h in wants]
@@ -54,6 +55,9 @@ class Linear(Rollouts):
         for c, x in h.sizes():
             for k, size in enumerate(x):
                 r = r - size * self.does.get(f"{c.name}.{c.parameters[k].name}", 0.0)  # a shape does nothing by itself
+        if self.sticks:
+            seed = np.frombuffer(h.theta.tobytes(), np.uint32).tolist()
+            r = r + self.sticks * np.random.default_rng(seed).normal(size=len(r))
         return r
 
 

@@ -66,4 +66,4 @@ def test_correlation_time_of_an_autoregressive_process(memory, expected):
             x[k] = memory * x[k - 1] + e
         x[(np.arange(len(x)) // 20) % 3 == 0] = np.nan
         series.append((x, 0.1))
-    assert correlation_time(series, 5.0) == pytest.approx(0.1 * expected, rel=0.2)
+    assert correlation_time(series) == pytest.approx(0.1 * expected, rel=0.2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.evidence.linear import FRAME, candidate, linear, region
-from workbench.identify.evidence.fit import fitting
+from workbench.identify.evidence.fit import fitting, regressed
 from workbench.identify.evidence.holdout import vetoed
 from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.options import EvidenceOptions
@@ -99,3 +99,30 @@ def test_correlation_that_is_left_makes_frames_count_less():
     _, found, _ = searched(replace(rollouts, truth=rollouts.truth + slow))
     assert quick.region.likelihood.tau < 2 * FRAME
     assert found.region.likelihood.tau > 20 * FRAME
+
+
+def test_two_numbers_that_do_the_same_are_not_told_apart_by_sticking():
+    """Residuals that jump at each small move: differences of them would tell the two apart, moves of all at once do not."""
+    rollouts = robot({"coulomb_friction": 2.0})
+    does = dict(rollouts.does)
+    does[NUMBER] = 0.5 * does["coulomb_friction.torque"]
+    rollouts = replace(rollouts, does=does, sticks=1e-3)
+    (of,) = rollouts.regions
+    of = of.correlated(0.2)
+    h = start(of.numbers).with_effect(candidate("coulomb_friction"), np.array([2.0]))
+    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    by_differences, by_moves = (np.sqrt(np.diag(f.covariance(of, OPTIONS)))[1] for f in (fit, again))
+    assert by_moves == pytest.approx(0.5, rel=0.2)  # what is believed of the number, as the effect does twice as much
+    assert by_differences < 0.5 * by_moves
+
+
+def test_slopes_by_moves_are_those_by_differences_where_nothing_sticks():
+    rollouts = robot({"backlash": 1.5})
+    (of,) = rollouts.regions
+    h = start(of.numbers).with_effect(candidate("backlash"), np.array([1.5]))
+    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    slopes = np.column_stack([-rollouts.does[NUMBER], -rollouts.does["backlash.gap"]])
+    np.testing.assert_allclose(again.J, slopes, atol=1e-9)
+    np.testing.assert_allclose(again.covariance(of, OPTIONS), replace(fit, J=slopes).covariance(of, OPTIONS), rtol=1e-6)

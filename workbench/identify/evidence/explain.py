@@ -208,8 +208,8 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     region = entire.correlated(found.region.likelihood.tau)
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
-    J = yield from regressed(region, options, fit)
-    fit = replace(fit, J=J, log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit = yield from regressed(region, options, fit)
+    fit = replace(fit, log_evidence=best.log_evidence, log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

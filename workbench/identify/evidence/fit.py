@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,7 +24,7 @@ Asks = Generator[list[Hypothesis], list[Array], T]
 @dataclass(frozen=True)
 class Fitted:
     """r (n,): what it leaves [rad]; J (n, k): of r by theta; discrepancy [rad]; log_evidence [nats]; log_prior [nats]: of which
-    effects there are."""
+    effects there are; too_much (k, k): information that J seems to hold and that is only noise of J, where that is known."""
 
     hypothesis: Hypothesis
     r: Array = field(repr=False)
@@ -32,6 +32,7 @@ class Fitted:
     discrepancy: float
     log_evidence: float
     log_prior: float
+    too_much: Array | None = field(default=None, repr=False)
 
     @property
     def log_posterior(self) -> float:
@@ -42,6 +43,9 @@ class Fitted:
         """Of theta (k, k)."""
         h, likelihood = self.hypothesis, region.likelihood
         H = (self.J.T * likelihood.precision(self.r, self.discrepancy)) @ self.J
+        if self.too_much is not None:
+            told, axes = np.linalg.eigh(H - self.too_much)
+            H = (axes * np.maximum(told, 0.0)) @ axes.T
         return np.asarray(np.linalg.inv(H + np.diag(Prior.of(h, options).precision(h.theta))))
 
 
@@ -91,25 +95,25 @@ def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted
     return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
 
 
-def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Array]:
-    """A fit's slopes J (n, k) by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of
-    a Hadamard matrix, so that each number is told by all of them (R. Plackett and J. Burman, Biometrika 33, 1946).
+def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
+    """A fit with slopes J by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of a
+    Hadamard matrix, so that all moves tell each number (R. Plackett and J. Burman, Biometrika 33, 1946).
 
-    A joint that sticks answers a small move with noise, which differences of one number after the other take for slopes, and
-    their square for information: two numbers that do the same would seem to be told apart, and both to be well known.
+    A joint that sticks answers a small move by chance, which differences of one number after the other take for slopes, and
+    their square for information: two numbers that do the same would seem to be told apart, and both to be well known. What the
+    moves leave unexplained says how much of it is chance, which is taken off (W. Fuller, Measurement error models, 1987).
     """
     h, k = f.hypothesis, len(f.hypothesis.theta)
     low, high = h.bounds()
-    signs = hadamard(1 << (4 * k).bit_length())[:, 1:k + 1]  # pairs of moves, four and more to a number
-    there, back = (np.clip(h.theta + way * options.spread * signs, low, high) for way in (1, -1))
-    left = yield [h.at(theta) for theta in (*there, *back)]
-    r = np.array(left)
-    return np.asarray(np.linalg.lstsq(there - back, r[:len(signs)] - r[len(signs):], rcond=None)[0].T)
-
-
-def renewed(region: Region, options: EvidenceOptions, f: Fitted, r: Array) -> Fitted:
-    """A fit judged anew where it stands, by residuals that changed as other regions did, or by another correlation time."""
-    return judged(region, options, f.hypothesis, r, f.J)
+    signs = hadamard(1 << (4 * k).bit_length())[:, 1:k + 1]  # four and more pairs of moves to a number
+    moves = options.spread * np.linspace(0.5, 1.5, len(signs))[:, None] * signs  # each a different one, however few numbers
+    there, back = (np.clip(h.theta + way * moves, low, high) for way in (1, -1))
+    left = np.array((yield [h.at(theta) for theta in (*there, *back)]))
+    moved, answer = there - back, left[:len(signs)] - left[len(signs):]
+    J = np.linalg.lstsq(moved, answer, rcond=None)[0].T
+    chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
+    precision = region.likelihood.precision(f.r, f.discrepancy)
+    return replace(f, J=J, too_much=float(precision @ chance) * np.linalg.pinv(moved.T @ moved))
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:

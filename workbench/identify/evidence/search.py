@@ -76,14 +76,14 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
         found = _replaced(found, lockstep(rollouts, {i: part(found[i]) for i in sorted(these)}))
         rollouts = standing(rollouts, found)
 
-    everywhere(lambda f: _renewed(f, options, exploring), range(len(found)))
+    everywhere(lambda f: _renewed(f, options, exploring, True), range(len(found)))
     open_ = set(range(len(found)))
     for level in range(options.most):
         report(f"effects, {what}, level {level + 1}", level / options.most)
         everywhere(lambda f: _level(f, options), open_)
         if not exploring:
             everywhere(lambda f: _exchanged(f, options), open_)
-        everywhere(lambda f: _renewed(f, options, exploring), range(len(found)))  # other joints moved
+        everywhere(lambda f: _renewed(f, options, exploring, len(found) > 1), range(len(found)))  # other joints moved
         open_ = {i for i in open_ if found[i].goes_on(options)}
         if not open_:
             break
@@ -119,7 +119,8 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
+    """Some states extended, each by so many of the moves that foretell most: those are tried by a step, the best of all fitted,
+    and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     for f in states:
@@ -130,8 +131,13 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
-    fits |= {f.hypothesis.key: f for f in made}
+    tried = yield from side_by_side([fitting(region, options, m.hypothesis, f.discrepancy, 1, None, m.J)
+                                     for f, m in wanted.values()])
+    fits |= {f.hypothesis.key: f for f in tried}
+    tried = sorted(tried, key=lambda f: -f.log_posterior)[:options.refined]
+    made = yield from side_by_side([_moved(region, options, f, wanted[f.hypothesis.key][1], k < 2 * options.beam)
+                                    for k, f in enumerate(tried)])
+    fits = _with_better(fits, made)
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
     fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
@@ -156,22 +162,25 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that foretold it where they tell all its numbers; and once more with the nominal law as it
-    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move, anew: bool) -> Asks[Fitted]:
+    """A move that was tried, fitted, with the slopes that foretold it where they tell all its numbers. anew: once more with the
+    nominal law as it stands, as what was recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
-    h = m.hypothesis
-    anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
-    fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
-                                    fitting(region, options, anew, f.discrepancy, options.iterations)])
+    h = f.hypothesis
+    nominal = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
+    parts = [fitting(region, options, h, f.discrepancy, options.iterations, f.r, None if shaped else f.J)]
+    parts += [fitting(region, options, nominal, f.discrepancy, options.iterations)] if anew else []
+    fits = yield from side_by_side(parts)
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
-def _renewed(found: Found, options: EvidenceOptions, exploring: bool) -> Asks[Found]:
-    """The fits judged anew, as other regions stand now, by the correlation time of what the closest of them leave: the median of
-    a few, as one tells it badly."""
+def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: bool) -> Asks[Found]:
+    """The fits judged anew by the correlation time of what the closest of them leave: the median of a few, as one tells it
+    badly. again: rolled out again, as other regions stand elsewhere now, or the step is another."""
     near = [f for f in found.fits.values() if exploring or f.log_posterior > found.best.log_posterior - 3 * options.occam]
-    left = yield [f.hypothesis for f in near]
+    left = [f.r for f in near]
+    if again:
+        left = yield [f.hypothesis for f in near]
     closest = sorted(left, key=found.region.likelihood.discrepancy)[:options.beam]
     tau = float(np.median([found.region.correlation(r) for r in closest]))
     region = found.region.correlated(min(tau, options.explored) if exploring else tau)
