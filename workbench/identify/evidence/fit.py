@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ from scipy.linalg import hadamard
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, steps_of
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -59,35 +59,60 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
 
 def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
             J: Array | None = None) -> Asks[Fitted]:
-    """Fits a hypothesis from where it stands, at a discrepancy s. r, J: what it leaves there and how that answers to theta, where
-    known; else they are asked."""
-    prior, seen = Prior.of(start, options), {}
-    low, high = start.bounds()
+    """Fits a hypothesis from where it stands, at a discrepancy s. r: what it leaves there, where known; J: slopes of that, NaN in
+    columns that are not known: these are measured by differences."""
+    prior, (low, high) = Prior.of(start, options), start.bounds()
     start = start.at(np.clip(start.theta, low, high))
     if r is None:
         (r,) = yield [start]
-    seen[start.theta.tobytes()] = r
+    J = yield from _measured(start, r, J, options.stride)
+    seen = [(start.theta, r)]
 
-    def rows(h: Hypothesis, left: Array) -> Array:
-        seen[h.theta.tobytes()] = left
-        return np.concatenate([region.likelihood.rows(left, s), prior.rows(h.theta)])
+    def rows(theta: Array, left: Array) -> Array:
+        return np.concatenate([region.likelihood.rows(left, s), prior.rows(theta)])
 
-    first = rows(start, r)
-    since = [] if J is None else [Solved(start.theta, first, np.vstack([region.likelihood.slope(r, s)[:, None] * J,
-                                                                         _prior_slopes(prior, start.theta)]))]
-    fit = fit_blocks([start.theta], [first], [(low, high)], iterations, options.stride, since, np.ones(len(start.theta)))
+    first = rows(start.theta, r)
+    slopes = np.vstack([region.likelihood.slope(r, s)[:, None] * J, _prior_slopes(prior, start.theta)])
+    fit = fit_blocks([start.theta], [first], [(low, high)], iterations, options.stride, [Solved(start.theta, first, slopes)],
+                     np.ones(len(start.theta)))
     try:
         points = next(fit)
         while True:
-            hypotheses = [start.at(p[0]) for p in points]
-            answers = yield hypotheses
-            points = fit.send([[rows(h, left)] for h, left in zip(hypotheses, answers)])
-    except StopIteration as end:
-        (solved,) = end.value
-    there = start.at(solved.x)
-    left = seen[there.theta.tobytes()]
-    J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
-    return judged(region, options, there, left, J_there)
+            answers = yield [start.at(p[0]) for p in points]
+            seen += [(p[0], left) for p, left in zip(points, answers)]
+            points = fit.send([[rows(p[0], left)] for p, left in zip(points, answers)])
+    except StopIteration:
+        theta, left, J = _followed(seen, J, lambda theta, left: float(np.sum(np.square(rows(theta, left)))))
+    return judged(region, options, start.at(theta), left, J)
+
+
+def _measured(h: Hypothesis, r: Array, J: Array | None, stride: float) -> Asks[Array]:
+    """Slopes (n, k) of r, those that are not known by differences."""
+    k = len(h.theta)
+    J = np.full((len(r), k), np.nan) if J is None else J.copy()
+    unknown = np.flatnonzero(np.isnan(J).any(axis=0))
+    if len(unknown):
+        steps = steps_of(h.theta, *h.bounds(), stride, np.ones(k))
+        left = yield [h.at(h.theta + np.eye(k)[i] * steps[i]) for i in unknown]
+        J[:, unknown] = np.column_stack([(x - r) / steps[i] for i, x in zip(unknown, left)])
+    return J
+
+
+def _followed(seen: Sequence[tuple[Array, Array]], J: Array, cost: Callable[[Array, Array], float]) -> tuple[Array, Array, Array]:
+    """Of what a fit saw (theta, r), in its order: the best, what that leaves, and its slopes, from those at the first, J, by
+    differences where one number moved and by Broyden's rule where the fit went on."""
+    (at, r), *others = seen
+    J, least = J.copy(), cost(at, r)
+    for theta, left in others:
+        way, better = theta - at, cost(theta, left) < least
+        if np.count_nonzero(way) == 1:
+            k = int(np.flatnonzero(way)[0])
+            J[:, k] = (left - r) / way[k]
+        elif better and way.any():
+            J += np.outer(left - r - J @ way, way) / (way @ way)
+        if better:
+            at, r, least = theta, left, cost(theta, left)
+    return at, r, J
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
@@ -110,10 +135,11 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
     there, back = (np.clip(h.theta + way * moves, low, high) for way in (1, -1))
     left = np.array((yield [h.at(theta) for theta in (*there, *back)]))
     moved, answer = there - back, left[:len(signs)] - left[len(signs):]
-    J = np.linalg.lstsq(moved, answer, rcond=None)[0].T
+    J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
     chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
     precision = region.likelihood.precision(f.r, f.discrepancy)
-    return replace(f, J=J, too_much=float(precision @ chance) * np.linalg.pinv(moved.T @ moved))
+    scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
+    return replace(f, J=J, too_much=float(precision @ chance) * scatter)
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:

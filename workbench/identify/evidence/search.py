@@ -135,7 +135,7 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
                                      for f, m in wanted.values()])
     fits |= {f.hypothesis.key: f for f in tried}
     tried = sorted(tried, key=lambda f: -f.log_posterior)[:options.refined]
-    made = yield from side_by_side([_moved(region, options, f, wanted[f.hypothesis.key][1], k < 2 * options.beam)
+    made = yield from side_by_side([_moved(region, options, f, k < 2 * options.beam)
                                     for k, f in enumerate(tried)])
     fits = _with_better(fits, made)
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
@@ -162,14 +162,13 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move, anew: bool) -> Asks[Fitted]:
-    """A move that was tried, fitted, with the slopes that foretold it where they tell all its numbers. anew: once more with the
-    nominal law as it stands, as what was recalibrated for want of an effect may hold a fit where it is."""
-    shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
-    h = f.hypothesis
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, anew: bool) -> Asks[Fitted]:
+    """A move that was tried, fitted; slopes that lines did not tell are measured. anew: once more with the nominal law as it
+    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
+    h, J = f.hypothesis, np.where(f.J.any(axis=0), f.J, np.nan)
     nominal = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
-    parts = [fitting(region, options, h, f.discrepancy, options.iterations, f.r, None if shaped else f.J)]
-    parts += [fitting(region, options, nominal, f.discrepancy, options.iterations)] if anew else []
+    parts = [fitting(region, options, h, f.discrepancy, options.iterations, f.r, J)]
+    parts += [fitting(region, options, nominal, f.discrepancy, options.iterations, None, J)] if anew else []
     fits = yield from side_by_side(parts)
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
