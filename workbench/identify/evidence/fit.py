@@ -116,30 +116,61 @@ def _followed(seen: Sequence[tuple[Array, Array]], J: Array, cost: Callable[[Arr
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit gone on with at its own discrepancy, with slopes measured anew."""
-    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
+    """A fit gone on with at its own discrepancy by slopes that are regressed, over moves that get shorter: joints that stick make
+    a landscape of many small valleys, in which differences lead astray."""
+    s, spread = f.discrepancy, options.spread
+    while spread >= options.stride:
+        moves = yield from _moves(f.hypothesis, spread)
+        prior = Prior.of(f.hypothesis, options)
+        costs = [np.sum(np.square(region.likelihood.rows(left, s))) + np.sum(np.square(prior.rows(h.theta)))
+                 for h, left in moves.seen]
+        h, left = moves.seen[int(np.argmin(costs))]
+        here = float(np.sum(np.square(region.likelihood.rows(f.r, s))) + np.sum(np.square(prior.rows(f.hypothesis.theta))))
+        h, left = (h, left) if min(costs) < here else (f.hypothesis, f.r)
+        on = yield from fitting(region, options, h, s, 1, left, moves.slopes[0])
+        f, spread = max(f, on, key=lambda g: g.log_posterior), spread / 2
+    return f
 
 
 def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit with slopes J by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of a
-    Hadamard matrix, so that all moves tell each number (R. Plackett and J. Burman, Biometrika 33, 1946).
+    """A fit with slopes J by regression on moves of all its numbers at once, as far as `options.spread`.
 
     A joint that sticks answers a small move by chance, which differences of one number after the other take for slopes, and
     their square for information: two numbers that do the same would seem to be told apart, and both to be well known. What the
     moves leave unexplained says how much of it is chance, which is taken off (W. Fuller, Measurement error models, 1987).
     """
-    h, k = f.hypothesis, len(f.hypothesis.theta)
-    low, high = h.bounds()
-    signs = hadamard(1 << (4 * k).bit_length())[:, 1:k + 1]  # four and more pairs of moves to a number
-    moves = options.spread * np.linspace(0.5, 1.5, len(signs))[:, None] * signs  # each a different one, however few numbers
-    there, back = (np.clip(h.theta + way * moves, low, high) for way in (1, -1))
-    left = np.array((yield [h.at(theta) for theta in (*there, *back)]))
-    moved, answer = there - back, left[:len(signs)] - left[len(signs):]
-    J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
-    chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
+    moves = yield from _moves(f.hypothesis, options.spread, 4)
+    J, chance, scatter = moves.slopes
     precision = region.likelihood.precision(f.r, f.discrepancy)
-    scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
     return replace(f, J=J, too_much=float(precision @ chance) * scatter)
+
+
+@dataclass(frozen=True)
+class _Moves:
+    """Hypotheses with what they leave: m that were moved one way, then the same moved back."""
+
+    seen: list[tuple[Hypothesis, Array]]
+
+    @property
+    def slopes(self) -> tuple[Array, Array, Array]:
+        """Slopes (n, k) of what is left; the variance (n,) of what they do not explain; of the slopes by that (k, k)."""
+        m = len(self.seen) // 2
+        theta, left = np.array([h.theta for h, _ in self.seen]), np.array([r for _, r in self.seen])
+        moved, answer = theta[:m] - theta[m:], left[:m] - left[m:]
+        J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
+        chance = np.square(answer - moved @ J.T).sum(axis=0) / max(m - moved.shape[1], 1)
+        return J, chance, np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
+
+
+def _moves(h: Hypothesis, spread: float, to_a_number: int = 1) -> Asks[_Moves]:
+    """All numbers moved at once, forth and back: signs of a Hadamard matrix, so that all moves tell each number (R. Plackett and
+    J. Burman, Biometrika 33, 1946), at least so many pairs to a number."""
+    k = len(h.theta)
+    signs = hadamard(1 << (to_a_number * k).bit_length())[:, 1:k + 1]
+    moves = spread * np.linspace(0.5, 1.5, len(signs))[:, None] * signs  # each a different one, however few numbers
+    wanted = [h.at(np.clip(h.theta + move, *h.bounds())) for move in (*moves, *-moves)]
+    left = yield wanted
+    return _Moves(list(zip(wanted, left)))
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
