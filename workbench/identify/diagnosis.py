@@ -121,7 +121,7 @@ def _diagnosed(session: Session, config: SimulationConfig, began: float, progres
 
     if gap and is_by_logs(evidence):
         return _by_evidence(session, known.model, seen, evaluator, pool, nominal, build, missed, gap, unreadable, progress,
-                            began)
+                            began, {**engine, **apart})
 
     # 4. Which effects explain it: searched for on a part of long sessions, compared with their rivals, numbers refined
     looked_at = data_subset(rebalanced(evaluator.evidence, begun.residuals), begun.residuals)
@@ -157,11 +157,13 @@ def _diagnosed(session: Session, config: SimulationConfig, began: float, progres
 
 def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator: RolloutEvaluator, pool: Sequence[Candidate],
                  nominal: Fit, build: Geometry, missed: Sequence[DroppedCommands], gap: tuple[GapEntry, ...],
-                 unreadable: LeftOut, progress: Progress, began: float) -> DiagnosisResult:
-    """Steps 4 to 6 of servo logs, by evidence."""
+                 unreadable: LeftOut, progress: Progress, began: float, engine: Mapping[str, str | float]) -> DiagnosisResult:
+    """Steps 4 to 6 of servo logs, by evidence. engine: whose rollouts these are, and how far it is from Drake."""
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
     explained = explain(evaluator, known, pool, progress)
     fitted = explained.model
+    progress("judging the engine", None)
+    final = {BESIDE_DRAKE.format("final"): judged(evaluator, fitted, "final")}
     progress("rolling out the fitted model", None)
     steps = (2 * PROBLEM.fine, PROBLEM.fine)
     longer, after = evaluator.residuals([RolloutRequest(fitted, everywhere, step) for step in steps])
@@ -176,7 +178,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
         findings=findings, rejected=explained.losers(), unexplained=left,
         posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - began)
-        | {"seed": 0, "rollouts": evaluator.rollouts},
+        | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **final}},
         left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
     return DiagnosisResult(diagnosis, reports, explained.ties(), observation_models(evidence))

@@ -19,12 +19,12 @@ class EnginesPartError(ArithmeticError):
 
 
 def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
-    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of all takes. 0 where
-    rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its text."""
+    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of the takes' beginnings.
+    0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its text."""
     if evaluator.config.engine == "drake":
         return 0.0
     drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)
-    everywhere = [RolloutRequest(model, tuple(range(len(evaluator.evidence))))]
+    everywhere = [RolloutRequest(model, tuple(range(len(evaluator.evidence))), until=PROBLEM.engines_compared)]
     (ours,), (theirs,) = evaluator.residuals(everywhere), drake.residuals(everywhere)
     worst = 0.0
     for i, residual in ours.items():

@@ -72,6 +72,8 @@ class ProblemOptions:
     """More than a take has: numbers of stretches count on by as many from take to take."""
     engines_apart: float = 0.1
     """Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
+    engines_compared: float = 20.0
+    """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all."""
     heavy_trunk: float = 0.09
     """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
 

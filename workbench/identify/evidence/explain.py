@@ -29,7 +29,7 @@ from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
 from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.rollouts import Rollouts
-from workbench.identify.evidence.search import Found, lockstep, search, standing, without_names
+from workbench.identify.evidence.search import Found, gone_on, lockstep, search, standing, without_names
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
@@ -171,7 +171,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
             for c, gain in gains.items():
                 rejected.append(Rejected(c.name, c.where, SpokenAgainst(-gain)))
             found = tuple(without_names(f, gains) if i == k else f for i, f in enumerate(found))
-        rollouts = standing(rollouts, found)
+        rollouts, found = gone_on(rollouts, found, options, progress)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))

@@ -28,7 +28,8 @@ SETTLE = 0.02
 
 def residuals_of(evaluator: RolloutEvaluator, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
     """As `RolloutEvaluator.residuals`; of logs without shifting their start, which is known."""
-    if not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
+    by_drake = evaluator.config.engine == "drake"
+    if by_drake or not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
         return evaluator.residuals(questions)
     with ThreadPoolExecutor(evaluator.n_jobs) as pool:  # kernels hold no lock
         return list(pool.map(lambda q: _answer(evaluator, q), questions))

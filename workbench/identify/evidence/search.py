@@ -66,6 +66,13 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
     return rollouts, tuple(found)
 
 
+def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Report
+            ) -> tuple[Rollouts, tuple[Found, ...]]:
+    """The search gone on with from what was found, as after names were taken out."""
+    rollouts, on = _all_levels(standing(rollouts, found), list(found), options, False, report)
+    return rollouts, tuple(on)
+
+
 def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions, exploring: bool, report: Report
                 ) -> tuple[Rollouts, list[Found]]:
     """Level by level until no region's best fit has anything to be added, dropped or exchanged."""
