@@ -20,7 +20,8 @@ class EnginesPartError(ArithmeticError):
 
 def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
     """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of the takes' beginnings.
-    0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its text."""
+    0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its
+    text."""
     if evaluator.config.engine == "drake":
         return 0.0
     drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)
