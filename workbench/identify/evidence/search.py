@@ -126,8 +126,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that foretell most: those are tried by a step, the best of all fitted,
-    and the beam polished."""
+    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     for f in states:
@@ -138,12 +137,7 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    tried = yield from side_by_side([fitting(region, options, m.hypothesis, f.discrepancy, 1, None, m.J)
-                                     for f, m in wanted.values()])
-    fits |= {f.hypothesis.key: f for f in tried}
-    tried = sorted(tried, key=lambda f: -f.log_posterior)[:options.refined]
-    made = yield from side_by_side([_moved(region, options, f, k < 2 * options.beam)
-                                    for k, f in enumerate(tried)])
+    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
     fits = _with_better(fits, made)
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
@@ -169,14 +163,13 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, anew: bool) -> Asks[Fitted]:
-    """A move that was tried, fitted; slopes that lines did not tell are measured. anew: once more with the nominal law as it
-    stands, as what was recalibrated for want of an effect may hold a fit where it is."""
-    h, J = f.hypothesis, np.where(f.J.any(axis=0), f.J, np.nan)
-    nominal = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
-    parts = [fitting(region, options, h, f.discrepancy, options.iterations, f.r, J)]
-    parts += [fitting(region, options, nominal, f.discrepancy, options.iterations, None, J)] if anew else []
-    fits = yield from side_by_side(parts)
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
+    """A move fitted, with the slopes that foretold it, and those that lines do not tell measured; and once more with the nominal
+    law as it stands, as what was recalibrated for want of an effect may hold a fit where it is."""
+    h, J = m.hypothesis, np.where(m.J.any(axis=0), m.J, np.nan)
+    anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
+    fits = yield from side_by_side([fitting(region, options, start, f.discrepancy, options.iterations, None, J)
+                                    for start in (h, anew)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
