@@ -104,6 +104,7 @@ def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
     region = region.correlated(min(options.explored, region.correlation(r)))
     s = region.likelihood.discrepancy(r)
     fit = yield from fitting(region, options, h, s, options.iterations, r)
+    fit = yield from polished(region, options, fit)
     return region, fit
 
 
@@ -126,7 +127,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
+    """Some states extended, each by so many of the moves that foretell most: those are tried, and the best of all fitted."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     for f in states:
@@ -137,11 +138,10 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
-    fits = _with_better(fits, made)
-    ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
-    better = yield from side_by_side([polished(region, options, f) for f in ahead])
-    fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
+    tried = yield from side_by_side([_tried(region, options, f, m) for f, m in wanted.values()])
+    ahead = sorted(tried, key=lambda f: -f.log_posterior)[:options.refined]
+    made = yield from side_by_side([polished(region, options, f) for f in ahead])
+    fits = _with_better(fits, [*tried, *made, *(reduced(region, options, f) for f in made)])
     return Found(region, fits, found.extended | {f.hypothesis.key for f in states})
 
 
@@ -163,13 +163,12 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that foretold it, and those that lines do not tell measured; and once more with the nominal
-    law as it stands, as what was recalibrated for want of an effect may hold a fit where it is."""
-    h, J = m.hypothesis, np.where(m.J.any(axis=0), m.J, np.nan)
+def _tried(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
+    """A move by one step of a fit, with the slopes that foretold it; and by one from the nominal law as it stands, as what was
+    recalibrated for want of an effect may hold a fit where it is."""
+    h = m.hypothesis
     anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
-    fits = yield from side_by_side([fitting(region, options, start, f.discrepancy, options.iterations, None, J)
-                                    for start in (h, anew)])
+    fits = yield from side_by_side([fitting(region, options, start, f.discrepancy, 1, None, m.J) for start in (h, anew)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
