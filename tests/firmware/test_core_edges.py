@@ -309,8 +309,9 @@ def test_what_counts_as_moving_a_servo_through_the_bridge(sent: bytes, moved: bo
     assert sim.get("state") == (CHECK if moved else LIMP)
 
 
-def test_a_write_of_one_large_byte_is_answered_through_the_bridge() -> None:
+@pytest.mark.parametrize("sent", [packet(9, 3, bytes([27, 200])), b"\xff" + packet(9, 1)])
+def test_a_large_byte_or_a_third_ff_is_no_header_through_the_bridge(sent: bytes) -> None:
     sim = bridged()
-    sim.send(packet(9, 3, bytes([27, 200])))
+    sim.send(sent)
     sim.run(4)
     assert sim.received() == packet(9, 0)
