@@ -9,25 +9,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.firmware.native import LINK_PC, Sim, core, walk
-from tests.firmware.test_core_play import bridged, changed, goal_times, upload
+from tests.firmware.native import LINK_PC, Sim, core, until, walk
+from tests.firmware.test_core_play import changed, goal_times, upload
 from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame, upload_frames
 from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
-from workbench.device.virtual.protocol import packet
 from workbench.motion import PoseTable
 from workbench.robot import InputError
 
 TABLE = walk()
 LIMP, CHECK, NEUTRAL, PLAY = 1, 2, 4, 5
-
-
-def until(sim: Sim, wanted: set[int], most: int = 4000) -> int:
-    """Milliseconds until the state is one of these."""
-    for ms in range(most):
-        if sim.get("state") in wanted:
-            return ms
-        sim.run(1)
-    raise AssertionError(f"still {sim.get('state')} after {most} ms")
 
 
 @pytest.mark.parametrize(("held", "state"), [(19, NEUTRAL), (20, PLAY)])
@@ -64,17 +54,6 @@ def test_start_held_releases_after_1500_ms_and_once() -> None:
     sim.set("start", 0)
     sim.run(300)
     assert sim.get("state") == LIMP
-
-
-def test_the_bridge_ends_after_1000_ms() -> None:
-    sim = bridged()
-    sim.send(packet(9, 1))
-    assert until(sim, {LIMP}) == 1000
-    sim = bridged()
-    sim.run(970)
-    sim.send(packet(9, 1))
-    sim.run(990)
-    assert sim.get("state") == 8
 
 
 def reason_with(what: str, value: int, ms: int = 1900) -> int:
@@ -297,20 +276,3 @@ def test_data_beyond_the_size_that_was_said_are_refused() -> None:
     sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]
-
-
-@pytest.mark.parametrize(("sent", "moved"), [
-    (packet(9, 4, bytes([30, 88, 2])), True), (packet(9, 5), True), (packet(9, 3, bytes([24, 1])), True),
-    (packet(9, 3, bytes([47, 0])), False), (packet(9, 3, bytes([48, 40, 0])), False), (packet(9, 2, bytes([30, 2])), False)])
-def test_what_counts_as_moving_a_servo_through_the_bridge(sent: bytes, moved: bool) -> None:
-    sim = bridged()
-    sim.send(sent)
-    until(sim, {LIMP, CHECK})  # after silence: whoever was moved is asked where it is, and brought back
-    assert sim.get("state") == (CHECK if moved else LIMP)
-
-
-def test_a_write_of_one_large_byte_is_answered_through_the_bridge() -> None:
-    sim = bridged()
-    sim.send(packet(9, 3, bytes([27, 200])))
-    sim.run(4)
-    assert sim.received() == packet(9, 0)
