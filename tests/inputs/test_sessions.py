@@ -96,6 +96,17 @@ def test_a_frozen_body_is_a_warning_of_every_verb(arm: Path) -> None:
     assert len(found.warnings) == 1
 
 
+def test_a_motion_of_a_take_is_checked_as_alone(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    motion = arm / "motions" / "wave.csv"
+    head, *rows = motion.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    small = [",".join([time, *(f"{float(angle) / 57.3:.4f}" for angle in angles)]) for time, *angles in cells]
+    motion.write_text("\n".join([head, *small]) + "\n")
+    said = succeeds(capsys, "inspect", str(arm))
+    assert f"take 'wave': {motion}: no joint leaves" in said
+    assert "radians" in said
+
+
 def test_many_problems_are_one_line() -> None:
     assert summed_up(["a", "b", "c", "d"]) == "a; b; c (and 1 more: see workbench inspect)"
 
