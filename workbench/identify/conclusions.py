@@ -32,11 +32,14 @@ class ReadOff(Protocol):
     """An effect of one number that was read off the recordings: its mean and variance, in the contract's unit."""
 
     @property
-    def spec(self) -> EffectSpec: ...
+    def spec(self) -> EffectSpec:
+        """What was found, as the model takes it."""
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """Of its first parameter."""
     @property
-    def variance(self) -> float: ...
+    def variance(self) -> float:
+        """Of that mean."""
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:

@@ -47,6 +47,7 @@ class Race:
 
 
 def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    """Keeps the largest gain for each joint."""
     for j, gain in zip(joints, gains):
         best[j] = max(best.get(j, 0.0), gain)
 

@@ -196,7 +196,7 @@ def _odds(ratio: float) -> str:
 
 
 def listed(words: Sequence[str], last: str = "and") -> str:
-    """ "a, b and c". """
+    """As in: a, b and c."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 
