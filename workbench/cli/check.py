@@ -21,11 +21,15 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> None:
-    """Warns of a session's problems; InputError where a take lasts so long that it is mostly a slip, unless `yes`."""
+    """Warns of a session's problems; InputError where its takes cannot be used together, or where one lasts so long that it is
+    mostly a slip, unless `yes`."""
     from workbench.compare.file_problems import session_check
+    from workbench.robot import InputError
 
     found = session_check(session)
     warn(verb, found.warnings)
+    if found.refused:
+        raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from workbench.compare.options import FILES
 from workbench.compare.prediction import read_start
 from workbench.compare.session import PredictSpec, Session, TakeSpec
-from workbench.compare.session_takes import readable
+from workbench.compare.session_takes import capture_yaw, read_takes, readable
 from workbench.effects.apply import resolved
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
@@ -28,19 +28,21 @@ _ROUTINE = " unseen in "
 @dataclass(frozen=True)
 class SessionCheck:
     """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
-    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves."""
+    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves. refused: why no
+    verb can use the takes together."""
 
     problems: Mapping[str, Sequence[str]]
     longest: float
     longest_name: str
     damaged: frozenset[str] = frozenset()
+    refused: str | None = None
 
     @property
     def warnings(self) -> list[str]:
         """A line for each file with problems that are not routine, as gaps of cameras are."""
         out = []
         for of, lines in self.problems.items():
-            bad = [] if of in self.damaged else serious(lines)
+            bad = [] if of in self.damaged or (of == "takes" and self.refused) else serious(lines)
             out += [f"{of}: {summed_up(bad)}"] if bad else []
         return out
 
@@ -68,11 +70,24 @@ def session_check(session: Session) -> SessionCheck:
             except InputError as e:
                 found[name] = [str(e)]
                 damaged.add(name)
+    refused = _no_yaw(session) if any(f"take '{t.name}'" not in damaged for t in session.takes) else None
+    if refused:
+        found["takes"] = [refused]
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
         found["predict"] = ["no take tells the yaw of the capture: it is taken from where the bodies stand at the start, good to "
                             "some degrees; give the session's `yaw` [deg], or a captured take"]
     longest = max(seconds, key=lambda name: seconds[name])
-    return SessionCheck({of: lines for of, lines in found.items() if lines}, seconds[longest], longest, frozenset(damaged))
+    doubtful = {of: lines for of, lines in found.items() if lines}
+    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), refused)
+
+
+def _no_yaw(session: Session) -> str | None:
+    """Why the takes that cameras saw do not tell where the robot headed; None where they do, or the session does."""
+    try:
+        capture_yaw(session, read_takes(session)[0])
+    except InputError as e:
+        return str(e)
+    return None
 
 
 def model_problems_of(model: RobotModel, held: bool = False) -> list[str]:
@@ -167,8 +182,6 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    if len(recording.time) < FILES.fewest_frames:
-        out.insert(0, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
     return ([text] if (text := long_work(seconds)) else []) + out, seconds
 
 

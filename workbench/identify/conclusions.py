@@ -147,7 +147,7 @@ def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
     """Of an effect that was tried in a round and not taken."""
     best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
     if t.screened_out:
-        return ScreenedOut()
+        return ScreenedOut(*t.promised)
     if best is None:
         return TooLittle()
     return Outdone(best.candidate.name, best.candidate.where, best.gain["choose"], t.gain["choose"])

@@ -17,20 +17,21 @@ Array = NDArray[np.float64]
 class LeadChecks:
     """When a joint is said to precede its goal.
 
-    longest: leads and lags looked at [s]. rows: a lead is at least so many, as a row's goal may be sent after its position was
-    read. step: fineness of leads, in rows. better: RMS that the lead leaves of the position, in shares of what the best lag
-    leaves; near 1 for noise, and of a periodic motion, whose leads are lags, too (of 44 real logs, 0.6 says nothing of all, 0.75
-    of one). likeness: share of the position's variance that the lead explains. goes: a joint that moves less tells nothing [deg].
-    fewest: rows that tell.
+    longest: leads and lags looked at [s]; share: of the log, at most, whose ends are then not looked at. rows: a lead is at
+    least so many, as a row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS that
+    the lead leaves of the position, in shares of what the best lag leaves; near 1 for noise, and of a periodic motion, whose
+    leads are lags, too (of 44 real logs, 0.6 says nothing of all, 0.75 of one). likeness: share of the position's variance that
+    the lead explains. goes: a joint that moves less tells nothing [deg]. fewest: rows that tell.
     """
 
     longest: float = 0.4
+    share: float = 0.2
     rows: float = 1.5
     step: float = 0.5
     better: float = 0.6
     likeness: float = 0.9
     goes: float = 5.0
-    fewest: int = 40
+    fewest: int = 30
 
 
 LEADS = LeadChecks()
@@ -54,8 +55,10 @@ def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
 def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:
     """By how long positions (N,) [rad] precede goals (N,) [rad] at times (N,) [s]; None where they do not."""
     row = float(np.median(np.diff(time)))
-    lags = np.arange(-round(c.longest / (row * c.step)), round(c.longest / (row * c.step)) + 1) * row * c.step
-    inside = (time >= time[0] + c.longest) & (time <= time[-1] - c.longest)
+    most = min(c.longest, c.share * float(time[-1] - time[0]))
+    steps = round(most / (row * c.step))
+    lags = np.arange(-steps, steps + 1) * row * c.step
+    inside = (time >= time[0] + most) & (time <= time[-1] - most)
     if inside.sum() < c.fewest:
         return None
     left = np.array([_left(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])

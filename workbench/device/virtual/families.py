@@ -1,8 +1,10 @@
-"""Control tables of other families (ROBOTIS e-manual, XL330-M288-T; Feetech's STS memory table), for the same virtual servo."""
+"""Control tables of other families (ROBOTIS e-manual, XL330-M288-T and XL430-W250-T; Feetech's STS memory table), for the same
+virtual servo."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from workbench.device.virtual.protocol2 import Protocol2
 from workbench.device.virtual.registers import Register, VirtualProfile
@@ -69,6 +71,22 @@ XL330 = VirtualProfile(
         Register("present_temperature", 146, 1, 30, writable=False),
     ),
 )
+
+_OTHER_XL430 = {
+    r.name: r for r in (
+        Register("model_number", 0, 2, 1060, writable=False, eeprom=True), Register("baud_rate", 8, 1, 3, 0, 7, eeprom=True),
+        Register("temperature_limit", 31, 1, 72, 0, 100, eeprom=True),
+        Register("max_voltage_limit", 32, 2, 160, 60, 160, eeprom=True),
+        Register("min_voltage_limit", 34, 2, 60, 60, 160, eeprom=True),
+        Register("velocity_limit", 44, 4, 265, 0, 1023, eeprom=True),
+        Register("alarm_shutdown", 63, 1, 52, 0, 255, eeprom=True),
+        Register("position_p_gain", 84, 2, 800, 0, 16383), Register("goal_velocity", 104, 4, 0, 0, 265),
+        Register("present_voltage", 144, 2, 120, writable=False))}
+_XL430_RATES = (*_XL330_RATES, 4_500_000)
+XL430 = replace(
+    XL330, name="XL430-W250-T", bit_rate=lambda value: _XL430_RATES[value],
+    registers=tuple(_OTHER_XL430.get(r.name, r) for r in XL330.registers
+                    if r.name not in ("current_limit", "goal_current", "present_current")))  # it measures no current
 
 STS3215 = VirtualProfile(
     name="STS3215",

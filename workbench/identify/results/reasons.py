@@ -55,11 +55,16 @@ class WorseInPlace(Reason):
 
 @dataclass(frozen=True)
 class ScreenedOut(Reason):
-    """By its response alone, without a fit."""
+    """By its response alone, without a fit: what that takes off chi squared at its best, `gain`, and what the best rival's does,
+    `best`, on the stretches looked at."""
+
+    gain: float
+    best: float
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return "its signature is not that of what is missing"
+        takes = f"would take {self.gain:.0f} off chi squared at most" if self.gain >= 1 else "takes nothing off chi squared"
+        return f"its signature is not that of what is missing: it {takes}, the best rival's {self.best:.0f}"
 
 
 @dataclass(frozen=True)
