@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import struct
 import zlib
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from tests.firmware.native import LINK_PC, Sim, core, walk
-from tests.firmware.test_core_play import bridged, changed, upload
+from tests.firmware.test_core_play import bridged, changed, goal_times, upload
 from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame, upload_frames
 from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
 from workbench.device.virtual.protocol import packet
@@ -100,6 +101,21 @@ def test_a_dead_supply_that_still_answers_is_told_by_its_voltage_in_three_rounds
     assert 2 * 24 <= until(sim, {LIMP}) <= 4 * 24 + 5
 
 
+@pytest.mark.parametrize(("hangs", "raised"), [(0, 0), (3, 3), (14, 14), (20, 14)])
+def test_a_joint_that_hangs_is_brought_to_neutral_itself_and_let_down_from_there(hangs: int, raised: int) -> None:
+    sim = Sim(TABLE)
+    sim.run(100)
+    sim.set("hangs", hangs, 4)
+    goals = []
+    while sim.get("state") != NEUTRAL:
+        sim.run(5)
+        goals.append(sim.get("goal", 4))
+        assert len(goals) < 1000
+    assert max(goals[-140:]) == 512 + raised
+    assert goals[-1] == 512
+    assert goals[-140:].count(512 + raised) >= 60
+
+
 def test_a_servo_without_torque_limit_is_overloaded_even_without_the_alarm_bit() -> None:
     sim = Sim(TABLE)
     sim.play()
@@ -178,12 +194,31 @@ def test_first_pose_at_the_edge_of_reach() -> None:
         assert (sim.get("state"), sim.get("table_fault")) == (PLAY, fault)
 
 
+def walk_of(n: int, dwell: int) -> bytes:
+    """Two poses of a robot of n joints."""
+    goals = np.array([[500 + k for k in range(n)], [520 - k for k in range(n)]])
+    table = PoseTable(tuple(f"j{k}" for k in range(n)), goals, np.full((2, n), 100), np.array([dwell, dwell]))
+    return encode_table(TableFile(table, tuple(JointBounds(k + 1, low=400, high=600) for k in range(n))))
+
+
+def test_there_is_no_pause_before_every_servo_has_been_asked_for_its_new_goal() -> None:
+    """Eight joints are read in 11 ms, every 24 ms; where a pose falls into a round, the next begins at once."""
+    sim = Sim(walk_of(8, 103))
+    sim.play()
+    logs: list[LogMessage] = []
+    for _ in range(200):
+        sim.run(50)
+        logs += [m for m in sim.messages() if isinstance(m, LogMessage)]
+    poses = np.array(goal_times(sim)) * 1e-6
+    pauses = [after.time - log.time - log.duration for log, after in pairwise(logs)
+              if np.any((poses > log.time + 0.003) & (poses < log.time + log.duration - 0.003))]
+    assert len(pauses) > 10
+    assert max(pauses) <= 0.002
+
+
 def test_twenty_six_joints_walk_and_tell() -> None:
     n = 26
-    goals = np.array([[500 + k for k in range(n)], [520 - k for k in range(n)]])
-    table = PoseTable(tuple(f"j{k}" for k in range(n)), goals, np.full((2, n), 100), np.array([150, 150]))
-    data = encode_table(TableFile(table, tuple(JointBounds(k + 1, low=400, high=600) for k in range(n))))
-    sim = Sim(data)
+    sim = Sim(walk_of(n, 150))
     sim.play()
     sim.run(500)
     sim.received()
@@ -223,6 +258,18 @@ def test_torque_off_is_told_again_to_a_servo_that_missed_it_but_not_all_the_time
     offs = [sim.get("event_us", k) for k in range(sim.get("events")) if sim.get("event_kind", k) == 2]
     assert 2 <= len(offs) <= 6
     assert min(np.diff(offs)) >= 5000
+
+
+@pytest.mark.parametrize(("stray", "windows", "reason"), [(39, 6, 7), (40, 3, 7), (40, 4, 17)])
+def test_babble_is_40_bytes_in_each_of_four_windows_of_25_ms(stray: int, windows: int, reason: int) -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(25 - sim.get("us") // 1000 % 25 + 12)
+    for _ in range(windows):
+        sim.set("stray", sim.get("stray") + stray)
+        sim.run(25)
+    sim.run(50)
+    assert sim.get("reason") == reason
 
 
 @pytest.mark.parametrize(("few", "reason"), [(7, 7), (8, 15)])

@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from tests.firmware.native import LINK_PC, LINK_ZIGBEE, Sim, walk
-from workbench.device.link import AnswerMessage, ControllerState, FrameType, LogMessage, StateMessage, frame, upload_frames
+from workbench.device.link import (
+    AnswerMessage,
+    ControllerState,
+    FrameReader,
+    FrameType,
+    LogMessage,
+    StateMessage,
+    frame,
+    upload_frames,
+)
 from workbench.device.table_file import TableFile, decode_table, encode_table
 from workbench.device.virtual.protocol import packet
 from workbench.motion import PoseTable
@@ -319,12 +328,40 @@ def test_bridge_passes_packets_and_answers_and_keeps_ruinous_ones_back() -> None
     sim.send(packet(9, 3, bytes([30, 88, 2, 50, 0])))
     sim.run(900)
     assert sim.get("position", 6) == 600
-    for ruinous in (packet(254, 6), packet(254, 3, bytes([3, 9])), packet(254, 3, bytes([4, 1]))):
+    assert sim.received() == packet(9, 0)
+    for ruinous in (packet(254, 6), *(packet(254, i, bytes([at, 9])) for i in (3, 4) for at in (0, 3, 4))):
         sim.send(ruinous)
-    sim.send(packet(99, 1))
-    sim.run(10)
-    assert sim.received() == packet(9, 0)  # of the write
-    assert [sim.get("id", j) for j in range(3)] == [15, 13, 11]
+        sim.run(10)
+        assert on_the_bus(sim) == (9, 3)  # that write is still the last that was sent
+    for fine in (packet(254, 3, bytes([5, 0])), packet(9, 3, bytes([3, 9])), packet(99, 1)):
+        sim.send(fine)
+        sim.run(10)
+        assert on_the_bus(sim) == (fine[2], fine[4])
+    assert sim.received() == packet(9, 0)  # of the ID, which this robot's servos keep
+
+
+def on_the_bus(sim: Sim) -> tuple[int, int]:
+    """Servo and instruction of the last packet."""
+    return sim.get("sent", 2), sim.get("sent", 4)
+
+
+@pytest.mark.parametrize("wait", range(0, 26))
+def test_the_bridge_loses_no_packet_and_passes_on_no_answer_that_was_not_asked_for(wait: int) -> None:
+    """A read of the controller's own is under way when the bridge begins, or the answer to the packet before is not in."""
+    sim = Sim(TABLE)
+    sim.to_neutral()
+    sim.send(frame(FrameType.RELEASE))
+    sim.run(100 + wait)
+    sim.received()
+    sim.send(frame(FrameType.BRIDGE) + packet(9, 1))
+    sim.run(8)
+    said = sim.received()
+    assert said.endswith(packet(9, 0))
+    (answer,) = FrameReader().feed(said[said.rindex(b"\xa5\x5a"):-6])
+    assert answer.type == FrameType.ANSWER
+    sim.send(packet(9, 1) + packet(10, 2, bytes([3, 1])) + packet(8, 1))
+    sim.run(8)
+    assert sim.received() == packet(9, 0) + packet(10, 0, bytes([10])) + packet(8, 0)
 
 
 def test_bridge_ends_in_a_ramp_if_something_moved_and_just_lets_go_if_not() -> None:

@@ -218,7 +218,7 @@ def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
     budget, examined = Budget(), CertifyOptions(n_jobs=n_jobs)
     scale = effort / 4
     budget = replace(budget, seeds=round(budget.seeds * min(scale, 2.0)), generations=max(3, round(budget.generations * scale)),
-                     robust=max(3, round(budget.robust * scale)), draws=max(4, min(16, round(16 * scale))))
+                     robust=max(3, round(budget.robust * scale)), draws=4 if effort == 1 else budget.draws)
     if effort == 1:
         examined = replace(examined, draws=8, checked=0, seconds=4.0)
     return OptimizeOptions(budget, examined, seed, n_jobs)

@@ -19,6 +19,8 @@ STRAYING = ("drift", "curvature off the arc")
 """Limits that steering can keep."""
 STEERED = 2
 """How often a gait is steered before the next generation."""
+FEW = 3 / 8
+"""Share of the ensemble's robots on which half of a generation is tried, before the better half of that is tried on all."""
 Progress = Callable[[str, float | None], None]
 
 
@@ -121,7 +123,7 @@ class _Run:
         self._streak, self._robust, self.best, self.nearest = 0, True, None, None
         tried = self.evaluator.judged([r.best.shape for r in runs], self.budget.draws)
         self._note(tried)
-        first = min(range(len(runs)), key=lambda k: (not tried[k].draws, *tried[k].rank()))
+        first = _ordered(tried)[0]
         self.best = self.best or tried[first]
         return runs[first]
 
@@ -138,7 +140,7 @@ class _Run:
         return request.speed is not None and request.aim == "speed" and self._streak >= self.budget.enough
 
     def _note(self, candidates: list[Candidate]) -> None:
-        told = [c for c in candidates if c.draws or not self._robust]
+        told = [c for c in candidates if len(c.draws) >= self.budget.draws or not self._robust]
         for c in told:
             if self.best is None or c.rank() < self.best.rank():
                 self.best = c
@@ -177,14 +179,14 @@ class _Refiner:
         self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
 
     def generation(self, draws: int) -> None:
-        """One generation, on the nominal robot, and its better half on `draws` more."""
+        """One generation, on the nominal robot, and what is best of it on `draws` more."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
         judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
         judged = steered(run.evaluator, run.space, judged)
         if draws:
-            judged = run.evaluator.judged([c.shape for c in judged], draws, _better_half)
-        order = sorted(range(len(judged)), key=lambda k: (bool(draws) and not judged[k].draws, *judged[k].rank()))
+            judged = raced(run.evaluator, judged, draws)
+        order = _ordered(judged)
         cost = np.empty(len(judged))
         cost[order] = np.arange(len(judged))
         if "turn" in run.space.names:
@@ -228,6 +230,16 @@ def _straight(request: Request, c: Candidate, before: Candidate | None) -> float
     return c.shape.turn - excess * c.table.period * c.shape.duty
 
 
-def _better_half(candidates: list[Candidate]) -> list[Candidate]:
-    """The better half by what they do on the nominal robot."""
-    return sorted(candidates, key=Candidate.rank)[:(len(candidates) + 1) // 2]
+def raced(evaluator: Evaluator, candidates: list[Candidate], draws: int) -> list[Candidate]:
+    """The candidates with their better half tried on some robots of the ensemble, and the better half of that on `draws`."""
+    out = list(candidates)
+    for count, share in ((max(1, round(FEW * draws)), 2), (draws, 4)):
+        kept = _ordered(out)[:-(-len(out) // share)]
+        for k, c in zip(kept, evaluator.judged([out[k].shape for k in kept], count)):
+            out[k] = c
+    return out
+
+
+def _ordered(candidates: list[Candidate]) -> list[int]:
+    """Indices, the best first; one that was tried on more robots comes before others."""
+    return sorted(range(len(candidates)), key=lambda k: (-len(candidates[k].draws), *candidates[k].rank()))

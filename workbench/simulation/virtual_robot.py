@@ -87,8 +87,8 @@ class StationBody:
         return replace(take, time=take.time - started, starts_at=0.0)
 
     def _advance(self, now: int) -> None:
-        """Whole steps up to now; what servos were told in the same instant goes out as one command."""
-        target = int(self.time(now) / self.step + 1e-6) * self.step
+        """Whole steps up to the one nearest to now; what servos were told in the same instant goes out as one command."""
+        target = int(self.time(now) / self.step + 0.5) * self.step
         if target <= self._run.time + 1e-9:
             return
         if self._changed:
