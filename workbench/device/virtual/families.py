@@ -60,7 +60,7 @@ _XL430 = {name: keeps for name, keeps in _XL330.items() if name not in _NO_CURRE
     "alarm_shutdown": Kept(52, (0, 255)),
     "position_p_gain": Kept(800, (0, 16383)),
     "goal_velocity": Kept(0, (0, 265), at=(104, 4)),
-    "present_voltage": Kept(120),
+    "present_voltage": Kept(111),
 }
 _STS3215 = {
     "firmware_version": Kept(3),
