@@ -92,6 +92,12 @@ class RobotModel:
         return (*self.source.problems, *model_problems(self.path, self.source.source))
 
     @cached_property
+    def held_problems(self) -> tuple[str, ...]:
+        """As `problems`, of a robot whose base is always held: what the base weighs, and on what it stands, do not matter."""
+        about = tuple(text for text in self.source.problems if not text.startswith(f"link '{self.base}' has no <inertial>"))
+        return about + model_problems(self.path, self.source.source, self.base)
+
+    @cached_property
     def kinematics(self) -> Kinematics:
         """Tree of links and joints, with vectorised forward kinematics."""
         return Kinematics.from_file(self.path)

@@ -1,4 +1,4 @@
-"""Other families (ROBOTIS e-manual, XL330-M288-T; Feetech's STS memory table), for the same virtual servo."""
+"""Other families (ROBOTIS e-manual, XL330-M288-T, XL430-W250-T; Feetech's STS memory table), for the same virtual servo."""
 
 from __future__ import annotations
 
@@ -49,6 +49,19 @@ _XL330 = {
     "present_voltage": Kept(50),
     "present_temperature": Kept(30),
 }
+_NO_CURRENT = ("current_limit", "goal_current", "present_current")  # an XL-430 measures none
+_XL430 = {name: keeps for name, keeps in _XL330.items() if name not in _NO_CURRENT} | {
+    "model_number": Kept(1060),
+    "baud_rate": Kept(3, (0, 7)),
+    "temperature_limit": Kept(72, (0, 100)),
+    "max_voltage_limit": Kept(160, (60, 160)),
+    "min_voltage_limit": Kept(60, (60, 160)),
+    "velocity_limit": Kept(265, (0, 1023), at=(44, 4)),
+    "alarm_shutdown": Kept(52, (0, 255)),
+    "position_p_gain": Kept(800, (0, 16383)),
+    "goal_velocity": Kept(0, (0, 265), at=(104, 4)),
+    "present_voltage": Kept(111),
+}
 _STS3215 = {
     "firmware_version": Kept(3),
     "model_number": Kept(777),
@@ -89,4 +102,5 @@ _STS3215 = {
 }
 
 XL330 = emulated("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False)
+XL430 = emulated("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False)
 STS3215 = emulated("sts3215", "STS3215", 71, _STS3215, refresh=0.0, eeprom_lock=1)
