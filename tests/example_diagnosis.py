@@ -29,7 +29,7 @@ def diagnosis(model: RobotModel, verdict: Verdict = "explained", gaps: int = 8) 
         gap=tuple(GapEntry("structure", ("flm",), "walk", ((0.5 + k, 1.2 + k),), 2.0, 0.1, "deg", "stance") for k in range(gaps)),
         findings=(finding(),),
         rejected=(Rejected("coulomb_friction", ("flm",), Outdone("dead_band", ("flm",), 900.0, 40.0), Change(2.0, 1.9, "deg")),
-                  Rejected("payload", ("body_link",), ScreenedOut())),
+                  Rejected("payload", ("body_link",), ScreenedOut(12.0, 310.0))),
         unexplained=(Unexplained(("frb",), 0.6, 0.2, "deg", Dependence("a <take>", "frb", "angle", 0.6)),),
         next_experiment=NextExperiment("next_experiment.csv", "fixed", (("backlash", "joint_compliance"),)),
         provenance={"seed": 7, "seconds": 94.0}, left_out=(("trot", "line 9: the file is cut"),))

@@ -262,3 +262,14 @@ def test_a_count_shows_where_values_stay_though_rows_lie_between(tmp_path, model
     take = take_from_recording(recording, measurement, model, "log", "free")
     assert noise_of([take]).joints[joints[1]] == pytest.approx(count / np.sqrt(12), rel=0.01)
     assert channel_names(SimpleNamespace(recorded=take, model=model)) == joints  # its base is nowhere told
+
+
+def test_a_joint_that_never_moves_has_the_noise_of_its_kinds_count(tmp_path, model):
+    """What its servo would have told: 0 would make a gap of any number."""
+    count = 2 * np.pi / 4096
+    time = np.arange(0.0, 2.0, 0.02)
+    moving = np.cumsum(np.tile([1, 2, 3, -1, -2, -3], 17)[:len(time)]) * count  # no value stays for two rows
+    joints = model.joints[:2]
+    channels = {f"{what}.{joint}": values for what in ("goal", "position") for joint, values in zip(joints, (moving, 0 * time))}
+    measurement = register(read_recording(write_joint_log(tmp_path / "log.csv", time, channels)), model, None)
+    assert measurement.noise[joints[1]] == pytest.approx(count / np.sqrt(12), rel=0.01)

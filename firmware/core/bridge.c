@@ -4,7 +4,7 @@
 void bridge_begin(struct robot *r) {
     enter(r, STATE_BRIDGE, REASON_LINK, 0xFF);
     r->bridge.got = 0;
-    r->bridge.moved = false;
+    r->bridge.whole = r->bridge.asked = r->bridge.moved = false;
     r->bridge.heard = r->now;
     r->send_goals = r->send_release = false;
 }
@@ -39,16 +39,26 @@ static bool moves(const uint8_t *p) {
     return p[5] <= DXL_SPEED && p[5] + count > DXL_TORQUE;
 }
 
-static void forward(struct robot *r) {
+/* All bytes of a packet are there. Until it is sent no more are taken from the link. */
+static void take(struct robot *r) {
     struct bridge *b = &r->bridge;
-    uint32_t n = b->got, expected = answer_length(b->packet);
+    bool right = dxl_sum(b->packet, b->got) == b->packet[b->got - 1u];
+    if (right) b->heard = r->now;
+    b->whole = right && !ruinous(b->packet) && answer_length(b->packet) <= BUS_BYTES;
+    if (!b->whole) b->got = 0;
+}
+
+/* Called where the bus is free: what was under way when the bridge began, or the packet before, is over. */
+void bridge_send(struct robot *r) {
+    struct bridge *b = &r->bridge;
+    if (!b->whole) return;
+    uint32_t n = b->got;
     b->got = 0;
-    if (dxl_sum(b->packet, n) != b->packet[n - 1u]) return;
-    b->heard = r->now;
-    if (ruinous(b->packet) || expected > BUS_BYTES || !bus_free(&r->bus)) return;
+    b->whole = false;
+    b->asked = true;
     b->moved = b->moved || moves(b->packet);
     memcpy(r->bus.tx, b->packet, n);
-    bus_ask(&r->bus, n, expected, BRIDGE_TIMEOUT_MS, r->now);
+    bus_ask(&r->bus, n, answer_length(b->packet), BRIDGE_TIMEOUT_MS, r->now);
 }
 
 void bridge_feed(struct robot *r, uint8_t byte) {
@@ -60,9 +70,12 @@ void bridge_feed(struct robot *r, uint8_t byte) {
     if (b->got == 2u && byte == 0xFF) return;
     b->packet[b->got++] = byte;
     if (b->got == 4u && (byte < 2u || byte + 4u > BUS_BYTES)) b->got = 0;
-    if (b->got > 4u && b->got == b->packet[3] + 4u) forward(r);
+    if (b->got > 4u && b->got == b->packet[3] + 4u) take(r);
 }
 
+/* What answers a read of our own, asked before the bridge began, is none of the PC's. */
 void bridge_answer(struct robot *r) {
+    if (!r->bridge.asked) return;
+    r->bridge.asked = false;
     for (uint32_t k = 0; k < r->bus.rx_length; k++) ring_put(&r->link[LINK_PC].tx, r->bus.rx[k]);
 }

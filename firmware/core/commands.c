@@ -106,8 +106,9 @@ void commands_bytes(struct robot *r) {
     for (uint8_t link = 0; link < LINKS; link++) {
         struct links *l = &r->link[link];
         for (uint32_t k = 0; k < 16u && ring_used(&l->rx); k++) {
-            uint8_t byte = ring_get(&l->rx);
             bool bridged = link == LINK_PC && r->state == STATE_BRIDGE;
+            if (bridged && r->bridge.whole) break;
+            uint8_t byte = ring_get(&l->rx);
             if (link == LINK_ZIGBEE) remote(r, byte);
             if (bridged) bridge_feed(r, byte);
             if (!frame_feed(&l->reader, byte)) continue;

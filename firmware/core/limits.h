@@ -37,6 +37,9 @@
 #define RAMP_SPARE_MS 2000u   /* beyond the time that a ramp should take */
 #define RAMP_TOLERANCE 30u    /* counts, 9 degrees: droop under the robot's own weight is 2 degrees */
 
+#define SEAT_COUNTS 14        /* 4 degrees: what a joint is told more than neutral before it is let down onto its droop */
+#define SEAT_MS 300u          /* for each of the two; friction lets go slowly */
+
 #define BUTTON_MS 20u         /* a button is pressed once it has been so for this long */
 #define HELD_MS 1500u         /* START held this long releases at once */
 #define REMOTE_MS 1000u       /* two equal words of the remote within this are one press */

@@ -27,6 +27,7 @@ void ramp_to(struct robot *r, const uint16_t *goals, uint8_t state, uint8_t afte
     }
     r->state = state;
     r->after = after;
+    r->seating = SEAT_NOT;
     r->state_told = false;
     r->ramp_ends = r->now + longest * 1000u * 1000u / (RAMP_SPEED * SPEED_MILLI);
     new_goals(r);
@@ -117,12 +118,34 @@ static bool arrived(const struct robot *r) {
     return true;
 }
 
+/* Before it holds neutral each joint is brought there itself, by as much beyond as it hangs below; then all are told neutral. So they
+   rest where they fall to from there, whatever they came from: friction would hold them elsewhere. False once that is over. */
+static bool seat(struct robot *r) {
+    bool moved = false;
+    if (r->seating == SEAT_DONE) return false;
+    for (uint32_t j = 0; j < r->joints; j++) {
+        int32_t neutral = table_neutral(playing(r), j), goal = neutral, by = neutral - (int32_t)r->servo[j].position;
+        if (r->seating == SEAT_NOT) goal += by > SEAT_COUNTS ? SEAT_COUNTS : by < -SEAT_COUNTS ? -SEAT_COUNTS : by;
+        if (goal < table_low(playing(r), j)) goal = table_low(playing(r), j);
+        if (goal > table_high(playing(r), j)) goal = table_high(playing(r), j);
+        moved = moved || goal != (int32_t)r->goals[j];
+        r->goals[j] = (uint16_t)goal;
+        r->speeds[j] = RAMP_SPEED;
+    }
+    r->seating++;
+    if (!moved) return false;
+    r->ramp_ends = r->now + SEAT_MS;
+    new_goals(r);
+    return true;
+}
+
 /* After every round of readings: has a ramp come to its end? */
 void motion_round(struct robot *r) {
     if (r->state != STATE_RAMP && r->state != STATE_STOP && r->state != STATE_YIELD) return;
     int32_t late = (int32_t)(r->now - r->ramp_ends);
     if (late < 0) return;
     if (arrived(r)) {
+        if (r->after == STATE_NEUTRAL && seat(r)) return;
         if (r->after == STATE_PLAY) begin_play(r);
         enter(r, r->after, r->reason, r->servo_named);
     } else if (late > (int32_t)RAMP_SPARE_MS) {

@@ -13,7 +13,6 @@ void read_begin(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
         struct servo *s = &r->servo[j];
         s->missed = s->garbled = s->hot = s->overloaded = 0;
-        s->fresh = false;
     }
 }
 

@@ -38,7 +38,11 @@ static void answer(struct robot *r) {
 
 static void next(struct robot *r) {
     if (r->joints == 0) return;
-    if (r->state == STATE_BRIDGE || motion_send(r)) return;
+    if (r->state == STATE_BRIDGE) {
+        bridge_send(r);
+        return;
+    }
+    if (motion_send(r)) return;
     r->sending_read = read_next(r);
 }
 

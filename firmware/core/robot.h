@@ -29,6 +29,8 @@ enum reason {
     REASON_HELD, REASON_BRIDGE_SILENT, REASON_BAD_TABLE, REASON_MOVED_BY_HAND, REASONS
 };
 
+enum seating { SEAT_NOT, SEAT_ABOVE, SEAT_DONE }; /* how far the last of the way to neutral has come */
+
 enum reaction { GO_ON, YIELD, RELEASE };
 
 struct servo {
@@ -52,6 +54,8 @@ enum { LINK_PC, LINK_ZIGBEE, LINKS };
 
 struct bridge {
     uint8_t packet[BUS_BYTES], got;
+    bool whole;            /* a packet waits for the bus */
+    bool asked;            /* what is under way on the bus is the PC's */
     bool moved;            /* torque or goals went through: silence ends in a ramp */
     uint32_t heard;
 };
@@ -78,6 +82,7 @@ struct robot {
     bool send_goals, send_release, sending_read;
     uint8_t resends;
     uint32_t ramp_ends;
+    uint8_t seating;
 
     uint32_t turn, tries, sweep_started, failed_row, garbled_row;
     uint8_t check_for; /* what follows when every servo has been asked: a ramp to hold, or one to let go */
@@ -124,6 +129,7 @@ void tell_state(struct robot *r);                                             /*
 void tell_log(struct robot *r);
 void bridge_begin(struct robot *r);                                           /* bridge.c */
 void bridge_feed(struct robot *r, uint8_t byte);
+void bridge_send(struct robot *r);
 void bridge_answer(struct robot *r);
 void bridge_tick(struct robot *r);
 void bridge_end(struct robot *r, uint8_t reason);

@@ -10,7 +10,8 @@ void sim_free(struct sim *s) { free(s); }
 static uint32_t *number(struct sim *s, const char *what) {
     const struct { const char *name; uint32_t *at; } fields[] = {
         {"poses", &s->poses}, {"goal_errors", &s->goal_errors}, {"wrong_longest", &s->wrong_longest}, {"events", &s->events},
-        {"flip_to", &s->flip_to}, {"flip_from", &s->flip_from}, {"cycle", &s->r.cycle}, {"pose", &s->r.pose}};
+        {"flip_to", &s->flip_to}, {"flip_from", &s->flip_from}, {"cycle", &s->r.cycle}, {"pose", &s->r.pose},
+        {"stray", &s->r.bus.stray}};
     for (size_t k = 0; k < sizeof fields / sizeof *fields; k++)
         if (!strcmp(what, fields[k].name)) return fields[k].at;
     return NULL;
@@ -19,7 +20,7 @@ static uint32_t *number(struct sim *s, const char *what) {
 static uint8_t *byte_of(struct sim *s, const char *what, uint32_t k) {
     const struct { const char *name; uint8_t *at; } fields[] = {
         {"state", &s->r.state}, {"reason", &s->r.reason}, {"servo_named", &s->r.servo_named}, {"table_fault", &s->r.table_fault},
-        {"volts", &s->volts}, {"heat", &s->servo[k].heat}, {"drop", &s->servo[k].drop}, {"glitch", &s->glitch}, {"torque", &s->servo[k].table[DXL_TORQUE]},
+        {"volts", &s->volts}, {"heat", &s->servo[k].heat}, {"drop", &s->servo[k].drop}, {"hangs", &s->servo[k].hangs}, {"glitch", &s->glitch}, {"torque", &s->servo[k].table[DXL_TORQUE]},
         {"slope", &s->servo[k].table[28]}, {"model", &s->servo[k].table[DXL_MODEL]}, {"id", &s->servo[k].table[DXL_ID]},
         {"upload_state", &s->r.upload.state}};
     for (size_t i = 0; i < sizeof fields / sizeof *fields; i++)
@@ -45,6 +46,7 @@ uint64_t sim_get(struct sim *s, const char *what, uint32_t k) {
     if (!strcmp(what, "event_pose")) return s->log[k].pose;
     if (!strcmp(what, "event_resends")) return s->log[k].resends;
     if (!strcmp(what, "us")) return s->us;
+    if (!strcmp(what, "sent")) return s->r.bus.tx[k];
     if (number(s, what)) return *number(s, what);
     if (byte_of(s, what, k)) return *byte_of(s, what, k);
     return flag(s, what, k) ? *flag(s, what, k) : UINT64_MAX;

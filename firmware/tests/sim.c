@@ -66,7 +66,7 @@ static void store(struct sim *s, struct sim_servo *v, uint32_t address, const ui
 }
 
 static void sense(struct sim *s, struct sim_servo *v) {
-    put16(v->table + DXL_POSITION, (uint32_t)(v->milli / 1000));
+    put16(v->table + DXL_POSITION, (uint32_t)(v->milli / 1000) - v->hangs);
     v->table[DXL_VOLTS] = (uint8_t)(s->volts - v->drop);
     v->table[DXL_HEAT] = v->heat;
 }

@@ -10,6 +10,7 @@ struct sim_servo {
     bool powered, mute, twin, overload;
     bool held;     /* something is in its way: it does not move */
     uint8_t heat, drop; /* deg C; 0.1 V less than the others have */
+    uint8_t hangs;      /* counts by which its load holds it below its goal */
 };
 
 enum { LOG_GOALS = 1, LOG_OFF = 2, LOG_STATE = 3 };

@@ -57,7 +57,7 @@ def test_every_goal_is_right_to_a_count_and_in_time(tmp_path, family):
         k = commands.column(joint)
         for t, goal in zip(commands.times, commands.goals[:, k]):
             at = result.started + t
-            assert any(value == bus.profile.position(goal) and 0 <= when - at < 2e-3 for when, value in written), (joint, t)
+            assert any(value == bus.profile.position(goal) and abs(when - at) < 1e-3 for when, value in written), (joint, t)
     assert limp(r)
 
 

@@ -7,12 +7,14 @@ from tests.firmware.image import needs_compiler
 from workbench.robot import EffectSpec
 
 
-def test_a_worn_gear_and_a_register_of_an_arm_are_named(tmp_path):
-    """The gear by what it does, the register by itself."""
+def test_a_worn_gear_and_two_registers_of_an_arm_are_named(tmp_path):
+    """The gear by what it does, the registers by themselves."""
     worn = EffectSpec("coulomb_friction", ("two",), {"torque": 0.2})
-    verdict, found = named(of_an_arm(tmp_path, (worn,), margins={"one": 3}))
+    set_so = {"one": {"compliance_margin": 3}, "three": {"compliance_slope": 64}}
+    verdict, found = named(of_an_arm(tmp_path, (worn,), registers=set_so))
     assert ("coulomb_friction", ("two",)) in found
     assert found["dead_band", ("one",)] > 0.95
+    assert found["servo_gain", ("three",)] > 0.95
     assert verdict != "no_gap"
 
 

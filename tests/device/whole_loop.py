@@ -92,11 +92,11 @@ ARM_MOTION = Motion("wave", np.array([0.0, 0.35, 0.6, 0.85, 1.2, 1.45, 1.8]), ("
                                 [0, 0, 0]]))
 
 
-def of_an_arm(folder: Path, effects, cycles=2, seed=3, margins=()):
-    """By `run`, on a robot of three joints that a stand holds. margins: compliance margins that somebody set, by joint."""
+def of_an_arm(folder: Path, effects, cycles=2, seed=3, registers=()):
+    """By `run`, on a robot of three joints that a stand holds. registers: what somebody set, by joint, as keys of servo.yaml."""
     bodies = {"Trunk": "trunk", "Upper": "upper", "Middle": "middle", "Lower": "lower"}
     model = replace(arm(folder), rigid_bodies=bodies)
-    servos = {j: replace(model.servo(j), compliance_margin=dict(margins).get(j, 1)) for j in model.joints}
+    servos = {j: replace(model.servo(j), **dict(registers).get(j, {})) for j in model.joints}
     robot = VirtualRobot(replace(model, effects=effects, servos=servos), "fixed")
     bus = Bus(robot.port, robot.profile)
     done = run_on_robot(bus, model, ARM_MOTION, cycles, folder, lambda: "", base="fixed", virtual=robot, seed=seed)

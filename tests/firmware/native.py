@@ -123,3 +123,12 @@ def cell(fault: int, seed: int, table: bytes, watch_ms: int, sim: Sim) -> CellRu
     started = sim.lib.cell_run(sim.p, ctypes.byref(run))
     assert started == 0, f"fault {fault}, seed {seed}: never walked"
     return run
+
+
+def until(sim: Sim, wanted: set[int], most: int = 4000) -> int:
+    """Milliseconds until the state is one of these."""
+    for ms in range(most):
+        if sim.get("state") in wanted:
+            return ms
+        sim.run(1)
+    raise AssertionError(f"still {sim.get('state')} after {most} ms")

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import struct
 import zlib
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from tests.firmware.native import LINK_PC, Sim, core, walk
-from tests.firmware.test_core_play import bridged, changed, upload
+from tests.firmware.native import LINK_PC, Sim, core, until, walk
+from tests.firmware.test_core_play import changed, goal_times, upload
 from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame, upload_frames
 from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
-from workbench.device.virtual.protocol import packet
 from workbench.motion import PoseTable
 from workbench.robot import InputError
 
 TABLE = walk()
 LIMP, CHECK, NEUTRAL, PLAY = 1, 2, 4, 5
-
-
-def until(sim: Sim, wanted: set[int], most: int = 4000) -> int:
-    """Milliseconds until the state is one of these."""
-    for ms in range(most):
-        if sim.get("state") in wanted:
-            return ms
-        sim.run(1)
-    raise AssertionError(f"still {sim.get('state')} after {most} ms")
 
 
 @pytest.mark.parametrize(("held", "state"), [(19, NEUTRAL), (20, PLAY)])
@@ -65,17 +56,6 @@ def test_start_held_releases_after_1500_ms_and_once() -> None:
     assert sim.get("state") == LIMP
 
 
-def test_the_bridge_ends_after_1000_ms() -> None:
-    sim = bridged()
-    sim.send(packet(9, 1))
-    assert until(sim, {LIMP}) == 1000
-    sim = bridged()
-    sim.run(970)
-    sim.send(packet(9, 1))
-    sim.run(990)
-    assert sim.get("state") == 8
-
-
 def reason_with(what: str, value: int, ms: int = 1900) -> int:
     sim = Sim(TABLE)
     sim.play()
@@ -98,6 +78,21 @@ def test_a_dead_supply_that_still_answers_is_told_by_its_voltage_in_three_rounds
     sim.run(400)
     sim.set("volts", 60)
     assert 2 * 24 <= until(sim, {LIMP}) <= 4 * 24 + 5
+
+
+@pytest.mark.parametrize(("hangs", "raised"), [(0, 0), (3, 3), (14, 14), (20, 14)])
+def test_a_joint_that_hangs_is_brought_to_neutral_itself_and_let_down_from_there(hangs: int, raised: int) -> None:
+    sim = Sim(TABLE)
+    sim.run(100)
+    sim.set("hangs", hangs, 4)
+    goals = []
+    while sim.get("state") != NEUTRAL:
+        sim.run(5)
+        goals.append(sim.get("goal", 4))
+        assert len(goals) < 1000
+    assert max(goals[-140:]) == 512 + raised
+    assert goals[-1] == 512
+    assert goals[-140:].count(512 + raised) >= 60
 
 
 def test_a_servo_without_torque_limit_is_overloaded_even_without_the_alarm_bit() -> None:
@@ -178,12 +173,31 @@ def test_first_pose_at_the_edge_of_reach() -> None:
         assert (sim.get("state"), sim.get("table_fault")) == (PLAY, fault)
 
 
+def walk_of(n: int, dwell: int) -> bytes:
+    """Two poses of a robot of n joints."""
+    goals = np.array([[500 + k for k in range(n)], [520 - k for k in range(n)]])
+    table = PoseTable(tuple(f"j{k}" for k in range(n)), goals, np.full((2, n), 100), np.array([dwell, dwell]))
+    return encode_table(TableFile(table, tuple(JointBounds(k + 1, low=400, high=600) for k in range(n))))
+
+
+def test_there_is_no_pause_before_every_servo_has_been_asked_for_its_new_goal() -> None:
+    """Eight joints are read in 11 ms, every 24 ms; where a pose falls into a round, the next begins at once."""
+    sim = Sim(walk_of(8, 103))
+    sim.play()
+    logs: list[LogMessage] = []
+    for _ in range(200):
+        sim.run(50)
+        logs += [m for m in sim.messages() if isinstance(m, LogMessage)]
+    poses = np.array(goal_times(sim)) * 1e-6
+    pauses = [after.time - log.time - log.duration for log, after in pairwise(logs)
+              if np.any((poses > log.time + 0.003) & (poses < log.time + log.duration - 0.003))]
+    assert len(pauses) > 10
+    assert max(pauses) <= 0.002
+
+
 def test_twenty_six_joints_walk_and_tell() -> None:
     n = 26
-    goals = np.array([[500 + k for k in range(n)], [520 - k for k in range(n)]])
-    table = PoseTable(tuple(f"j{k}" for k in range(n)), goals, np.full((2, n), 100), np.array([150, 150]))
-    data = encode_table(TableFile(table, tuple(JointBounds(k + 1, low=400, high=600) for k in range(n))))
-    sim = Sim(data)
+    sim = Sim(walk_of(n, 150))
     sim.play()
     sim.run(500)
     sim.received()
@@ -225,6 +239,18 @@ def test_torque_off_is_told_again_to_a_servo_that_missed_it_but_not_all_the_time
     assert min(np.diff(offs)) >= 5000
 
 
+@pytest.mark.parametrize(("stray", "windows", "reason"), [(39, 6, 7), (40, 3, 7), (40, 4, 17)])
+def test_babble_is_40_bytes_in_each_of_four_windows_of_25_ms(stray: int, windows: int, reason: int) -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(25 - sim.get("us") // 1000 % 25 + 12)
+    for _ in range(windows):
+        sim.set("stray", sim.get("stray") + stray)
+        sim.run(25)
+    sim.run(50)
+    assert sim.get("reason") == reason
+
+
 @pytest.mark.parametrize(("few", "reason"), [(7, 7), (8, 15)])
 def test_the_battery_is_low_where_more_than_half_of_the_servos_say_so(few: int, reason: int) -> None:
     sim = Sim(TABLE)
@@ -250,20 +276,3 @@ def test_data_beyond_the_size_that_was_said_are_refused() -> None:
     sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]
-
-
-@pytest.mark.parametrize(("sent", "moved"), [
-    (packet(9, 4, bytes([30, 88, 2])), True), (packet(9, 5), True), (packet(9, 3, bytes([24, 1])), True),
-    (packet(9, 3, bytes([47, 0])), False), (packet(9, 3, bytes([48, 40, 0])), False), (packet(9, 2, bytes([30, 2])), False)])
-def test_what_counts_as_moving_a_servo_through_the_bridge(sent: bytes, moved: bool) -> None:
-    sim = bridged()
-    sim.send(sent)
-    until(sim, {LIMP, CHECK})  # after silence: whoever was moved is asked where it is, and brought back
-    assert sim.get("state") == (CHECK if moved else LIMP)
-
-
-def test_a_write_of_one_large_byte_is_answered_through_the_bridge() -> None:
-    sim = bridged()
-    sim.send(packet(9, 3, bytes([27, 200])))
-    sim.run(4)
-    assert sim.received() == packet(9, 0)

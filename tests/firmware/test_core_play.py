@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from tests.firmware.native import LINK_PC, LINK_ZIGBEE, Sim, walk
-from workbench.device.link import AnswerMessage, ControllerState, FrameType, LogMessage, StateMessage, frame, upload_frames
+from workbench.device.link import (
+    AnswerMessage,
+    ControllerState,
+    FrameType,
+    LogMessage,
+    StateMessage,
+    frame,
+    upload_frames,
+)
 from workbench.device.table_file import TableFile, decode_table, encode_table
-from workbench.device.virtual.protocol import packet
 from workbench.motion import PoseTable
 
 TABLE = walk()
@@ -293,69 +300,6 @@ def test_only_whole_and_fitting_uploads_ever_play() -> None:
 def test_only_whole_and_fitting_uploads_ever_play_of_ten_thousand() -> None:
     for seed in range(10):
         uploads(1000, seed)
-
-
-def bridged(seed: int = 0) -> Sim:
-    sim = Sim(TABLE, seed=seed)
-    sim.to_neutral()
-    sim.send(frame(FrameType.RELEASE))
-    sim.run(100)
-    sim.send(frame(FrameType.BRIDGE))
-    sim.run(10)
-    assert sim.get("state") == 8
-    sim.received()
-    return sim
-
-
-def test_bridge_passes_packets_and_answers_and_keeps_ruinous_ones_back() -> None:
-    sim = bridged()
-    sim.send(packet(9, 1))
-    sim.run(3)
-    assert sim.received() == packet(9, 0)
-    sim.send(packet(9, 2, bytes([36, 2])))
-    sim.run(3)
-    answer = sim.received()
-    assert answer[:5] == bytes([0xFF, 0xFF, 9, 4, 0])
-    sim.send(packet(9, 3, bytes([30, 88, 2, 50, 0])))
-    sim.run(900)
-    assert sim.get("position", 6) == 600
-    for ruinous in (packet(254, 6), packet(254, 3, bytes([3, 9])), packet(254, 3, bytes([4, 1]))):
-        sim.send(ruinous)
-    sim.send(packet(99, 1))
-    sim.run(10)
-    assert sim.received() == packet(9, 0)  # of the write
-    assert [sim.get("id", j) for j in range(3)] == [15, 13, 11]
-
-
-def test_bridge_ends_in_a_ramp_if_something_moved_and_just_lets_go_if_not() -> None:
-    sim = bridged()
-    sim.send(packet(9, 3, bytes([30, 88, 2, 50, 0])))
-    sim.run(600)
-    sim.send(packet(9, 1))
-    sim.run(1100)
-    assert (sim.get("state"), sim.get("reason")) == (7, 22)
-    sim.run(3000)
-    assert sim.get("state") == 1
-    assert abs(sim.get("position", 6) - 512) < 20
-    assert not any(sim.get("torque", j) for j in range(15))
-    sim = bridged()
-    sim.send(packet(9, 1))
-    sim.run(1100)
-    assert (sim.get("state"), sim.get("reason")) == (1, 22)
-    sim = bridged()
-    sim.send(frame(FrameType.BRIDGE_END))
-    sim.run(20)
-    assert sim.get("state") == 1
-
-
-def test_bridge_is_refused_while_torque_is_on() -> None:
-    sim = Sim(TABLE)
-    sim.play()
-    sim.messages()
-    sim.send(frame(FrameType.BRIDGE))
-    sim.run(5)
-    assert sim.get("state") == 5
-    assert not next(m for m in sim.messages() if isinstance(m, AnswerMessage)).well
 
 
 def test_state_is_told_when_it_changes_and_when_asked() -> None:

@@ -172,54 +172,6 @@ def test_after_any_reset_it_stands_still_and_says_why(how: str) -> None:
     assert any(m.state == ControllerState.NEUTRAL for m in robot.messages() if isinstance(m, StateMessage))
 
 
-@pytest.mark.parametrize(("fault", "reason"), [
-    ("mute", "a servo is silent"), ("hot", "a servo is hot"), ("babble", "somebody babbles on the bus")])
-def test_a_fault_on_the_wire_is_met_as_in_the_core(fault: str, reason: str) -> None:
-    fault_in_image(fault, reason, 1)
-
-
-def fault_in_image(fault: str, reason: str, seed: int) -> None:
-    robot = Robot(seed)
-    robot.play()
-    rng = np.random.default_rng(seed)
-    robot.run(float(rng.uniform(50, 1500)))
-    at, servo = robot.clock.now, robot.servos[int(rng.choice(IDS))]
-    if fault == "mute":
-        servo.mute = True
-    elif fault == "overload":
-        servo.overload = True
-    elif fault == "hot":
-        servo.temperature = 66.0
-    elif fault == "low":
-        robot.bus.supply = 9.2
-    elif fault == "dead":
-        for each in robot.servos.values():
-            each.power(False)
-    elif fault == "babble":
-        def babble() -> None:
-            robot.bus.talk("babbler", rng.bytes(32), 1_000_000, robot.clock.now)
-
-        for k in range(700):
-            robot.clock.at(at + k * 330 * MICROSECOND, babble)
-    bound = 2000 if fault in ("hot", "low") else 300
-    robot.run(bound + 5)
-    told = [m for m in robot.messages() if isinstance(m, StateMessage) and m.time > at / SECOND]
-    assert [m.reason for m in told[:1]] == [reason]
-    reactions = (t for t, p in robot.ear.packets if p[4] == 3 or (p[4] == 0x83 and {g for g, _ in goals_of(p)} == {512}))
-    first = next(t for t in reactions if t > at)
-    assert first <= at + bound * MILLISECOND
-    robot.sound()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("fault", "reason"), [
-    ("mute", "a servo is silent"), ("hot", "a servo is hot"), ("babble", "somebody babbles on the bus"),
-    ("overload", "a servo is overloaded"), ("low", "the battery is low"), ("dead", "the servos' supply is dead")])
-def test_faults_on_the_wire_at_twenty_moments(fault: str, reason: str) -> None:
-    for seed in range(20):
-        fault_in_image(fault, reason, seed)
-
-
 def test_flips_in_both_directions_stop_nothing_and_every_goal_is_put_right() -> None:
     flips(8)
 

@@ -90,7 +90,9 @@ def test_a_session_is_compared_with_footfalls(session: Path, tmp_path: Path, cap
 
 
 @pytest.mark.parametrize("arguments", [
-    ("inspect", "package://fox/fox.sdf"), ("inspect", str(TROT)),
+    ("inspect", "package://fox/fox.sdf"), ("inspect", "fox"), ("inspect", str(data_file("fox/model.yaml"))),
+    ("inspect", str(TROT)),
+    ("play", str(TROT), "--model", "fox", "--port", "virtual", "--base", "fixed", "--cycles", "1", "--out"),
     ("inverse-dynamics", str(TROT), "--model", "fox", "--cycles", "1", "--out"),
     ("export", str(TROT), "--model", "fox", "--cycles", "1", "--force", "--out")], ids=lambda a: "_".join(a[:1]))
 def test_other_verbs_take_it(arguments: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

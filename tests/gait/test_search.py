@@ -13,7 +13,7 @@ from workbench.gait.evaluate import Evaluator
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of, out_of_reach
 from workbench.gait.request import Request
-from workbench.gait.search import Budget, search, steered
+from workbench.gait.search import Budget, raced, search, steered
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import paths_of
@@ -95,6 +95,18 @@ def test_a_gait_that_turns_is_steered_straight(machine):
     (straight,) = steered(evaluator, space, [crooked])
     assert abs(request.drift(crooked.nominal)) > request.limits.drift
     assert abs(request.drift(straight.nominal)) < abs(request.drift(crooked.nominal)) / 3
+
+
+def test_the_better_ones_are_tried_on_more_robots(machine, tmp_path):
+    draws = load_ensemble().draws(machine.model, 2, 0, tmp_path)
+    evaluator = Evaluator(machine, Request(), draws)
+    trot = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
+    judged = evaluator.judged([replace(trot, stride=s) for s in (0.03, 0.04, 0.05, 0.06)], 0)
+    tried = raced(evaluator, judged, 2)
+    assert sorted(len(c.draws) for c in tried) == [0, 0, 1, 2]
+    best = min(judged, key=lambda c: c.rank())
+    assert next(c for c in tried if c.shape == best.shape).draws
+    assert sorted(len(c.draws) for c in raced(evaluator, judged, 2, all_of_them=True)) == [1, 1, 1, 2]
 
 
 def test_every_seed_is_within_reach_and_ranges(machine):

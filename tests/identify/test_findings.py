@@ -34,7 +34,7 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
         "rejected": [{"effect": "coulomb_friction", "where": ["flm"],
                       "reason": "dead_band(flm) takes 900 off chi squared on the choosing stretches, this 40",
                       "validation": {"before": 2.0, "after": 1.9, "unit": "deg"}},
-                     {"effect": "payload", "where": ["body_link"], "reason": str(ScreenedOut())}],
+                     {"effect": "payload", "where": ["body_link"], "reason": str(ScreenedOut(12.0, 310.0))}],
         "unexplained": [{"where": ["frb"], "error": 0.6, "floor": 0.2, "unit": "deg",
                          "description": "a <take>: goes with angle (correlation 0.60)"}],
         "next_experiment": {"motion": "next_experiment.csv", "base": "fixed", "separates": [["backlash", "joint_compliance"]]},

@@ -78,6 +78,24 @@ def test_a_sensor_that_stands_while_its_goal_goes_on(tmp_path: Path) -> None:
     assert any("repeats" in p and "from 1.200 s" in p and "the sensor stood still" in p for p in problems)
 
 
+@pytest.mark.parametrize(("lead", "told"), [
+    (0.06, True), (0.2, True), (0.01, False), (0.0, False), (-0.06, False), (-0.2, False)])
+def test_a_position_that_precedes_its_goal(tmp_path: Path, lead: float, told: bool) -> None:
+    time, _, _ = swing(300)
+    path = np.cumsum(np.random.default_rng(3).normal(size=900))  # a motion that does not repeat
+    path = np.convolve(path, np.hanning(40) / 20, "same")[300:]
+    goal, position = (np.interp(time - late, np.arange(600) / 50 - 2, path) for late in (0.0, -lead))
+    problems = _read(tmp_path, time, goal, np.round(position / 0.0879) * 0.0879).problems
+    assert any(f"precedes goal.arm by {1e3 * lead:.0f} ms" in p for p in problems) == told
+    assert told or problems == ()
+
+
+def test_leads_of_a_periodic_motion_may_be_lags(tmp_path: Path) -> None:
+    time = np.arange(300) / 50
+    goal, position = 30 * np.sin(2 * np.pi * time / 0.5), 20 * np.sin(2 * np.pi * (time + 0.1) / 0.5)
+    assert not any("precedes" in p for p in _read(tmp_path, time, goal, np.round(position / 0.0879) * 0.0879).problems)
+
+
 def test_a_joint_at_its_stop_is_no_stuck_sensor(tmp_path: Path) -> None:
     time, goal, position = swing()
     assert _read(tmp_path, time, goal, np.clip(position, -20, 15)).problems == ()
@@ -97,6 +115,15 @@ def test_what_is_no_number_is_refused_with_its_line(tmp_path: Path, cell: str) -
     text[5] = f"0.08,{cell},1"
     (tmp_path / "log.csv").write_text("\n".join(text) + "\n")
     with pytest.raises(InputError, match="line 6, column 2"):
+        read_recording(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("cell", ["1e300", "-1e308", "1e18"])
+def test_what_no_channel_reaches_is_refused_with_its_bound(tmp_path: Path, cell: str) -> None:
+    text = joint_log(*swing()).splitlines()
+    text[5] = f"0.08,{cell},1"
+    (tmp_path / "log.csv").write_text("\n".join(text) + "\n")
+    with pytest.raises(InputError, match=r"goal.arm: .* at 0.080 s; expected at most 1e\+10"):
         read_recording(tmp_path / "log.csv")
 
 

@@ -203,3 +203,12 @@ def test_the_puppy_is_read_as_it_stands() -> None:
     model = RobotModel("package://puppy/puppy.sdf")
     assert (model.path, model.source.notes, model.problems) == (model.source.source, (), ())
     assert model_problems(model.path, model.path) == ()
+
+
+def test_what_a_held_base_weighs_is_no_matter(tmp_path: Path) -> None:
+    base, _, rest = SDF.partition("<link name=\"a\">")
+    bare = base[:base.index("<inertial>")] + "</link><link name=\"a\">" + rest
+    model = RobotModel(str(_robot(tmp_path, bare, "robot.sdf")))
+    assert any("has no <inertial>" in text for text in model.problems)
+    assert all("link 'r'" in text or text.startswith("no link") for text in model.problems)
+    assert model.held_problems == ()

@@ -32,12 +32,12 @@ def _model(urdf: Path) -> RobotModel:
 
 
 def _motion(folder: Path, made: Made, model: RobotModel) -> Path:
-    """The last two joints of the first leg swing, all others rest."""
+    """The last two joints of the first leg swing, quickly and slowly, which tells kinds of friction apart; all others rest."""
     leg = next(iter(made.legs))
     moving = [f"{leg}_{name}" for name, _ in made.joints[-2:]]
     rows = ["time," + ",".join(model.joints)]
-    for k, (a, b) in enumerate([(0, 0), (20, -15), (-10, 25), (25, 10), (-15, -20), (10, 15), (0, 0)]):
-        rows.append(f"{0.4 * k}," + ",".join(str({moving[0]: a, moving[1]: b}.get(j, 0)) for j in model.joints))
+    for at, a, b in [(0, 0, 0), (0.3, 20, -15), (0.7, -10, 25), (1.0, 25, 10), (2.0, -15, -20), (2.9, 10, 15), (3.4, 0, 0)]:
+        rows.append(f"{at}," + ",".join(str({moving[0]: a, moving[1]: b}.get(j, 0)) for j in model.joints))
     (folder / "swing.csv").write_text("\n".join(rows) + "\n")
     return folder / "swing.csv"
 

@@ -16,6 +16,7 @@ import yaml
 from tests.command import refused, succeeds
 from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli import progress
+from workbench.cli.check import check_session
 from workbench.cli.output import LEFT, output_directory
 from workbench.compare.file_problems import session_check, summed_up
 from workbench.compare.session import load_session
@@ -40,6 +41,20 @@ def _rewrite(folder: Path, **changes: object) -> Path:
 def test_a_sound_session_has_no_problems(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "no problems" in succeeds(capsys, "inspect", str(arm / "session.yaml"))
     assert "no problems" in succeeds(capsys, "inspect", str(arm))  # as compare and diagnose take its folder
+
+
+def _unseen(row: str) -> str:
+    return ",".join(row.split(",")[:2]) + "," * (row.count(",") - 1)
+
+
+@pytest.mark.parametrize(("keep", "said"), [
+    (lambda rows: rows[:8], "holds 1 frame"), (lambda rows: [*rows[:7], *map(_unseen, rows[7:])], "no rigid body was seen"),
+])
+def test_a_take_that_shows_nothing_is_refused_at_once(arm: Path, capsys: pytest.CaptureFixture[str], keep, said: str) -> None:
+    path = arm / "takes" / "wave.csv"
+    path.write_text("\n".join(keep(path.read_text().splitlines())) + "\n")
+    assert said in succeeds(capsys, "inspect", str(arm))
+    assert said in refused(capsys, "compare", str(arm), "--out", str(arm / "out"), "--jobs", "1")
 
 
 @pytest.mark.parametrize(("damage", "said"), [
@@ -76,6 +91,9 @@ def test_the_yaw_is_a_key_and_is_named_where_it_is_missed(arm: Path) -> None:
     session = load_session(arm / "session.yaml")
     with pytest.raises(InputError, match=r"takes wave: yaw: no tracked joint turns .*give the session's `yaw`"):
         capture_yaw(session, read_takes(session)[0])
+    assert session_check(session).refused is not None
+    with pytest.raises(InputError, match="takes wave: yaw"):  # before anything is simulated
+        check_session("compare", session)
     session = load_session(_rewrite(arm, yaw=30.0))
     assert capture_yaw(session, read_takes(session)[0]) == pytest.approx(np.deg2rad(30))
 
@@ -94,6 +112,17 @@ def test_a_frozen_body_is_a_warning_of_every_verb(arm: Path) -> None:
     found = session_check(load_session(arm / "session.yaml"))
     assert any("repeat the pose before" in line for line in found.warnings)
     assert len(found.warnings) == 1
+
+
+def test_a_motion_of_a_take_is_checked_as_alone(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    motion = arm / "motions" / "wave.csv"
+    head, *rows = motion.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    small = [",".join([time, *(f"{float(angle) / 57.3:.4f}" for angle in angles)]) for time, *angles in cells]
+    motion.write_text("\n".join([head, *small]) + "\n")
+    said = succeeds(capsys, "inspect", str(arm))
+    assert f"take 'wave': {motion}: no joint leaves" in said
+    assert "radians" in said
 
 
 def test_many_problems_are_one_line() -> None:

@@ -21,11 +21,15 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> None:
-    """Warns of a session's problems; InputError where a take lasts so long that it is mostly a slip, unless `yes`."""
+    """Warns of a session's problems; InputError where its takes cannot be used together, or where one lasts so long that it is
+    mostly a slip, unless `yes`."""
     from workbench.compare.file_problems import session_check
+    from workbench.robot import InputError
 
     found = session_check(session)
     warn(verb, found.warnings)
+    if found.refused:
+        raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
 
 
@@ -39,10 +43,13 @@ def check_model(verb: str, model: RobotModel) -> None:
 
 def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -> None:
     """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
-    from workbench.compare.file_problems import motion_problems, summed_up
+    from workbench.compare.file_problems import motion_problems, slow_poses, summed_up
+    from workbench.robot import InputError
 
     problems = motion_problems(motion, cycles)
     warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
+    if (text := slow_poses(motion)) and not yes:
+        raise InputError(motion.source, f"{text} Say --yes if it is meant")
     _ask(motion.source, cycles * motion.duration, yes)
 
 

@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def finding_line(finding: Finding) -> str:
+    """One line of the terminal: what was found, how surely, and what it takes off errors on unseen stretches."""
     from workbench.view.report.words import this_or
 
     tie, error = finding.tie, finding.validation

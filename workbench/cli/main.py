@@ -33,6 +33,7 @@ class OneLineParser(argparse.ArgumentParser):
     """Says what is wrong in one line; the usage is one `--help` away."""
 
     def error(self, message: str) -> NoReturn:
+        """Ends with exit code 2 and one line on stderr."""
         self.exit(2, f"{self.prog}: error: {' '.join(message.split())} (see {self.prog} --help)\n")
 
 

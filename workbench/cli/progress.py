@@ -85,6 +85,7 @@ class Progress:
                 self._stream.flush()
 
     def __call__(self, what: str, done: float | None = None) -> None:
+        """Says what is being done, and which share of it is."""
         with self._lock:
             if what.partition(" ")[0] != self._now[0].partition(" ")[0]:
                 self._entered = time.monotonic()

@@ -53,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
     for line in wider_limits(model, found):
         print(f"wider than the model: {line}; --write narrows it")
     if args.out is not None:
-        print(f"wrote {save_registers(registers, args.out / 'registers.yaml')}")
+        path = save_registers(registers, args.out / "registers.yaml")
+        print(f"wrote {path}; beside a session.yaml that says `registers: {path.name}`, `diagnose` begins with what differs")
     for problem in found.problems():
         print(f"workbench servos: problem: {problem}", file=sys.stderr)
     return 2 if found.problems() else 0

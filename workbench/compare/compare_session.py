@@ -109,6 +109,7 @@ def _cost(job: Job) -> float:
 
 
 def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
+    """What is to be simulated for a take, on a base that goes on from `steadied` states where given."""
     return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
 
 

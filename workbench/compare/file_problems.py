@@ -11,7 +11,7 @@ import numpy as np
 from workbench.compare.options import FILES
 from workbench.compare.prediction import read_start
 from workbench.compare.session import PredictSpec, Session, TakeSpec
-from workbench.compare.session_takes import readable
+from workbench.compare.session_takes import capture_yaw, read_takes, readable
 from workbench.effects.apply import resolved
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
@@ -28,19 +28,21 @@ _ROUTINE = " unseen in "
 @dataclass(frozen=True)
 class SessionCheck:
     """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
-    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves."""
+    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves. refused: why no
+    verb can use the takes together."""
 
     problems: Mapping[str, Sequence[str]]
     longest: float
     longest_name: str
     damaged: frozenset[str] = frozenset()
+    refused: str | None = None
 
     @property
     def warnings(self) -> list[str]:
         """A line for each file with problems that are not routine, as gaps of cameras are."""
         out = []
         for of, lines in self.problems.items():
-            bad = [] if of in self.damaged else serious(lines)
+            bad = [] if of in self.damaged or (of == "takes" and self.refused) else serious(lines)
             out += [f"{of}: {summed_up(bad)}"] if bad else []
         return out
 
@@ -53,7 +55,8 @@ def session_problems(session: Session) -> list[str]:
 def session_check(session: Session) -> SessionCheck:
     """What is doubtful in a session: its robot, its servos, each of its takes and predictions, every file of them read and
     checked against the robot. A damaged take, which the verbs leave out, is one of them."""
-    found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
+    held = all(base == "fixed" for base in [*(t.base for t in session.takes), *(p.base for p in session.predict)])
+    found: dict[str, list[str]] = {"robot": model_problems_of(session.model, held)}
     seconds = {"": 0.0}
     damaged = set()
     for of, entries in (("take", session.takes), ("predict", session.predict)):
@@ -67,16 +70,29 @@ def session_check(session: Session) -> SessionCheck:
             except InputError as e:
                 found[name] = [str(e)]
                 damaged.add(name)
+    refused = _no_yaw(session) if any(f"take '{t.name}'" not in damaged for t in session.takes) else None
+    if refused:
+        found["takes"] = [refused]
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
         found["predict"] = ["no take tells the yaw of the capture: it is taken from where the bodies stand at the start, good to "
                             "some degrees; give the session's `yaw` [deg], or a captured take"]
     longest = max(seconds, key=lambda name: seconds[name])
-    return SessionCheck({of: lines for of, lines in found.items() if lines}, seconds[longest], longest, frozenset(damaged))
+    doubtful = {of: lines for of, lines in found.items() if lines}
+    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), refused)
 
 
-def model_problems_of(model: RobotModel) -> list[str]:
-    """What is doubtful in a robot's description, its servos' constants and its effects, a line each."""
-    out = list(model.problems)
+def _no_yaw(session: Session) -> str | None:
+    """Why the takes that cameras saw do not tell where the robot headed; None where they do, or the session does."""
+    try:
+        capture_yaw(session, read_takes(session)[0])
+    except InputError as e:
+        return str(e)
+    return None
+
+
+def model_problems_of(model: RobotModel, held: bool = False) -> list[str]:
+    """What is doubtful in a robot's description, its servos' constants and its effects, a line each. held: its base is."""
+    out = list(model.held_problems if held else model.problems)
     doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
     out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
     given = set(model.servos)
@@ -110,7 +126,7 @@ def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
     """What is doubtful in a motion that is played `cycles` times, a line each."""
     jumps = cycles > 1 and not motion.closes
     out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
-    if (text := long_work(motion.duration)) is not None:
+    if (text := slow_poses(motion) or long_work(motion.duration)) is not None:
         out.append(text)
     if np.abs(motion.angles).max() < FILES.smallest_motion and np.ptp(motion.angles) > 0:
         most = np.rad2deg(np.abs(motion.angles).max())
@@ -132,6 +148,15 @@ def long_work(seconds: float) -> str | None:
     return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: a slip in times, frames or cycles?"
 
 
+def slow_poses(motion: Motion) -> str | None:
+    """A line where poses follow each other so slowly that their times are not in seconds."""
+    apart = float(np.median(np.diff(motion.times)))
+    if apart <= FILES.slowest_pose:
+        return None
+    return (f"a pose every {apart:.4g} s, {motion.duration:.6g} s in all: are the times in milliseconds, a slip? "
+            "(a table has seconds)")
+
+
 def serious(problems: Sequence[str]) -> list[str]:
     """Those that are not routine, as gaps of cameras are."""
     return [text for text in problems if _ROUTINE not in text]
@@ -150,13 +175,13 @@ def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
     commands = take.commands(model) or recording.commands
     if commands is None:
         raise InputError(take.recording, "no motion is given, and the recording has no commands")
+    if take.motion is not None:
+        out = [f"{take.motion}: {text}" for text in motion_problems(load_motion(take.motion, model), take.cycles)] + out
     if np.ptp(commands.goals, axis=0).max() == 0 and len(commands.times) > 1:
         out.insert(0, "its commands never change")
     seconds = float(recording.time[-1] - recording.time[0])
     if take.starts_at is not None and take.starts_at > recording.time[-1]:
         out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
-    if len(recording.time) < FILES.fewest_frames:
-        out.insert(0, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
     return ([text] if (text := long_work(seconds)) else []) + out, seconds
 
 
@@ -165,11 +190,13 @@ def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str
     if entry.commands is not None:
         log = named_by_model(read_recording(entry.commands), model)
         seconds = float(log.time[-1] - log.time[0])
-        return ([text] if (text := long_work(seconds)) else []), seconds
+        return ([text] if (text := long_work(seconds)) else []) + list(log.problems), seconds
     assert entry.start is not None
     assert entry.motion is not None
     start = read_start(entry.start)
     check_assets(start, model)
     seconds = (entry.frames or 0) / start.rate
-    load_motion(entry.motion, model).commands(entry.cycles)
-    return ([text] if (text := long_work(seconds)) else []), seconds
+    motion = load_motion(entry.motion, model)
+    motion.commands(entry.cycles)
+    out = [f"{entry.motion}: {text}" for text in motion_problems(motion, entry.cycles)]
+    return ([text] if (text := long_work(seconds)) else []) + out, seconds

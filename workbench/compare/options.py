@@ -42,6 +42,8 @@ class FileLimits:
     """No servo's goal lies as far from its centre [rad]."""
     longest: float = 600.0
     """A take or motion that lasts longer is mostly a slip [s]: simulating it takes hours."""
+    slowest_pose: float = 8.0
+    """Between poses of a motion, in the median [s]: in milliseconds, most are further apart; no gait or test rests as long."""
     fewest_frames: int = 20
     """Of a take."""
 

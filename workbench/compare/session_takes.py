@@ -6,7 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from workbench.compare.comparison import aligned
+from workbench.compare.options import FILES
 from workbench.compare.session import Session, TakeSpec
 from workbench.effects.apply import seen
 from workbench.motion.commands import Commands
@@ -96,13 +99,18 @@ def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
 
 
 def readable(path: Path, model: RobotModel) -> Recording:
-    """A recording that can be compared: InputError where it cannot be read, or has neither rigid bodies nor joints."""
+    """A recording that can be compared: InputError where it cannot be read, is hardly one, or has neither rigid bodies that were
+    seen nor joints."""
     recording = read_recording(path)
+    if len(recording.time) < FILES.fewest_frames:
+        raise InputError(path, f"holds {len(recording.time)} frame(s); expected {FILES.fewest_frames} or more")
     if recording.channels:
         return named_by_model(recording, model)
     if not recording.rigid_bodies:
         found = f"{len(recording.markers)} markers" if recording.markers else "nothing"
         raise InputError(path, f"expected rigid bodies or joint channels, found {found}")
+    if not any(np.isfinite(b.p).any() and b.quat.any() for b in recording.rigid_bodies.values()):
+        raise InputError(path, "no rigid body was seen in any frame")
     return recording
 
 

@@ -18,6 +18,7 @@ class Stop:
     reason: str = ""
 
     def __call__(self) -> bool:
+        """Whether to stop."""
         return bool(self.reason)
 
 

@@ -48,6 +48,14 @@ def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, 
         yield effect, spec, si_values(effect, spec)
 
 
+def law_of(model: RobotModel) -> ServoLaw:
+    """The servos' law alone, effects applied in their order: in a fraction of the time of `physics_of`."""
+    law = ServoLaw.of([model.servo(j) for j in model.joints])
+    for effect, spec, values in resolved(model):
+        law = effect.law(law, _columns(model, spec), values)
+    return law
+
+
 def physics_of(model: RobotModel) -> Physics:
     """The model's physics, effects applied in their order."""
     law = ServoLaw.of([model.servo(j) for j in model.joints])
@@ -58,7 +66,7 @@ def physics_of(model: RobotModel) -> Physics:
     terms: list[ServoTerm] = []
     sdf: SdfRobot | None = None
     for effect, spec, values in resolved(model):
-        columns = np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=int)
+        columns = _columns(model, spec)
         law = effect.law(law, columns, values)
         term = effect.servo_term(np.isin(model.joints, spec.where), values)
         terms += [] if term is None else [term]
@@ -75,6 +83,10 @@ def physics_of(model: RobotModel) -> Physics:
             effect.description(sdf, spec, model)
     return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
                    sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends, tuple(terms))
+
+
+def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
+    return np.array([model.joints.index(j) for j in spec.where if j in model.joints], dtype=np.int64)
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:

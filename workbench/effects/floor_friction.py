@@ -13,4 +13,5 @@ class FloorFriction(Effect):
     observable_when_fixed = False
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
+        """The model's own coefficient of friction."""
         return (1.0 if model.ground.friction is None else model.ground.friction,)

@@ -219,6 +219,7 @@ class SdfRobot:
         return self._named("link", name)
 
     def inertial(self, link: str) -> Element:
+        """The <inertial> of a link; InputError where it has none."""
         inertial = self._link(link).find("inertial")
         if inertial is None:
             raise InputError(self.source, f"link '{link}' has no <inertial>, to which mass could be added")

@@ -52,6 +52,7 @@ class Separation:
 
     @property
     def separated(self) -> bool:
+        """Whether the motion is expected to tell the two apart."""
         return self.log_likelihood_ratio >= EXPERIMENT.separated
 
 

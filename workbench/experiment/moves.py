@@ -49,6 +49,7 @@ class Path:
         return self.to(dict.fromkeys(self.joints, 0.0), speed).hold(EXPERIMENT.rest_at_end)
 
     def segment(self, name: str, base: str = "fixed", long: bool = False) -> Segment:
+        """The motion so far, as one segment."""
         return Segment(name, base, np.array(self.times), np.vstack(self.poses), long)
 
 

@@ -26,6 +26,7 @@ class Segment:
 
     @property
     def duration(self) -> float:
+        """Of the segment [s]."""
         return float(self.times[-1])
 
 

@@ -78,21 +78,22 @@ class Ensemble:
             factors = {link: float(1 + self.mass_share * rng.uniform(-1, 1)) for link in model.kinematics.links}
             drawn = with_masses(drawn, factors, folder)
         told = {e.effect for e in model.effects}  # what a diagnosis found is better known than the file's range
-        return replace(drawn, effects=(*drawn.effects, *(e for e in effects if e.effect not in told)))
+        return drawn.with_effects((*drawn.effects, *(e for e in effects if e.effect not in told)))
 
 
 def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -> RobotModel:
     """The robot with each link's mass and inertia times its factor, as an SDF file in `folder` named by its content."""
-    sdf = SdfRobot(model.path)
+    sdf, masses = SdfRobot(model.path), dict(model.kinematics.masses)
     for link, factor in factors.items():
         inertial = sdf.inertial(link)
         mass, center, inertia = read_inertia(inertial)
         write_inertia(inertial, mass * factor, center, inertia * factor)
+        masses[link] *= factor
     text = sdf.text()
     path = folder / f"masses-{hashlib.sha256(text.encode()).hexdigest()[:12]}.sdf"
     if not path.is_file():
         write_whole(path, text)
-    return replace(model, description=str(path))
+    return model.with_masses(path, masses)
 
 
 def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = None) -> Ensemble:
@@ -145,7 +146,7 @@ def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Gene
             else:
                 drawn[name] = float(np.clip(next(values), p.low, p.high))
         effects.append(replace(spec, parameters=drawn))
-    return replace(model, effects=tuple(effects))
+    return model.with_effects(effects)
 
 
 def _inside(model: RobotModel, rng: np.random.Generator) -> tuple[float, float, float]:

@@ -83,13 +83,16 @@ class Evaluator:
         self.draws = tuple(request.on_slope(d) for d in draws)
         self._memory, self._known = memory, _read(memory)
         self._config = hashlib.sha256(repr(config).encode()).hexdigest()[:8]
+        self._tables: dict[GaitShape, tuple[GaitTable | None, list[Margin]]] = {}
         self.rollouts = 0
 
     def judged(self, shapes: Sequence[GaitShape], draws: int, keep: Callable[[list[Candidate]], list[Candidate]] | None = None,
                ) -> list[Candidate]:
         """The shapes as candidates, in their order. draws: on how many of the ensemble's robots those are tried which `keep`
         (default: all that keep the limits so far) picks from what they do on the nominal robot."""
-        tables = [self._table(p) for p in paths_of(self.machine, shapes)]
+        new = [s for s in dict.fromkeys(shapes) if s not in self._tables]
+        self._tables.update({p.shape: self._table(p) for p in paths_of(self.machine, new)})
+        tables = [self._tables[s] for s in shapes]
         first = [t for t, margins in tables if t is not None and violation(margins) == 0.0]
         nominal = dict(zip(map(id, first), self._measures([(t, self.nominal) for t in first])))
         out = [self._candidate(t, margins, nominal.get(id(t))) for t, margins in tables]
@@ -161,7 +164,6 @@ class Evaluator:
         if self._memory is not None and lines:
             with self._memory.open("a") as f:
                 f.writelines(lines)
-
 
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
-from workbench.effects.apply import physics_of, played
+from workbench.effects.apply import law_of, played
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.servo import ServoLaw
@@ -100,7 +100,7 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     forward = float((step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle)).sum() / seconds)
     left = float((step[:, 1] * np.cos(middle) - step[:, 0] * np.sin(middle)).sum() / seconds)
     whole = p[-1, :2] - p[0, :2]
-    law = _law(model)
+    law = law_of(model)
     torque, v = take.torque[inside], take.v[inside]
     unknown = np.full(len(take), np.nan)
     current, power = supply(take, model, law) if electrical else (unknown, unknown)
@@ -115,16 +115,6 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
         jerk=base_jerk(time, p))
-
-
-_laws: dict[str, ServoLaw] = {}
-
-
-def _law(model: RobotModel) -> ServoLaw:
-    """The servos' law with the model's effects, kept: effects on the build take a while to work in."""
-    if model.sha256 not in _laws:
-        _laws[model.sha256] = physics_of(model).law
-    return _laws[model.sha256]
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:

@@ -43,9 +43,9 @@ DRIFT_SHARE = 0.6
 """Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
 SPREAD_SHARE = 0.7
 """Of the drift over draws allowed, likewise: other robots are drawn for the certificate."""
-FIRST_LOOK = Budget(seeds=80, generations=6, robust=0, draws=0)
+FIRST_LOOK = Budget(seeds=60, starts=2, generations=4, robust=0, draws=0)
 """Beside a refusal: what works instead, in half a minute."""
-BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5)
+BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, variants=("2 ms", "1 ms", "0.5 ms"))
 """How the nearest table beside a refusal is examined at most, so that a refusal comes within a minute."""
 
 
@@ -112,7 +112,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 def _briefly(options: CertifyOptions) -> CertifyOptions:
     """No more than BRIEFLY."""
     least = {f: min(getattr(options, f), getattr(BRIEFLY, f)) for f in ("draws", "checked", "seconds", "floor_seconds")}
-    return replace(options, **least)
+    return replace(options, variants=tuple(v for v in options.variants if v in BRIEFLY.variants), **least)
 
 
 def sought(request: Request) -> Request:
@@ -218,7 +218,7 @@ def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
     budget, examined = Budget(), CertifyOptions(n_jobs=n_jobs)
     scale = effort / 4
     budget = replace(budget, seeds=round(budget.seeds * min(scale, 2.0)), generations=max(3, round(budget.generations * scale)),
-                     robust=max(3, round(budget.robust * scale)), draws=max(4, min(16, round(16 * scale))))
+                     robust=max(3, round(budget.robust * scale)), draws=4 if effort == 1 else budget.draws)
     if effort == 1:
         examined = replace(examined, draws=8, checked=0, seconds=4.0)
     return OptimizeOptions(budget, examined, seed, n_jobs)

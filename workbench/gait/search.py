@@ -19,6 +19,13 @@ STRAYING = ("drift", "curvature off the arc")
 """Limits that steering can keep."""
 STEERED = 2
 """How often a gait is steered before the next generation."""
+APART = 0.4
+"""Distance in the unit cube from which two gaits differ, less than half of what two of a first generation are apart: how a gait
+stands other robots hangs on small things, so that it is looked for in many."""
+NARROW = 0.5
+"""Width of the search over the ensemble, by that on the nominal robot: it begins at a good gait."""
+FEW = 3 / 8
+"""Share of the ensemble's robots on which half of a generation is tried, before the better half of that is tried on all."""
 Progress = Callable[[str, float | None], None]
 
 
@@ -26,11 +33,12 @@ Progress = Callable[[str, float | None], None]
 class Budget:
     """How much is tried, in numbers of gaits and not in seconds, so that the same seed ends in the same table.
 
-    seeds: random gaits at first. starts: the best of them, of different families or knees, from which CMA-ES goes on. population,
-    generations: of each start, on the nominal robot; then `robust` generations, over `draws` robots of the ensemble, of the
-    start whose best gait does best on them. width: first standard deviation in the unit cube. enough: a search for a given speed
-    ends after so many generations in a row that kept every limit. hopeless: it ends before the ensemble comes in if the best gait
-    has less than this share of the speed, which no robust generations have been seen to make up for.
+    seeds: random gaits at first. starts: the best of them, of different families or knees, from which CMA-ES goes on.
+    population, generations: of each start, on the nominal robot; then `robust` generations, over `draws` robots of the
+    ensemble, from the one that does best on them of `pool` good gaits that differ. width: first standard deviation in the
+    unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit. hopeless: it
+    ends before the ensemble comes in if the best gait has less than this share of the speed, which no robust generations have
+    been seen to make up for.
     """
 
     seeds: int = 100
@@ -39,6 +47,7 @@ class Budget:
     generations: int = 12
     robust: int = 24
     draws: int = 16
+    pool: int = 12
     width: float = 0.15
     enough: int = 3
     hopeless: float = 0.6
@@ -66,13 +75,13 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
     run = _Run(evaluator, budget, space, progress)
     shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]
     started = run.seeded(shapes)
-    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(started)]
+    runs = [_Refiner(run, c, seed + 1 + k, budget.width) for k, c in enumerate(started)]
     for k in range(budget.generations * len(runs)):
         runs[k % len(runs)].generation(0)
         if run.enough():
             break
     if budget.robust and evaluator.draws and not run.hopeless():
-        refiner = run.most_robust(runs)
+        refiner = _Refiner(run, run.most_robust(runs), seed + 1 + len(runs), NARROW * budget.width)
         for _ in range(budget.robust):
             refiner.generation(budget.draws)
             if run.enough():
@@ -91,6 +100,7 @@ class _Run:
         self.generation = 0
         self._streak = 0
         self._robust = False
+        self._good: list[Candidate] = []
         robust = budget.robust if evaluator.draws else 0
         self._all = budget.starts * budget.generations + robust
 
@@ -115,15 +125,28 @@ class _Run:
         self._streak = self._streak + 1 if self.best.good else 0
         self.progress(f"generation {self.generation} of {self._all}{self._told()}", self.generation / self._all)
 
-    def most_robust(self, runs: Sequence[_Refiner]) -> _Refiner:
-        """The refiner whose best gait so far does best on the ensemble; from here on only what was tried on it counts."""
-        self.progress(f"ensemble: {len(runs)} gaits on {self.budget.draws} robots{self._told()}", None)
+    def most_robust(self, runs: Sequence[_Refiner]) -> Candidate:
+        """Of the best of each run, and of good gaits that differ, the one that does best on the ensemble; from here on only what
+        was tried on it counts."""
+        pool = self._different([r.best for r in runs])
+        self.progress(f"ensemble: {len(pool)} gaits on {self.budget.draws} robots{self._told()}", None)
         self._streak, self._robust, self.best, self.nearest = 0, True, None, None
-        tried = self.evaluator.judged([r.best.shape for r in runs], self.budget.draws)
+        tried = raced(self.evaluator, pool, self.budget.draws, all_of_them=True)
         self._note(tried)
-        first = min(range(len(runs)), key=lambda k: (not tried[k].draws, *tried[k].rank()))
-        self.best = self.best or tried[first]
-        return runs[first]
+        first = tried[_ordered(tried)[0]]
+        self.best = self.best or first
+        return first
+
+    def _different(self, pool: list[Candidate]) -> list[Candidate]:
+        """These, and the best of what kept all limits so far, as long as they are apart from those before them."""
+        for c in sorted(self._good, key=Candidate.rank):
+            if len(pool) >= self.budget.pool:
+                break
+            alike = [o for o in pool if (o.shape.family, o.shape.knees) == (c.shape.family, c.shape.knees)]
+            point = self.space.point(c.shape)
+            if all(np.linalg.norm(point - self.space.point(o.shape)) > APART for o in alike):
+                pool.append(c)
+        return pool
 
     def hopeless(self) -> bool:
         """Whether the speed asked for is far from what was found."""
@@ -138,7 +161,8 @@ class _Run:
         return request.speed is not None and request.aim == "speed" and self._streak >= self.budget.enough
 
     def _note(self, candidates: list[Candidate]) -> None:
-        told = [c for c in candidates if c.draws or not self._robust]
+        told = [c for c in candidates if len(c.draws) >= self.budget.draws or not self._robust]
+        self._good += [c for c in told if c.good and not self._robust]
         for c in told:
             if self.best is None or c.rank() < self.best.rank():
                 self.best = c
@@ -168,23 +192,23 @@ def _slow_only(c: Candidate) -> bool:
 class _Refiner:
     """One CMA-ES, whose constraints are kept by rank: a gait that breaks a limit comes after all that break none."""
 
-    def __init__(self, run: _Run, start: Candidate, seed: int) -> None:
+    def __init__(self, run: _Run, start: Candidate, seed: int, width: float) -> None:
         self._run, self._family, self._knees = run, start.shape.family, start.shape.knees
         self.best = start
         options = {"popsize": run.budget.population, "seed": seed, "bounds": [0.0, 1.0], "verbose": -9, "verb_log": 0,
                    "integer_variables": [], "maxiter": 10**6, "tolstagnation": 10**6, "tolfun": 0, "tolx": 0, "tolfunhist": 0}
         x0 = np.clip(run.space.point(start.shape), 0.02, 0.98)
-        self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
+        self._strategy = cma.CMAEvolutionStrategy(x0, width, options)
 
     def generation(self, draws: int) -> None:
-        """One generation, on the nominal robot, and its better half on `draws` more."""
+        """One generation, on the nominal robot, and what is best of it on `draws` more."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
         judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
         judged = steered(run.evaluator, run.space, judged)
         if draws:
-            judged = run.evaluator.judged([c.shape for c in judged], draws, _better_half)
-        order = sorted(range(len(judged)), key=lambda k: (bool(draws) and not judged[k].draws, *judged[k].rank()))
+            judged = raced(run.evaluator, judged, draws)
+        order = _ordered(judged)
         cost = np.empty(len(judged))
         cost[order] = np.arange(len(judged))
         if "turn" in run.space.names:
@@ -228,6 +252,16 @@ def _straight(request: Request, c: Candidate, before: Candidate | None) -> float
     return c.shape.turn - excess * c.table.period * c.shape.duty
 
 
-def _better_half(candidates: list[Candidate]) -> list[Candidate]:
-    """The better half by what they do on the nominal robot."""
-    return sorted(candidates, key=Candidate.rank)[:(len(candidates) + 1) // 2]
+def raced(evaluator: Evaluator, candidates: list[Candidate], draws: int, all_of_them: bool = False) -> list[Candidate]:
+    """The candidates with their better half, or all, tried on some robots of the ensemble, and the best quarter on `draws`."""
+    out = list(candidates)
+    for count, share in ((max(1, round(FEW * draws)), 1 if all_of_them else 2), (draws, 4)):
+        kept = _ordered(out)[:-(-len(out) // share)]
+        for k, c in zip(kept, evaluator.judged([out[k].shape for k in kept], count)):
+            out[k] = c
+    return out
+
+
+def _ordered(candidates: list[Candidate]) -> list[int]:
+    """Indices, the best first; one that was tried on more robots comes before others."""
+    return sorted(range(len(candidates)), key=lambda k: (-len(candidates[k].draws), *candidates[k].rank()))

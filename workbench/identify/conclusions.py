@@ -32,11 +32,14 @@ class ReadOff(Protocol):
     """An effect of one number that was read off the recordings: its mean and variance, in the contract's unit."""
 
     @property
-    def spec(self) -> EffectSpec: ...
+    def spec(self) -> EffectSpec:
+        """What was found, as the model takes it."""
     @property
-    def mean(self) -> float: ...
+    def mean(self) -> float:
+        """Of its first parameter."""
     @property
-    def variance(self) -> float: ...
+    def variance(self) -> float:
+        """Of that mean."""
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
@@ -144,7 +147,7 @@ def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
     """Of an effect that was tried in a round and not taken."""
     best = next((a for a in r.accepted if t.joint in (None, a.joint) or a.joint is None), None)
     if t.screened_out:
-        return ScreenedOut()
+        return ScreenedOut(*t.promised)
     if best is None:
         return TooLittle()
     return Outdone(best.candidate.name, best.candidate.where, best.gain["choose"], t.gain["choose"])

@@ -46,10 +46,12 @@ class Candidate:
 
     @property
     def name(self) -> str:
+        """Of the effect."""
         return self.effect.name
 
     @property
     def key(self) -> Key:
+        """Effect and places: what tells one candidate from another."""
         return self.effect.name, self.where
 
     @property

@@ -34,23 +34,28 @@ class PointMass(Candidate):
     """A payload. Sizes: its mass and its moments about the link's centre of mass."""
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
+        """Numbers in the contract's units; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
     def bounds(self) -> tuple[Array, Array]:
+        """Of the sizes x."""
         low, high = super().bounds()
         low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
 
     def probes(self) -> list[Array]:
+        """Sizes at which each number is alone typical."""
         return [np.array([1.0, *(FIT.away * np.eye(4)[k, 1:])]) for k in range(4)]
 
     def around(self) -> list[Array]:
+        """Sizes to both sides, as a vector has no sign."""
         middle, *probes = self.probes()
         return [middle, *both_ways(middle, [p - middle for p in probes])]
 
     @property
     def makes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those without which there is no effect."""
         return np.arange(self.size) == 0
 
 
@@ -63,21 +68,26 @@ class SwungMass(PointMass):
 
     @property
     def size(self) -> int:
+        """How many numbers are fitted."""
         return 3
 
     @property
     def shapes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those that only shape the effect."""
         return np.array([True, False, False])
 
     @property
     def of_vector(self) -> NDArray[np.bool_]:
+        """Of the sizes, those that are a vector's."""
         return ~self.shapes
 
     @property
     def makes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those without which there is no effect."""
         return ~self.shapes
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
+        """Numbers in the contract's units; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         away = FIT.swung_distance * 2.0 ** float(np.clip(x[0], *FIT.swung_doublings))
         unit = self.typical[0] * (self.typical[1] - self.neutral[1])  # of moments [kg m]
@@ -88,14 +98,17 @@ class SwungMass(PointMass):
         return [float(np.clip(size / away, mass.low, mass.high)), *position.tolist()]
 
     def bounds(self) -> tuple[Array, Array]:
+        """Of the sizes x."""
         return np.array([FIT.swung_doublings[0], -FIT.most_moment, -FIT.most_moment]), np.array(
             [FIT.swung_doublings[1], FIT.most_moment, FIT.most_moment]
         )
 
     def probes(self) -> list[Array]:
+        """Sizes at which each number is alone typical."""
         return [FIT.away * np.eye(3)[k] for k in (1, 2)]
 
     def around(self) -> list[Array]:
+        """Sizes to both sides, as a vector has no sign."""
         return both_ways(np.zeros(3), self.probes())
 
     @property

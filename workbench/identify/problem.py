@@ -53,10 +53,12 @@ class TakeEvidence:
 
     @property
     def name(self) -> str:
+        """Of the take."""
         return self.take.spec.name
 
     @property
     def joints(self) -> tuple[str, ...]:
+        """Of the robot, in the model's order."""
         return self.take.recorded.joints
 
     @property

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.leaps import without_leaps
+from workbench.recording.log_lead import lead_problems
 from workbench.recording.log_units import UNITS, unit_problems
 from workbench.recording.recording import Recording
+from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 
@@ -27,7 +29,8 @@ class LogChecks:
     more than `leaps` of its other steps; a joint that sticks sets out slowly. far: as far as a goal may be from it at the
     end [deg]. same: share of rows in which goal and position are equal from
     which the goal is no command; shift: by so many rows at most.
-    pause: between rows, in medians of their steps. longest: a log may last [s].
+    pause: between rows, in medians of their steps. longest: a log may last [s]. largest: a number of any channel, beyond what
+    counts of 32 bits come to [SI].
     """
 
     slow: float = 0.5
@@ -39,15 +42,17 @@ class LogChecks:
     shift: int = 3
     pause: float = 8.0
     longest: float = 7200.0
+    largest: float = 1e10
 
 
 CHECKS = LogChecks()
 
 
 def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
-    """The recording with leaps of its positions mended and `problems` that say so, and whatever else cannot be right. Only of
-    logs on one clock; cameras' tracks are mended with the robot in view."""
+    """The recording with leaps of its positions mended and `problems` that say so, and whatever else cannot be right; InputError
+    where a number is beyond all bounds. Only of logs on one clock; cameras' tracks are mended with the robot in view."""
     time = recording.time
+    _bounded(recording, checks)
     if recording.sensing != "encoders" or len(time) < 3 or np.any(np.diff(time) <= 0):
         return recording
     channels, problems = dict(recording.channels), list(recording.problems)
@@ -61,7 +66,17 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     for check in (_clock, _no_command, _standing):
         problems += check(mended, checks)
     problems += unit_problems(mended)
+    if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
+        problems += lead_problems(mended)
     return replace(mended, problems=tuple(problems))
+
+
+def _bounded(r: Recording, c: LogChecks) -> None:
+    for name, values in r.channels.items():
+        beyond = np.flatnonzero(np.abs(values) > c.largest)
+        if len(beyond) and len(values) == len(r.time):
+            raise InputError(r.source, f"{name}: {values[beyond[0]]:.3g} (SI) at {r.time[beyond[0]]:.3f} s; expected at most "
+                                       f"{c.largest:g}")
 
 
 def beyond_range(recording: Recording, limits: dict[str, tuple[float, float]]) -> tuple[str, ...]:

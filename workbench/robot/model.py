@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -92,6 +92,12 @@ class RobotModel:
         return (*self.source.problems, *model_problems(self.path, self.source.source))
 
     @cached_property
+    def held_problems(self) -> tuple[str, ...]:
+        """As `problems`, of a robot whose base is always held: what the base weighs, and on what it stands, do not matter."""
+        about = tuple(text for text in self.source.problems if not text.startswith(f"link '{self.base}' has no <inertial>"))
+        return about + model_problems(self.path, self.source.source, self.base)
+
+    @cached_property
     def kinematics(self) -> Kinematics:
         """Tree of links and joints, with vectorised forward kinematics."""
         return Kinematics.from_file(self.path)
@@ -112,7 +118,24 @@ class RobotModel:
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
         """The same robot with one effect more."""
-        return replace(self, effects=(*self.effects, effect))
+        return self.with_effects((*self.effects, effect))
+
+    def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
+        """The same robot with these effects in place of its own."""
+        return self._with_known(replace(self, effects=tuple(effects)))
+
+    def with_masses(self, path: Path, masses: Mapping[str, float]) -> RobotModel:
+        """The same robot by an SDF file made of its own, in which links have these masses [kg] and all else is as it was: what
+        is known of its tree and its feet is not read again."""
+        other = replace(self, description=str(path))
+        k = replace(self.kinematics, path=path, masses=dict(masses))
+        vars(other).update(source=ModelSource(path, path), kinematics=k, foot_links=self.foot_links)
+        return other
+
+    def _with_known(self, other: RobotModel) -> RobotModel:
+        """`other`, of the same description, with what was read of that so far."""
+        vars(other).update({k: v for k, v in vars(self).items() if k in ("source", "kinematics", "foot_links")})
+        return other
 
     def with_servos(self, changes: Mapping[str, Any]) -> RobotModel:
         """The same robot with constants replaced in every servo (a take's `servos`)."""

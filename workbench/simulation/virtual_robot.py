@@ -15,6 +15,7 @@ from workbench.device.virtual import (
     SECOND,
     STS3215,
     XL330,
+    XL430,
     Clock,
     Drive,
     Sense,
@@ -32,7 +33,7 @@ from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
 
 Array = NDArray[np.float64]
-FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "STS3215": STS3215}
+FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
 """Families of which there is a virtual servo, by the name of their profile."""
 PIVOT = 0.012
 """How far a rigid body's pivot may lie from its link's origin, along each axis [m]: as wide as a marker cluster."""
@@ -86,8 +87,8 @@ class StationBody:
         return replace(take, time=take.time - started, starts_at=0.0)
 
     def _advance(self, now: int) -> None:
-        """Whole steps up to now; what servos were told in the same instant goes out as one command."""
-        target = int(self.time(now) / self.step + 1e-6) * self.step
+        """Whole steps up to the one nearest to now; what servos were told in the same instant goes out as one command."""
+        target = int(self.time(now) / self.step + 0.5) * self.step
         if target <= self._run.time + 1e-9:
             return
         if self._changed:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 from workbench.device import export
 from workbench.gait.ensemble import load_ensemble
-from workbench.gait.limits import GaitLimits
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import Optimized, OptimizeOptions, optimize, options_of, write_gait
 from workbench.gait.request import Request
@@ -22,10 +20,6 @@ SPEED = 0.10
 """What the demo asks for [m/s]: four times what the ROBOTIS walk does on this model."""
 
 
-WANDERS = math.radians(45.0)
-"""How much heading may change by distance over draws [rad/m, RMS]: half as much again as `optimize` allows by default."""
-
-
 def demo_options() -> OptimizeOptions:
     """A look that takes seconds: few seeds, six robots of the ensemble, no finer step than half a millisecond."""
     first = options_of(1)
@@ -35,7 +29,7 @@ def demo_options() -> OptimizeOptions:
 
 def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:
     """Seeks a gait, writes it with its certificate and page into `folder`, and its firmware tables if its certificate is good."""
-    request = Request(speed=SPEED, limits=GaitLimits(spread=WANDERS))
+    request = Request(speed=SPEED)
     result = optimize(GaitMachine(model), request, load_ensemble(), demo_options(),
                       lambda what, done: progress(f"a new gait: {what}", done))
     parts: list[Part] = [Text(_said(result))]

@@ -63,13 +63,16 @@ class UdpLink:
 
     @property
     def description(self) -> str:
+        """Whom this link speaks to, and through what."""
         how = "chosen by the route to it" if self.chosen else "as asked"
         return f"server {self._server[0]} through interface {self.interface} ({how}; this machine has {', '.join(addresses())})"
 
     def now(self) -> float:
+        """Time of this link's clock [s]."""
         return time.monotonic()
 
     def send(self, data: bytes) -> None:
+        """Sends a packet to the server; InputError where it cannot be reached."""
         try:
             self._command.sendto(data, self._server)
         except OSError as e:
@@ -89,6 +92,7 @@ class UdpLink:
                                    f"{self.description}") from None
 
     def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        """The next packet and when it came [s], None where none comes within `timeout` [s]."""
         sockets = [s for s in (self._data, self._command) if s is not None]
         ready, _, _ = select.select(sockets, [], [], timeout)
         for s in ready:
@@ -99,6 +103,7 @@ class UdpLink:
         return None
 
     def close(self) -> None:
+        """Closes both sockets."""
         for s in (self._command, self._data):
             if s is not None:
                 s.close()
@@ -113,18 +118,23 @@ class VirtualLink:
 
     @property
     def description(self) -> str:
+        """Whom this link speaks to, and through what."""
         return "emulated server"
 
     def now(self) -> float:
+        """Time of this link's clock [s]."""
         return self._now
 
     def send(self, data: bytes) -> None:
+        """Sends a packet to the server; InputError where it cannot be reached."""
         self._waiting += [(self._now + 2 * self._delay, a) for a in self._server.answer(data, self._now + self._delay)]
 
     def subscribe(self, info: ServerInfo) -> None:
+        """Nothing to join: the emulated server sends to this link."""
         pass
 
     def receive(self, timeout: float) -> tuple[float, bytes] | None:
+        """The next packet and when it came [s], None where none comes within `timeout` [s]."""
         end = self._now + timeout
         self._waiting += [(t + self._delay, data) for t, data in self._server.due(end - self._delay)]
         self._waiting.sort(key=lambda item: item[0])
@@ -136,6 +146,7 @@ class VirtualLink:
         return self._now, data
 
     def close(self) -> None:
+        """Closes both sockets."""
         pass
 
 

@@ -28,6 +28,8 @@ class _Content:
     sent: list[tuple[float, dict[str, Sequence[float]]]] = field(default_factory=list)
     read: dict[str, list[Sequence[float]]] = field(default_factory=dict)
     torque: list[tuple[float, dict[str, bool]]] = field(default_factory=list)
+    rests: list[float] = field(default_factory=list)
+    """When the goal was sent in which it then rested."""
 
 
 def finish_log(journal: str | Path, log: str | Path) -> Path:
@@ -81,14 +83,13 @@ def _take(content: _Content, entry: Mapping[str, Any]) -> None:
         content.read.setdefault(entry["joint"], []).append(row)
     elif "torque" in entry:
         content.torque.append((entry["t"], entry["torque"]))
+    elif "rest" in entry and content.sent:
+        content.rests.append(content.sent[-1][0])
 
 
 def _rest_begins(content: _Content) -> float:
-    """When the ramp to neutral had sent its last goal: the first at which all joints are told zero; else the first of all."""
-    for t, goal in content.sent:
-        if all(abs(goal[j][0]) < 1e-9 for j in content.joints if j in goal):
-            return t
-    return content.sent[0][0]
+    """When the last goal before the rest in neutral was sent; where it never came to that, the first goal of all."""
+    return content.rests[0] if content.rests else content.sent[0][0]
 
 
 def _between(time: Array, known: Array, values: Array) -> Array:

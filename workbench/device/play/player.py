@@ -25,15 +25,18 @@ class PlayOptions:
 
     ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of a
     ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within: how
-    long it may take beyond the ramp [s]. rest: how long the robot stands in neutral before the first pose and after the last [s];
-    a recording needs half a second of it. watchdog: silence after which servos that can stop by themselves [s]. hold: torque
-    stays on at the end.
+    long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there itself
+    before it is let down onto its droop [rad]; seat_seconds: how long it gets for that [s]. rest: how long the robot stands in
+    neutral before the first pose and after the last [s]; a recording needs half a second of it. watchdog: silence after which
+    servos that can stop by themselves do [s]. hold: torque stays on at the end.
     """
 
     ramp_speed: float = 0.6
     step: float = 0.02
     arrive: float = math.radians(12)
     within: float = 1.0
+    seat: float = math.radians(4)
+    seat_seconds: float = 0.3
     rest: float = 1.0
     watchdog: float = 0.5
     hold: bool = False
@@ -98,6 +101,7 @@ class _Performance:
             try:
                 self._ramp(neutral, "to neutral")
                 self._arrived(neutral)
+                self._seat(neutral)
                 self._rest()
                 self._poses(commands)
                 self._ramp(neutral, "back to neutral")
@@ -172,24 +176,45 @@ class _Performance:
                 raise _StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): stands at {stands:.0f} deg and not "
                                                      f"at {wanted:.0f}; what holds it?"))
 
+    def _seat(self, target: Mapping[str, float]) -> None:
+        """Brings each joint onto its goal itself, by as much beyond it as it hangs below, then tells all the goal at once. So
+        they rest where they fall to from there, as the simulated robot does; one that comes from below is held lower by its
+        friction, and a camera's zero with it."""
+        half, most = 0.6 * self.rig.bus.profile.count, self.options.seat
+        speeds = dict.fromkeys(target, self.options.ramp_speed)
+        for _ in range(2):
+            below = {j: target[j] - a for j, a in self.rig.angles.items() if abs(target[j] - a) > half}
+            if not below:
+                break
+            self.progress("settling in neutral", None)
+            self.goals = {j: g + min(max(below.get(j, 0.0), -most), most) for j, g in self.goals.items()}
+            self._keep_in_range()
+            self.rig.send(self.goals, speeds)
+            self._read_until(self.rig.bus.now() + self.options.seat_seconds)
+        if self.goals != dict(target):
+            self.goals = dict(target)
+            self.rig.send(self.goals, speeds)
+
     def _rest(self) -> None:
         self.progress("resting in neutral", None)
+        self.rig.journal.write(t=self.rig.bus.now(), rest=True)
         self._read_until(self.rig.bus.now() + self.options.rest)
 
     def _poses(self, commands: Commands) -> None:
-        """Each pose at its time after the first, however late the one before it was."""
+        """Each pose at its time after the first, however late the one before it was; its time is that of its packet's end."""
         bus = self.rig.bus
         self.started = bus.now()
+        packet = 0.0
         for k, time in enumerate(commands.times.tolist()):
-            due = self.started + time
-            self._read_until(due)
+            self._read_until(self.started + time - packet)
+            begun = bus.now()
             self.progress("playing", time / commands.end)
             goals = dict(zip(commands.joints, commands.goals[k].tolist()))
             sent = self.rig.send(goals, dict(zip(commands.joints, commands.speeds[k].tolist())))
             self.goals |= goals
             self.poses += 1
             if not k:
-                self.started = sent
+                self.started, packet = sent, sent - begun
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
         self.ended = bus.now()

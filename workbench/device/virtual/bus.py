@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
 from workbench.device.virtual.clock import SECOND, Clock
-from workbench.device.virtual.protocol import Instruction
+from workbench.device.virtual.protocol import BROADCAST, Instruction
 
 if TYPE_CHECKING:
     from workbench.device.virtual.servo import VirtualServo
@@ -158,7 +158,9 @@ class ServoBus:
     def _dispatch(self, packet: Instruction, end: int, burst: Burst, key: tuple[int, int]) -> None:
         start = end - burst.byte * (len(packet.parameters) + 6)
         for servo in self.servos:
-            if servo is burst.talker or (servo.rate, id(servo.profile.protocol)) != key:
+            if packet.servo not in (servo.ident, BROADCAST) or servo is burst.talker:
+                continue
+            if (servo.rate, id(servo.profile.protocol)) != key:
                 continue
             if self._talking_until.get(id(servo), -1) > start:  # it was talking itself, and heard nothing
                 continue

@@ -80,9 +80,7 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         self._alive()
         if not self._rx:
             clock = self.bus.clock
-            nearest = clock.next_event
-            latest = clock.now + MILLISECOND
-            clock.advance(latest if nearest is None else min(max(nearest, clock.now + 1), latest))
+            clock.advance(min(max(clock.next_time, clock.now + 1), clock.now + MILLISECOND))
         return bytes(self._rx.popleft() for _ in range(min(length, len(self._rx))))
 
     def getBytesAvailable(self) -> int:

@@ -1,12 +1,16 @@
-"""What kind of servo it is, as data: its registers and its times."""
+"""What kind of servo it is: where its registers lie, by the same data file that real ones are read by, and what a servo does with
+them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from workbench.device.virtual.protocol import Protocol, Protocol1
+from workbench.robot import data_file
+from workbench.robot.servo_profile_file import load_profile
 
 
 @dataclass(frozen=True)
@@ -21,6 +25,16 @@ class Register:
     high: int = 0
     writable: bool = True
     eeprom: bool = False
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What a servo keeps in a register: from the factory or at power-on, and what may be written (None: nothing). at: address and
+    size of one that the data file does not name, as nobody needs it from outside."""
+
+    default: int = 0
+    writable: tuple[int, int] | None = None
+    at: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)
@@ -42,16 +56,16 @@ class VirtualProfile:
     registers: tuple[Register, ...]
     bit_rate: Callable[[int], int]
     size: int
-    counts: int = 1023
-    span: float = 5.235987755982989
-    centre: int = 512
-    speed_unit: float = 0.011623892818282235
-    speed_sign: int = 0x400
-    return_delay_unit: float = 2e-6
+    counts: int
+    span: float
+    centre: int
+    speed_unit: float
+    speed_sign: int
+    load_sign: int
+    full_torque: int
+    return_delay_unit: float
     answer_times: tuple[float, float, float, float] = (18e-6, 22e-6, 24e-6, 6e-6)
     interrupt: tuple[float, float] = (1e-3, 130e-6)
-    load_sign: int = 0x400
-    full_torque: int = 1023
     goal_enables: bool = True
     eeprom_lock: int = 0
     refresh: float = 0.130
@@ -67,3 +81,25 @@ class VirtualProfile:
     def at(self) -> dict[int, tuple[Register, int]]:
         """Which register, and which byte of it, lies at an address."""
         return {r.address + k: (r, k) for r in self.registers for k in range(r.size)}
+
+
+def emulated(file: str, model: str, size: int, kept: Mapping[str, Kept], **own: Any) -> VirtualProfile:
+    """A servo of the family that a file in data/servos describes: addresses, sizes, signs, units and bit rates are the file's,
+    `own` what only a servo knows of itself."""
+    family = load_profile(data_file(f"servos/{file}.yaml"))
+
+    def sign(name: str) -> int:
+        bit = family.registers[name].sign
+        return 1 << bit if isinstance(bit, int) else 0
+
+    registers = []
+    for name, keeps in kept.items():
+        address, length = keeps.at or (family.registers[name].address, family.registers[name].size)
+        low, high = keeps.writable or (0, 0)
+        registers.append(Register(name, address, length, keeps.default, low, high, keeps.writable is not None,
+                                  address < family.eeprom_below))
+    common: dict[str, Any] = {
+        "bit_rate": lambda value: family.bit_rates[value], "counts": family.counts, "span": family.span, "centre": family.centre,
+        "speed_unit": family.speed_unit, "speed_sign": sign("present_speed"), "load_sign": sign("present_load"),
+        "full_torque": family.full_torque, "return_delay_unit": family.return_delay_unit}
+    return VirtualProfile(name=model, registers=tuple(registers), size=size, **common | own)

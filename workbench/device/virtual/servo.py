@@ -53,8 +53,8 @@ class VirtualServo:
         self._latched = Sense(0.0)
         self._drive: Drive | None = None
         self._heard = 0
-        self.rate = 0
-        """Bit/s at which it listens and talks."""
+        self.ident, self.rate = ident, 0
+        """ID on the bus; bit/s at which it listens and talks."""
         for register in profile.registers:
             self._put(register, register.default)
         self["id"] = ident
@@ -77,15 +77,13 @@ class VirtualServo:
         """Whether this family has such a register."""
         return name in self.profile.by_name
 
-    @property
-    def ident(self) -> int:
-        """Its ID on the bus."""
-        return self["id"]
-
     def _put(self, register: Register, value: int) -> None:
         self._table[register.address:register.address + register.size] = value.to_bytes(register.size, "little")
-        if register.name == "baud_rate":
-            self.rate = self.profile.bit_rate(value)
+        if register.name in ("id", "baud_rate"):
+            self._address()
+
+    def _address(self) -> None:
+        self.ident, self.rate = self["id"], self.profile.bit_rate(self["baud_rate"])
 
     # Power
 
@@ -213,7 +211,7 @@ class VirtualServo:
         if error:
             return error, 0
         self._table = new
-        self.rate = self.profile.bit_rate(self["baud_rate"])  # the answer to this comes at the new rate
+        self._address()  # the answer to this comes at the new rate
         for register in touched.values():
             self.written.append((time, register.address, self[register.name]))
         if "goal_position" in touched and self.profile.goal_enables:

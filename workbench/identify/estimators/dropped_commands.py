@@ -35,18 +35,22 @@ class DroppedCommands:
 
     @property
     def count(self) -> int:
+        """Of poses that the joint missed, in all takes."""
         return sum(map(len, self.poses.values()))
 
     @property
     def probability(self) -> float:
+        """With which a pose is missed."""
         return self.count / self.of
 
     @property
     def mean(self) -> float:
+        """Of the effect's number: the probability."""
         return self.probability
 
     @property
     def variance(self) -> float:
+        """Of the probability, by the binomial distribution."""
         return self.probability * (1 - self.probability) / self.of
 
     @property

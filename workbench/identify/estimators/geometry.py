@@ -60,6 +60,7 @@ class Measured:
 
     @property
     def variance(self) -> float:
+        """Of the mean, in the square of its unit."""
         return self.sigma**2
 
     @property

@@ -37,6 +37,7 @@ class Solved:
 
     @property
     def cost(self) -> float:
+        """Sum of squared residuals."""
         return float(self.r @ self.r)
 
 

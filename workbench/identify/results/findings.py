@@ -30,6 +30,7 @@ class Change:
     unit: str
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"before": _number(self.before), "after": _number(self.after), "unit": self.unit}
 
 
@@ -51,6 +52,7 @@ class Estimate:
                 raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"value": _numbers(self.value), "low": _numbers(self.low), "high": _numbers(self.high), "unit": self.unit}
 
 
@@ -66,6 +68,7 @@ class Alternative:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.confidence)}
 
 
@@ -80,6 +83,7 @@ class FamilyBelief:
         _check_confidence(self.confidence)
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"name": self.name, "confidence": _number(self.confidence)}
 
 
@@ -96,9 +100,11 @@ class Recalibrated:
 
     @property
     def sigmas(self) -> float:
+        """By how many of its standard deviations it went."""
         return (self.value - self.nominal) / self.sd
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
                 "unit": self.unit}
 
@@ -139,6 +145,7 @@ class Finding:
         return self.confidence + sum(a.confidence for a in self.alternatives) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"effect": self.effect, "where": list(self.where), "confidence": _number(self.together),
                 **({} if self.family is None else {"family": self.family.to_json()}),
                 "parameters": {name: p.to_json() for name, p in self.parameters.items()},
@@ -156,6 +163,7 @@ class Rejected:
     validation: Change | None = None
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         out = {"effect": self.effect, "where": list(self.where), "reason": self.reason.said()}
         return out if self.validation is None else out | {"validation": self.validation.to_json()}
 
@@ -179,6 +187,7 @@ class GapEntry:
             raise ValueError(f"layer: expected one of {', '.join(get_args(Layer))}, got {self.layer!r}")
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"layer": self.layer, "where": list(self.where), "take": self.take,
                 "when": [[round(_number(a), 4), round(_number(b), 4)] for a, b in self.when], **_said("phase", self.phase),
                 "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit}
@@ -195,6 +204,7 @@ class Unexplained:
     description: Description
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"where": list(self.where), "error": _number(self.error), "floor": _number(self.floor), "unit": self.unit,
                 "description": self.description.said()}
 
@@ -210,6 +220,7 @@ class NextExperiment:
     log_likelihood_ratios: tuple[float, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
         return {"motion": self.motion, "base": self.base, "separates": [list(pair) for pair in self.separates]}
 
 

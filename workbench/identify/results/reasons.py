@@ -48,16 +48,23 @@ class WorseInPlace(Reason):
     behind: float
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         more = f"{self.behind:.0f} more" if self.behind >= 0 else f"only {-self.behind:.0f} less"
         return f"in place of {naming(self.effect, self.where)} it leaves {more} of chi squared on stretches that no fit saw"
 
 
 @dataclass(frozen=True)
 class ScreenedOut(Reason):
-    """By its response alone, without a fit."""
+    """By its response alone, without a fit: what that takes off chi squared at its best, `gain`, and what the best rival's does,
+    `best`, on the stretches looked at."""
+
+    gain: float
+    best: float
 
     def said(self, naming: Naming = effect_at) -> str:
-        return "its signature is not that of what is missing"
+        """The reason in words, effects named by `naming`."""
+        takes = f"would take {self.gain:.0f} off chi squared at most" if self.gain >= 1 else "takes nothing off chi squared"
+        return f"its signature is not that of what is missing: it {takes}, the best rival's {self.best:.0f}"
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,7 @@ class TooLittle(Reason):
     """Nothing was accepted at its place."""
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return "what it takes away is no more than chance, or too little of what is missing there"
 
 
@@ -79,6 +87,7 @@ class Outdone(Reason):
     gain: float
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return (f"{naming(self.effect, self.where)} takes {self.taken:.0f} off chi squared on the choosing stretches, this "
                 f"{self.gain:.0f}")
 
@@ -90,6 +99,7 @@ class LessLikely(Reason):
     behind: float
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return f"the likeliest model with it is behind by {self.behind:.1f} nats (a factor of e each)"
 
 
@@ -100,6 +110,7 @@ class SpokenAgainst(Reason):
     by: float
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return f"takes that were kept back are less likely with it, by {self.by:.0f} nats"
 
 
@@ -113,6 +124,7 @@ class RefutedByRegister(Reason):
     unit: str
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
         return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{unit}"
 
@@ -133,6 +145,7 @@ class Dependence(Description):
     worst: str = ""
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         what = (f"{self.channel}, " if self.channel in BODY else
                 f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
         goes = "nothing tried" if self.signal is None else f"{self.signal} (correlation {self.correlation:.2f})"
@@ -151,6 +164,7 @@ class ParameterDrift(Description):
     unit: str
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return (f"{self.parameter} of {naming(self.effect, self.where)} would have to go from {self.first:.3g} to "
                 f"{self.last:.3g} {self.unit} within a take: something that changes looks like it")
 
@@ -163,5 +177,6 @@ class DownwardPull(Description):
     mass: float
 
     def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
         return (f"the {self.effect.replace('_', ' ')} is a pull straight down, with the weight of {1e3 * self.mass:.0f} g that "
                 "does not resist being moved as a load does: something that hangs and swings looks like it")

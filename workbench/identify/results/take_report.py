@@ -41,6 +41,7 @@ class TakeReport:
 
     @property
     def name(self) -> str:
+        """Of the take."""
         return self.recorded.name
 
     @property

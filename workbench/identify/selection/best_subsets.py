@@ -94,6 +94,7 @@ def variants(t: CandidateFit, points: Sequence[Array], responses: Sequence[Array
 
 
 def best_sets(seen: Sequence[Response], r0: Array) -> list[list[CandidateFit]]:
+    """The best sets of each size by what they would leave of the residuals `r0` if they were linear, the best first."""
     lines = _NormalEquations(seen, r0)
     best = lines.whole
     out: list[list[CandidateFit]] = []

@@ -18,13 +18,15 @@ class CandidateFit:
     """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
     `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
     choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
-    much less of it than of a rival that no fit was made."""
+    much less of it than of a rival that no fit was made; promised: what its response then takes off chi squared, and what the
+    best rival's does."""
 
     candidate: Candidate
     x: Array
     gain: Mapping[str, float]
     joint: str | None
     screened_out: bool = False
+    promised: tuple[float, float] = (0.0, 0.0)
     closed: float = 0.0
     by_channel: Array = field(default_factory=lambda: np.empty(0), repr=False)
 
@@ -47,6 +49,7 @@ class Race:
 
 
 def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:
+    """Keeps the largest gain for each joint."""
     for j, gain in zip(joints, gains):
         best[j] = max(best.get(j, 0.0), gain)
 

@@ -88,7 +88,7 @@ class CandidateEvaluation:
         past = yield from self._past()
         starts, gains = past or (yield from self._looked_at())
         alive = [] if past else (yield from self._worth_fitting(gains))
-        out = [CandidateFit(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, screened_out=True)
+        out = [CandidateFit(c, x, dict.fromkeys(("fit", "choose"), min(g, 0.0)), j, True, (g, self._best(j)))
                for b, (c, x, g, j) in enumerate(zip(self.group, starts, gains, self.joints)) if b not in alive]
         if not alive:
             return out
@@ -177,6 +177,10 @@ class CandidateEvaluation:
         while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
             until += SCREENING.looked / 2
         return until
+
+    def _best(self, joint: str | None) -> float:
+        seen = (self.race.screened_out, self.race.remembered)
+        return max(max(of.values(), default=0.0) if joint is None else of.get(joint, 0.0) for of in seen)
 
     def _early(self, until: float) -> dict[int, Array]:
         """What there is already leaves of the takes that are looked at for so long [s]."""

@@ -104,7 +104,7 @@ def read_sage_raw(path: str | Path) -> Recording:
     t_cmd, goals = _vectors(folder / "control.csv", ("positions",), len(joints))
     t_meas, measured = _vectors(folder / "state_motor.csv", ("positions", "velocities", "torques"), len(joints))
     channels = {"position": measured["positions"], "velocity": measured["velocities"], "torque_magnitude": measured["torques"]}
-    return _recording(str(path), folder.name, joints, t_cmd, goals["positions"], t_meas, channels)
+    return _recording(str(path), folder.resolve().name, joints, t_cmd, goals["positions"], t_meas, channels)
 
 
 def _vectors(path: Path, columns: tuple[str, ...], width: int) -> tuple[Array, dict[str, Array]]:
@@ -145,17 +145,23 @@ def _is_vector(cell: str | None, width: int) -> bool:
 
 def _recording(source: str, name: str, joints: tuple[str, ...], t_cmd: Array, goals: Array, time: Array,
                measured: dict[str, Array]) -> Recording:
+    of = f"{name}: " if name else ""
     for what, t in (("command", t_cmd), ("measurement", time)):
-        if len(t) == 0 or not np.isfinite(t).all() or not np.all(np.diff(t) > 0) or not np.all(np.diff(t - t[0]) > 0):
-            raise InputError(source, f"{name}: {what} times do not increase")
+        if len(t) == 0:
+            raise InputError(source, f"{of}expected {what} times, found none")
+        bad = ~np.isfinite(t) | (np.diff(t, prepend=-np.inf) <= 0) | (np.diff(t - t[0], prepend=-np.inf) <= 0)
+        if bad.any():
+            n = int(np.argmax(bad))
+            raise InputError(source, f"{of}{what} {n + 1} of {len(t)}: time {t[n]:.10g} s does not follow; expected increasing "
+                                     "times")
     for what, values in {"goal": goals, **measured}.items():
         rows = len(t_cmd) if what == "goal" else len(time)
         if values.shape != (rows, len(joints)):
-            raise InputError(source, f"{name}: {what} has shape {values.shape}; expected {(rows, len(joints))}")
+            raise InputError(source, f"{of}{what} has shape {values.shape}; expected {(rows, len(joints))}")
     for what, values in {"goal": goals, **measured}.items():
         if np.isinf(values).any() or (what in ("goal", "position") and not np.isfinite(values).any()):
-            raise InputError(source, f"{name}: {what} holds no finite number" if not np.isfinite(values).any()
-                             else f"{name}: {what}: expected finite numbers")
+            raise InputError(source, f"{of}{what} holds no finite number" if not np.isfinite(values).any()
+                             else f"{of}{what}: expected finite numbers")
     commands = commands_of_rows(t_cmd, joints, goals, np.ones(goals.shape, dtype=bool))
     latest = np.maximum(np.searchsorted(t_cmd, time, side="right") - 1, 0)
     channels = {f"goal.{j}": goals[latest, i] for i, j in enumerate(joints)}

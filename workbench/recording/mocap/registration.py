@@ -68,13 +68,17 @@ def _register_log(recording: Recording, model: RobotModel, starts_at: float | No
     recording = named_by_model(recording, model)
     positions = {j: recording.channels[f"position.{j}"] for j in model.joints if f"position.{j}" in recording.channels}
     counts: dict[str, float] = {}  # servos of one kind count alike
+    steps: dict[str, float] = {}  # for those that never move, and so tell no count of theirs
     for joint, position in positions.items():
         kind = model.servo(joint).model
         counts[kind] = float(np.fmin(counts.get(kind, np.nan), count_that_stays(position)))
+        steps[kind] = min(steps.get(kind, np.inf), resolution(position) or np.inf)
     noise = {}
     for joint, position in positions.items():
         still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
-        count = np.fmax(resolution(position), counts[model.servo(joint).model])
+        kind = model.servo(joint).model
+        own = resolution(position) or (steps[kind] if np.isfinite(steps[kind]) else 0.0)
+        count = np.fmax(own, counts[kind])
         noise[joint] = float(np.fmax(still, count / np.sqrt(12)))
     return Measurement(starts_at=first_command(recording, starts_at), noise=noise)
 

@@ -69,9 +69,9 @@ def quiet_drake() -> Iterator[None]:
 
 
 @cached_by_content(maxsize=32)
-def model_problems(path: Path, source: Path) -> tuple[str, ...]:
+def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
     """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
-    none."""
+    none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -92,7 +92,9 @@ def model_problems(path: Path, source: Path) -> tuple[str, ...]:
         return ()
     bodies = [plant.get_body(b) for b in plant.GetBodyIndices(instances[0])]
     groups = _fixed_together(plant)
-    return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies), *_feet(plant, scene_graph, bodies))
+    groups = {name: group for name, group in groups.items() if held not in group}
+    feet = () if held else _feet(plant, scene_graph, bodies)
+    return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies, held), *feet)
 
 
 def _fixed_together(plant: Any) -> dict[str, set[str]]:
@@ -121,14 +123,14 @@ def _without_mass(plant: Any, groups: dict[str, set[str]]) -> Iterator[str]:
             yield f"link '{name}' weighs nothing, nor does what is fixed to it, though a joint moves it"
 
 
-def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any]) -> Iterator[str]:
+def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any], held: str) -> Iterator[str]:
     reaches = {b.name(): _reach(plant, scene_graph, b) for b in bodies}
     overall = max(reaches.values(), default=0.0)
     for body in bodies:
         name, mass, reach = body.name(), body.default_mass(), reaches[body.name()]
         if reach > CHECKS.longest:
             yield f"link '{name}' reaches {reach:.3g} m from its frame: are lengths in millimetres?"
-        if mass <= 0:
+        if mass <= 0 or name == held:
             continue
         about = body.default_rotational_inertia().CopyToFullMatrix3()
         c = body.default_com()

@@ -22,14 +22,20 @@ def limit_bars(certificate: Certificate) -> Figure:
         colour = COMMAND if m.advice else RECORDED if m.use > 1 else FLOOR if m.use > 0.95 else SIMULATED
         axes.barh(k, max(use, 0.0), color=colour, hatch="//" if m.advice else None, edgecolor="white", height=0.7)
         where = "" if m.where in ("robot", "table") else f" ({m.where})"
-        axes.annotate(f"{m.value:.3g} of {m.limit:.3g} {m.unit}{where}", (max(use, 0.0), k), xytext=(5, 0),
-                      textcoords="offset points", va="center", fontsize=10)
+        axes.annotate(f"{short(m.value)} of {short(m.limit)} {m.unit}{where}", (max(use, 0.0), k), xytext=(5, 0),
+                      textcoords="offset points", va="center", fontsize=10, zorder=4,
+                      bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.2})
     axes.set_yticks(range(len(rows)), [name for name, _ in rows])
     axes.axvline(1.0, color=RECORDED, linewidth=1.4)
     axes.set_xlim(0, max(1.9, max(min(m.use, 2.6) for _, m in rows) + 0.9))
     axes.set_xlabel("value by limit")
     axes.grid(axis="y", visible=False)
     return figure
+
+
+def short(value: float) -> str:
+    """Three digits; what is far below any limit's precision is 0."""
+    return "0" if abs(value) < 1e-3 else f"{value:.3g}"
 
 
 @styled

@@ -50,6 +50,7 @@ def write_comparison(comparison: Comparison, model: RobotModel, folder: Path, ti
 
 
 def headline(comparison: Comparison) -> str:
+    """The page's first sentence: which joints differ by more than noise and numerics make."""
     over = [(t, j, c) for t in comparison.takes for j, c in t.joints.items() if c.over_noise > LIMIT]
     if not over:
         return f"Every joint's error is within {LIMIT:g} times what noise and numerics make."

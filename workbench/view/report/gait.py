@@ -30,7 +30,7 @@ from workbench.view.figures import (
     phase_portrait,
     stance_of,
 )
-from workbench.view.figures.gait import draw_ranges, limit_bars
+from workbench.view.figures.gait import draw_ranges, limit_bars, short
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay
 
@@ -51,7 +51,7 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
     strip = film_strip(on, take, None if walk is None else walk[0])
     if result.problem:
         report.add(Section("Not met", [Text(result.problem)]))
-    report.add(Section("The gait", [Replay(replay, "Six seconds from rest, with the ground's forces." + ghost, strip),
+    report.add(Section("The gait", [Replay(replay, "From rest, with the ground's forces." + ghost, strip),
                                     *_walking(take, on, walk)]))
     report.add(_limits_section(certificate))
     report.add(_draws_section(certificate))
@@ -123,7 +123,7 @@ def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | Non
 
 
 def _limits_section(certificate: Certificate) -> Section:
-    rows = [[m.name, m.where, f"{m.value:.3g}", f"{m.limit:.3g}", m.unit, f"{100 * m.margin:.0f} %",
+    rows = [[m.name, m.where, short(m.value), short(m.limit), m.unit, f"{100 * m.margin:.0f} %",
              "advice" if m.advice else "kept" if m.use <= 1 else "broken"] for m in certificate.margins]
     shown = [rows[certificate.margins.index(m)] for _, m in each(certificate.margins)]
     header = ["limit", "where", "value", "limit", "unit", "left", ""]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.robot import InputError, RobotModel, load_servo_constants
+from workbench.robot import ROBOTS, InputError, RobotModel, load_servo_constants
 from workbench.robot.files import read_json, read_text, regular_file
 from workbench.robot.tables import is_binary, plain_head
 from workbench.robot.yaml_file import read_yaml
@@ -77,6 +77,8 @@ def inspect_file(file: str | Path, packages: Mapping[str, str] | None = None) ->
     path = Path(file)
     if name.startswith("package://"):
         return _model(name, packages)
+    if name in ROBOTS and not path.exists():  # as --model names it
+        return _model(f"package://{name}/{name}.sdf", packages)
     if path.is_dir():
         return _folder(path)
     whole = path if path.exists() else Path(name.partition("#")[0])  # FILE.mtn#PAGE, FILE.npz#PROGRAMME
@@ -235,7 +237,7 @@ def _yaml(path: Path) -> Inspection:
         raise InputError(path, "expected keys with values")
     if "takes" in content or "predict" in content:
         return _session(path)
-    if "effects" in content or "servos" in content:
+    if not {"effects", "servos", "robot"}.isdisjoint(content):
         return _fitted_model(path)
     if "stall_torque" in content:
         servo = load_servo_constants(path)

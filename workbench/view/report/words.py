@@ -148,14 +148,14 @@ def layers_of(diagnosis: Diagnosis) -> str:
         return ""
     count = {layer: sum(g.layer == layer for g in diagnosis.gap) for layer in LAYERS}
     seen = sorted((layer for layer in LAYERS if count[layer]), key=lambda layer: -count[layer])
-    said = "By the form of the errors alone, before any cause was tried, this looks like " + listed(
+    said = "Sorted by where and when they show, the errors are of the kind that comes of " + listed(
         [f"{LAYERS[layer]} ({layer}, {count[layer]} of {len(diagnosis.gap)} entries)" for layer in seen]) + "."
     causes: dict[Layer, list[str]] = {}
     for f in diagnosis.findings:
         causes.setdefault(effect_named(f.effect).layer, []).append(title_of(f.effect, f.where))
     if causes:
         found = [f"{listed(names)}, which is {LAYERS[layer]} ({layer})" for layer, names in causes.items()]
-        said += f" What explains it is {listed(found)}."
+        said += f" The cause that was found is {listed(found)}; one cause may show as errors of several kinds."
     if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
         said += " Such a cause is felt at many joints at once."
     return said
@@ -196,7 +196,7 @@ def _odds(ratio: float) -> str:
 
 
 def listed(words: Sequence[str], last: str = "and") -> str:
-    """ "a, b and c". """
+    """As in: a, b and c."""
     return f" {last} ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
 
 

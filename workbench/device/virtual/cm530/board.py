@@ -76,6 +76,7 @@ class Board:
             0x40013800: self.servo_usart, 0x40004800: self.pc_usart, 0x40005000: self.zigbee_usart, 0x40020000: self.dma,
             0x40012400: Converter(self, (0x18, 9)), 0x40003000: self.watchdog, 0xE000E000: self.core,
         }
+        self._registers = {base + offset: (p, offset) for base, p in self.peripherals.items() for offset in p.known}
         self._interrupts = ((15, lambda: self.dma.waits(5)), (37, self.servo_usart.interrupts), (39, self.pc_usart.interrupts),
                             (53, self.zigbee_usart.interrupts))
         self._on = False
@@ -126,32 +127,30 @@ class Board:
 
     # Registers
 
-    def _peripheral(self, address: int) -> Peripheral:
-        base = address & ~0x3FF if address < 0xE0000000 else 0xE000E000
-        peripheral = self.peripherals.get(base)
-        if peripheral is None or address - base not in peripheral.known:
-            raise BoardError(f"no such register: {address:#010x}")
-        return peripheral
+    def clocks_changed(self) -> None:
+        """Which peripherals have a clock now."""
+        for peripheral in self.peripherals.values():
+            gate = peripheral.gate
+            peripheral.clocked = gate is None or bool(self.clocks.words[gate[0]] >> gate[1] & 1)
 
-    def _clocked(self, peripheral: Peripheral, address: int) -> bool:
-        gate = peripheral.gate
-        if gate is None or self.clocks.words.get(gate[0], 0) >> gate[1] & 1:
-            return True
-        self._violated(f"register {address:#010x} used while its clock is off")
-        return False
+    def _register(self, address: int) -> tuple[Peripheral, int]:
+        found = self._registers.get(address)
+        if found is None:
+            raise BoardError(f"no such register: {address:#010x}")
+        if not found[0].clocked:
+            self._violated(f"register {address:#010x} used while its clock is off")
+        return found
 
     def _read(self, address: int) -> int:
-        peripheral = self._peripheral(address)
-        base = address & ~0x3FF if address < 0xE0000000 else 0xE000E000
-        return peripheral.read(address - base) if self._clocked(peripheral, address) else 0
+        peripheral, offset = self._register(address)
+        return peripheral.read(offset) if peripheral.clocked else 0
 
     def _write(self, address: int, size: int, value: int) -> None:
-        peripheral = self._peripheral(address)
+        peripheral, offset = self._register(address)
         if size != 4:
             raise BoardError(f"{size} bytes written to {address:#010x}; this board takes words")
-        base = address & ~0x3FF if address < 0xE0000000 else 0xE000E000
-        if self._clocked(peripheral, address):
-            peripheral.write(address - base, value)
+        if peripheral.clocked:
+            peripheral.write(offset, value)
 
     def _pending(self) -> int | None:
         if self.core.tick_waits:

@@ -15,7 +15,6 @@ import unicorn
 from unicorn import arm_const as arm
 from unicorn.unicorn_py3.unicorn import uclib
 
-NEVER = 2**62
 SOURCE = Path(__file__).with_name("cycles.c")
 
 
@@ -52,27 +51,6 @@ class Cycles(ctypes.Structure):
         if self.now >= self.limit or (self.wish and not uc.reg_read(arm.UC_ARM_REG_PRIMASK)):
             self.wish = 0
             uc.emu_stop()
-
-
-class Registers:
-    """Several registers read or written in one call."""
-
-    def __init__(self, uc: unicorn.Uc, numbers: tuple[int, ...]) -> None:
-        self._uc = uc
-        self._numbers = (ctypes.c_int * len(numbers))(*numbers)
-        self._values = (ctypes.c_uint64 * len(numbers))()
-        size = ctypes.sizeof(ctypes.c_uint64)
-        self._places = (ctypes.c_void_p * len(numbers))(*(ctypes.addressof(self._values) + size * k for k in range(len(numbers))))
-
-    def read(self) -> list[int]:
-        """Their values, in order."""
-        uclib.uc_reg_read_batch(self._uc._uch, self._numbers, self._places, len(self._numbers))
-        return [value & 0xFFFFFFFF for value in self._values]
-
-    def write(self, values: list[int]) -> None:
-        """Sets them, in order."""
-        self._values[:] = values  # type: ignore[assignment]
-        uclib.uc_reg_write_batch(self._uc._uch, self._numbers, self._places, len(self._numbers))
 
 
 @lru_cache(maxsize=1)

@@ -10,21 +10,22 @@ if TYPE_CHECKING:
 
 class Peripheral:
     """Words that can be read and written; sub-classes give some of them a meaning. gate: RCC register offset and bit of its
-    clock, None where it is always on."""
+    clock, None where it is always on. clocked: whether that clock runs."""
 
     known: frozenset[int] = frozenset()
 
     def __init__(self, board: Board, gate: tuple[int, int] | None) -> None:
         self.board, self.gate = board, gate
-        self.words: dict[int, int] = {}
+        self.clocked = gate is None
+        self.words = dict.fromkeys(self.known, 0)
 
     def reset(self) -> None:
         """As after a reset of the chip."""
-        self.words = {}
+        self.words = dict.fromkeys(self.known, 0)
 
     def read(self, offset: int) -> int:
         """A word."""
-        return self.words.get(offset, 0)
+        return self.words[offset]
 
     def write(self, offset: int, value: int) -> None:
         """A word."""

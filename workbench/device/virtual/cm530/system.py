@@ -12,20 +12,25 @@ if TYPE_CHECKING:
 
 PIN_RESET, POWER_RESET, SOFTWARE_RESET, WATCHDOG_RESET = 1 << 26, 1 << 27, 1 << 28, 1 << 29
 """Flags of RCC_CSR."""
+INTERNAL_HERTZ = 8_000_000
+"""Of the internal oscillator, and of the crystal."""
 
 
 class Clocks(Peripheral):
-    """RCC: oscillators are ready at once, the selected one is the one that runs."""
+    """RCC: oscillators are ready at once, the selected one is the one that runs. hertz: of the processor; slow_hertz: of APB1."""
 
     known = frozenset(range(0, 0x28, 4))
 
     def __init__(self, board: Board) -> None:
         super().__init__(board, None)
         self.causes = 0
+        self.hertz = self.slow_hertz = INTERNAL_HERTZ
 
     def reset(self) -> None:
         """All gates shut, internal oscillator."""
-        self.words = {0: 0x83}
+        super().reset()
+        self.words[0] = 0x83
+        self._settled()
 
     def read(self, offset: int) -> int:
         """Ready bits follow the on bits; CSR tells what reset there was."""
@@ -43,19 +48,16 @@ class Clocks(Peripheral):
                 self.causes = 0
             value &= 1
         super().write(offset, value)
+        self._settled()
 
-    @property
-    def hertz(self) -> int:
-        """What the processor runs at, as far as the program has set it up."""
-        config = super().read(4)
-        on_pll = config & 3 == 2 and super().read(0) & 1 << 24 and super().read(0) & 1 << 16
-        return 8_000_000 * ((config >> 18 & 15) + 2) if on_pll and config & 1 << 16 else 8_000_000
-
-    @property
-    def slow_hertz(self) -> int:
-        """Clock of APB1."""
-        prescaler = super().read(4) >> 8 & 7
-        return self.hertz >> (prescaler - 3 if prescaler > 3 else 0)
+    def _settled(self) -> None:
+        """What runs, and how fast, as far as the program has set it up."""
+        control, config = self.words[0], self.words[4]
+        on_pll = config & 3 == 2 and control & 1 << 24 and control & 1 << 16
+        self.hertz = INTERNAL_HERTZ * ((config >> 18 & 15) + 2) if on_pll and config & 1 << 16 else INTERNAL_HERTZ
+        prescaler = config >> 8 & 7
+        self.slow_hertz = self.hertz >> (prescaler - 3 if prescaler > 3 else 0)
+        self.board.clocks_changed()
 
 
 class Core(Peripheral):
@@ -77,7 +79,7 @@ class Core(Peripheral):
 
     def enabled(self, irq: int) -> bool:
         """Whether an interrupt is let through."""
-        return bool(self.words.get(0x100 + 4 * (irq // 32), 0) >> irq % 32 & 1)
+        return bool(self.words[0x104 if irq > 31 else 0x100] >> irq % 32 & 1)
 
     def write(self, offset: int, value: int) -> None:
         """Set-enable registers only set, clear-enable ones only clear."""
@@ -121,14 +123,15 @@ class Watchdog(Peripheral):
 
     def reset(self) -> None:
         """Off."""
-        self.words = {8: 0xFFF}
+        super().reset()
+        self.words[8] = 0xFFF
         self.started = False
         self._fed += 1
 
     def write(self, offset: int, value: int) -> None:
         """0x5555 unlocks, 0xAAAA feeds, 0xCCCC starts."""
         if offset != 0:
-            if self.words.get(0) == 0x5555:
+            if self.words[0] == 0x5555:
                 self.words[offset] = value
             return
         if value != 0xAAAA or not self.started:
@@ -137,7 +140,7 @@ class Watchdog(Peripheral):
         if value in (0xAAAA, 0xCCCC) and self.started:
             self._fed += 1
             fed = self._fed
-            wait = (self.words[8] + 1) * (4 << self.words.get(4, 0)) * SECOND // 40_000
+            wait = (self.words[8] + 1) * (4 << self.words[4]) * SECOND // 40_000
             self.board.clock.after(wait, lambda: self._starved(fed))
 
     def _starved(self, fed: int) -> None:
@@ -159,13 +162,13 @@ class Converter(Peripheral):
 
     def _converted(self) -> None:
         self.words[0x4C] = min(round(160 * self.board.battery), 4095)
-        self.words[0] = self.words.get(0, 0) | 2
+        self.words[0] |= 2
 
     def read(self, offset: int) -> int:
         """Reading the result takes its flag away."""
         value = super().read(offset)
         if offset == 0x4C:
-            self.words[0] = self.words.get(0, 0) & ~2
+            self.words[0] &= ~2
         return value
 
 
@@ -177,17 +180,19 @@ class Port(Peripheral):
     def __init__(self, board: Board, gate: tuple[int, int]) -> None:
         super().__init__(board, gate)
         self.inputs = 0xFFFF
+        self._outputs = 0
 
     def reset(self) -> None:
         """All inputs."""
-        self.words = {0: 0x44444444, 4: 0x44444444}
+        super().reset()
+        self.words[0] = self.words[4] = 0x44444444
+        self._outputs = 0
 
     def read(self, offset: int) -> int:
         """IDR: the world on inputs, ourselves on outputs."""
         if offset != 8:
             return super().read(offset)
-        outputs = sum(1 << pin for pin in range(16) if self.mode(pin) & 3)
-        return (self.output & outputs) | (self.inputs & ~outputs & 0xFFFF)
+        return (self.output & self._outputs) | (self.inputs & ~self._outputs & 0xFFFF)
 
     def write(self, offset: int, value: int) -> None:
         """BSRR sets and clears; the board looks at what has changed."""
@@ -195,13 +200,15 @@ class Port(Peripheral):
         if offset == 0x10:
             value = (before | value & 0xFFFF) & ~(value >> 16)
             offset = 0x0C
-        super().write(offset, value)
+        self.words[offset] = value
+        if offset < 8:
+            self._outputs = sum(1 << pin for pin in range(16) if self.mode(pin) & 3)
         self.board.pins_changed(self)
 
     @property
     def output(self) -> int:
         """ODR."""
-        return self.words.get(0x0C, 0)
+        return self.words[0x0C]
 
     def mode(self, pin: int) -> int:
         """Four bits of configuration."""
@@ -209,7 +216,7 @@ class Port(Peripheral):
 
     def drives(self, pin: int) -> bool:
         """An output that is high."""
-        return bool(self.mode(pin) & 3) and bool(self.output >> pin & 1)
+        return bool((self._outputs & self.words[0x0C]) >> pin & 1)
 
 
 class Plain(Peripheral):

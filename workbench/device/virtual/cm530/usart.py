@@ -33,7 +33,8 @@ class Usart(Peripheral):
 
     def reset(self) -> None:
         """Off, nothing under way."""
-        self.words = {SR: TC | TXE}
+        super().reset()
+        self.words[SR] = TC | TXE
         self._hold = None
         self._shifting_until = -1
         self._epoch += 1
@@ -42,21 +43,17 @@ class Usart(Peripheral):
     def rate(self) -> int:
         """bit/s."""
         clocks = self.board.clocks
-        return (clocks.hertz if self._fast else clocks.slow_hertz) // max(self.words.get(BRR, 0), 1)
+        return (clocks.hertz if self._fast else clocks.slow_hertz) // max(self.words[BRR], 1)
 
     @property
     def byte(self) -> int:
         """Duration of a byte [ticks]."""
         return 10 * SECOND // self.rate
 
-    @property
-    def _status(self) -> int:
-        return self.words[SR]
-
     def read(self, offset: int) -> int:
         """Reading DR takes RXNE and ORE away."""
         if offset != DR:
-            return super().read(offset)
+            return self.words[offset]
         self.words[SR] &= ~(RXNE | ORE)
         return self._received
 
@@ -67,7 +64,7 @@ class Usart(Peripheral):
         elif offset == SR:
             self.words[SR] &= value | ~(TC | RXNE)
         else:
-            super().write(offset, value)
+            self.words[offset] = value
         if offset in (CR1, CR3, SR):
             if self.tx_dma is not None:
                 self.tx_dma.serve()
@@ -75,12 +72,11 @@ class Usart(Peripheral):
 
     def interrupts(self) -> bool:
         """TC, TXE and RXNE (or ORE), each if enabled."""
-        control, status = self.words.get(CR1, 0), self._status
-        return bool((control & TCIE and status & TC) or (control & TXEIE and status & TXE)
-                    or (control & RXNEIE and status & (RXNE | ORE)))
+        control, status = self.words[CR1], self.words[SR]  # each flag and what enables it are the same bit
+        return bool(control & status & (TC | TXE | RXNE) or (control & RXNEIE and status & ORE))
 
     def _send(self, value: int) -> None:
-        if self.words.get(CR1, 0) & (UE | TE) != UE | TE:
+        if self.words[CR1] & (UE | TE) != UE | TE:
             return
         self.words[SR] &= ~TC
         if self._shifting_until > self.board.clock.now:
@@ -132,13 +128,13 @@ class Usart(Peripheral):
     @property
     def takes_dma(self) -> bool:
         """Whether what comes in goes to memory by itself."""
-        return bool(self.words.get(CR1, 0) & (UE | RE) == UE | RE and self.words.get(CR3, 0) & DMAR)
+        return bool(self.words[CR1] & (UE | RE) == UE | RE and self.words[CR3] & DMAR)
 
     def receive(self, value: int) -> None:
         """One byte has come in."""
-        if self.words.get(CR1, 0) & (UE | RE) != UE | RE:
+        if self.words[CR1] & (UE | RE) != UE | RE:
             return
-        if self._status & RXNE:
+        if self.words[SR] & RXNE:
             self.words[SR] |= ORE
         else:
             self._received = value
@@ -154,37 +150,39 @@ class Dma(Peripheral):
     def __init__(self, board: Board, gate: tuple[int, int]) -> None:
         super().__init__(board, gate)
         self.channels = {k: Channel(self, k) for k in (2, 4, 5)}
+        self._by_control = {channel.base: channel for channel in self.channels.values()}
 
     def read(self, offset: int) -> int:
         """Counters are as of now."""
         if offset == 0x08 + 20 * 4 + 4:
             self.board.bus.settle()
-        return super().read(offset)
+        return self.words[offset]
 
     def write(self, offset: int, value: int) -> None:
         """IFCR clears flags; an enabled channel starts."""
         if offset == 4:
             for k in range(7):
                 if value >> 4 * k & 1:
-                    self.words[0] = self.words.get(0, 0) & ~(15 << 4 * k)
-            self.words[0] = self.words.get(0, 0) & ~value
+                    self.words[0] &= ~(15 << 4 * k)
+            self.words[0] &= ~value
             return
-        if offset >= 8 and (offset - 8) % 20 == 0:
-            self.board.bus.settle()
-        super().write(offset, value)
-        if offset >= 8 and (offset - 8) % 20 == 0:
-            channel = self.channels[(offset - 8) // 20 + 1]
-            channel.armed = self.board.clock.now
-            channel.serve()
+        channel = self._by_control.get(offset)
+        if channel is None:
+            self.words[offset] = value
+            return
+        self.board.bus.settle()
+        self.words[offset] = value
+        channel.armed = self.board.clock.now
+        channel.serve()
 
     def finished(self, channel: int) -> None:
         """Transfer complete."""
-        self.words[0] = self.words.get(0, 0) | 3 << 4 * (channel - 1)
+        self.words[0] |= 3 << 4 * (channel - 1)
         self.board.cpu.wish()
 
     def waits(self, channel: int) -> bool:
         """Whether the channel's interrupt line is up."""
-        return bool(self.words.get(0, 0) >> 4 * (channel - 1) & 2 and self.channels[channel].control & 2)
+        return bool(self.words[0] >> 4 * (channel - 1) & 2 and self.channels[channel].control & 2)
 
 
 class Channel:
@@ -201,33 +199,35 @@ class Channel:
     @property
     def control(self) -> int:
         """CCR."""
-        return self.dma.words.get(self.base, 0)
+        return self.dma.words[self.base]
 
     def serve(self) -> None:
         """Memory to USART: starts once channel and USART are both enabled."""
         usart, words = self.usart, self.dma.words
-        if not self.control & 1:
+        control = words[self.base]
+        if not control & 1:
             self._under_way = False
             self._taken = 0
-        if usart is None or self._under_way or not self.control & 1 or not self.control & 16 or not words.get(self.base + 4):
             return
-        if usart.words.get(CR1, 0) & (UE | TE) != UE | TE or not usart.words.get(CR3, 0) & DMAT:
+        if usart is None or self._under_way or not control & 16 or not words[self.base + 4]:
+            return
+        if usart.words[CR1] & (UE | TE) != UE | TE or not usart.words[CR3] & DMAT:
             return
         self._under_way = True
         count = words[self.base + 4]
         words[self.base + 4] = 0
-        data = bytes(self.dma.board.cpu.uc.mem_read(words[self.base + 12], count))
+        data = self.dma.board.cpu.engine.peek(words[self.base + 12], count)
         usart.send_block(data, lambda: self.dma.finished(self.number))
 
     def take(self, data: bytes) -> int:
         """USART to memory; returns how many bytes the channel still wanted."""
         words = self.dma.words
-        left = words.get(self.base + 4, 0)
+        left = words[self.base + 4]
         if not self.control & 1 or self.control & 16 or not left or not data:
             return 0
         count = min(left, len(data))
         words[self.base + 4] = left - count
-        self.dma.board.cpu.uc.mem_write(words[self.base + 12] + self._taken, data[:count])
+        self.dma.board.cpu.engine.poke(words[self.base + 12] + self._taken, data[:count])
         self._taken += count
         if left == count:
             self.dma.finished(self.number)

@@ -1,0 +1,78 @@
+"""Whether a joint comes before its goal: a servo follows, so such goals were logged late, or made from what the joint did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LeadChecks:
+    """When a joint is said to precede its goal.
+
+    longest: leads and lags looked at [s]; share: of the log, at most, whose ends are then not looked at. rows: a lead is at
+    least so many, as a row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS that
+    the lead leaves of the position, in shares of what the best lag leaves; near 1 for noise, and of a periodic motion, whose
+    leads are lags, too (of 44 real logs, 0.6 says nothing of all, 0.75 of one). likeness: share of the position's variance that
+    the lead explains. goes: a joint that moves less tells nothing [deg]. fewest: rows that tell.
+    """
+
+    longest: float = 0.4
+    share: float = 0.2
+    rows: float = 1.5
+    step: float = 0.5
+    better: float = 0.6
+    likeness: float = 0.9
+    goes: float = 5.0
+    fewest: int = 30
+
+
+LEADS = LeadChecks()
+
+
+def lead_problems(r: Recording, c: LeadChecks = LEADS) -> Iterator[str]:
+    """A line for each joint whose positions precede its goals."""
+    for joint in r.joints:
+        goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")
+        if goal is None or position is None:
+            continue
+        on = np.isfinite(goal) & np.isfinite(position) & (r.channels.get(f"enabled.{joint}", np.ones(len(goal))) != 0)
+        if on.sum() < c.fewest or min(np.rad2deg(np.ptp(goal[on])), np.rad2deg(np.ptp(position[on]))) < c.goes:
+            continue
+        lead = _lead(r.time[on], goal[on], position[on], c)
+        if lead is not None:
+            yield (f"position.{joint}: precedes goal.{joint} by {1e3 * lead:.0f} ms, which no servo does: were the goals logged "
+                   "late, or made from what the joint did?")
+
+
+def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | None:
+    """By how long positions (N,) [rad] precede goals (N,) [rad] at times (N,) [s]; None where they do not."""
+    row = float(np.median(np.diff(time)))
+    most = min(c.longest, c.share * float(time[-1] - time[0]))
+    steps = round(most / (row * c.step))
+    lags = np.arange(-steps, steps + 1) * row * c.step
+    inside = (time >= time[0] + most) & (time <= time[-1] - most)
+    if inside.sum() < c.fewest:
+        return None
+    left = np.array([_left(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
+    best = int(np.argmin(left))
+    ahead = lags <= -c.rows * row
+    if not ahead[best] or left[best] > 1 - c.likeness or best == 0:
+        return None
+    return float(-lags[best]) if np.sqrt(left[best]) < c.better * np.sqrt(left[lags >= 0].min()) else None
+
+
+def _left(goal: Array, position: Array) -> float:
+    """Share of the position's variance that a goal, scaled by a positive number and moved, does not explain."""
+    a, b = goal - goal.mean(), position - position.mean()
+    total, along = float(b @ b), float(a @ b)
+    if total == 0 or along <= 0:
+        return 1.0
+    return 1 - along**2 / (total * float(a @ a))
