@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
@@ -13,7 +13,7 @@ from scipy.linalg import hadamard
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks, steps_of
+from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -59,118 +59,67 @@ def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J:
 
 def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,
             J: Array | None = None) -> Asks[Fitted]:
-    """Fits a hypothesis from where it stands, at a discrepancy s. r: what it leaves there, where known; J: slopes of that, NaN in
-    columns that are not known: these are measured by differences."""
-    prior, (low, high) = Prior.of(start, options), start.bounds()
+    """Fits a hypothesis from where it stands, at a discrepancy s. r, J: what it leaves there and how that answers to theta, where
+    known; else they are asked."""
+    prior, seen = Prior.of(start, options), {}
+    low, high = start.bounds()
     start = start.at(np.clip(start.theta, low, high))
     if r is None:
         (r,) = yield [start]
-    J = yield from _measured(start, r, J, options.stride)
-    seen = [(start.theta, r)]
+    seen[start.theta.tobytes()] = r
 
-    def rows(theta: Array, left: Array) -> Array:
-        return np.concatenate([region.likelihood.rows(left, s), prior.rows(theta)])
+    def rows(h: Hypothesis, left: Array) -> Array:
+        seen[h.theta.tobytes()] = left
+        return np.concatenate([region.likelihood.rows(left, s), prior.rows(h.theta)])
 
-    first = rows(start.theta, r)
-    slopes = np.vstack([region.likelihood.slope(r, s)[:, None] * J, _prior_slopes(prior, start.theta)])
-    fit = fit_blocks([start.theta], [first], [(low, high)], iterations, options.stride, [Solved(start.theta, first, slopes)],
-                     np.ones(len(start.theta)))
+    first = rows(start, r)
+    since = [] if J is None else [Solved(start.theta, first, np.vstack([region.likelihood.slope(r, s)[:, None] * J,
+                                                                         _prior_slopes(prior, start.theta)]))]
+    fit = fit_blocks([start.theta], [first], [(low, high)], iterations, options.stride, since, np.ones(len(start.theta)))
     try:
         points = next(fit)
         while True:
-            answers = yield [start.at(p[0]) for p in points]
-            seen += [(p[0], left) for p, left in zip(points, answers)]
-            points = fit.send([[rows(p[0], left)] for p, left in zip(points, answers)])
-    except StopIteration:
-        theta, left, J = _followed(seen, J, lambda theta, left: float(np.sum(np.square(rows(theta, left)))))
-    return judged(region, options, start.at(theta), left, J)
-
-
-def _measured(h: Hypothesis, r: Array, J: Array | None, stride: float) -> Asks[Array]:
-    """Slopes (n, k) of r, those that are not known by differences."""
-    k = len(h.theta)
-    J = np.full((len(r), k), np.nan) if J is None else J.copy()
-    unknown = np.flatnonzero(np.isnan(J).any(axis=0))
-    if len(unknown):
-        steps = steps_of(h.theta, *h.bounds(), stride, np.ones(k))
-        left = yield [h.at(h.theta + np.eye(k)[i] * steps[i]) for i in unknown]
-        J[:, unknown] = np.column_stack([(x - r) / steps[i] for i, x in zip(unknown, left)])
-    return J
-
-
-def _followed(seen: Sequence[tuple[Array, Array]], J: Array, cost: Callable[[Array, Array], float]) -> tuple[Array, Array, Array]:
-    """Of what a fit saw (theta, r), in its order: the best, what that leaves, and its slopes, from those at the first, J, by
-    differences where one number moved and by Broyden's rule where the fit went on."""
-    (at, r), *others = seen
-    J, least = J.copy(), cost(at, r)
-    for theta, left in others:
-        way, better = theta - at, cost(theta, left) < least
-        if np.count_nonzero(way) == 1:
-            k = int(np.flatnonzero(way)[0])
-            J[:, k] = (left - r) / way[k]
-        elif better and way.any():
-            J += np.outer(left - r - J @ way, way) / (way @ way)
-        if better:
-            at, r, least = theta, left, cost(theta, left)
-    return at, r, J
+            hypotheses = [start.at(p[0]) for p in points]
+            answers = yield hypotheses
+            points = fit.send([[rows(h, left)] for h, left in zip(hypotheses, answers)])
+    except StopIteration as end:
+        (solved,) = end.value
+    there = start.at(solved.x)
+    left = seen[there.theta.tobytes()]
+    J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
+    return judged(region, options, there, left, J_there)
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit gone on with at its own discrepancy by slopes that are regressed, over moves that get shorter: joints that stick make
-    a landscape of many small valleys, in which differences lead astray."""
-    s, spread = f.discrepancy, options.spread
-    while spread >= options.stride:
-        moves = yield from _moves(f.hypothesis, spread)
-        prior = Prior.of(f.hypothesis, options)
-        costs = [np.sum(np.square(region.likelihood.rows(left, s))) + np.sum(np.square(prior.rows(h.theta)))
-                 for h, left in moves.seen]
-        h, left = moves.seen[int(np.argmin(costs))]
-        here = float(np.sum(np.square(region.likelihood.rows(f.r, s))) + np.sum(np.square(prior.rows(f.hypothesis.theta))))
-        h, left = (h, left) if min(costs) < here else (f.hypothesis, f.r)
-        on = yield from fitting(region, options, h, s, 1, left, moves.slopes[0])
-        f, spread = max(f, on, key=lambda g: g.log_posterior), spread / 2
-    return f
+    """A fit gone on with at its own discrepancy, with slopes measured anew."""
+    return (yield from fitting(region, options, f.hypothesis, f.discrepancy, options.iterations, f.r))
 
 
 def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:
-    """A fit with slopes J by regression on moves of all its numbers at once, as far as `options.spread`.
+    """A fit with slopes J by regression on moves of all numbers at once, forth and back, as far as `options.spread`: signs of a
+    Hadamard matrix, so that all moves tell each number (R. Plackett and J. Burman, Biometrika 33, 1946).
 
     A joint that sticks answers a small move by chance, which differences of one number after the other take for slopes, and
     their square for information: two numbers that do the same would seem to be told apart, and both to be well known. What the
     moves leave unexplained says how much of it is chance, which is taken off (W. Fuller, Measurement error models, 1987).
     """
-    moves = yield from _moves(f.hypothesis, options.spread, 4)
-    J, chance, scatter = moves.slopes
+    h, k = f.hypothesis, len(f.hypothesis.theta)
+    low, high = h.bounds()
+    signs = hadamard(1 << (4 * k).bit_length())[:, 1:k + 1]  # four and more pairs of moves to a number
+    moves = options.spread * np.linspace(0.5, 1.5, len(signs))[:, None] * signs  # each a different one, however few numbers
+    there, back = (np.clip(h.theta + way * moves, low, high) for way in (1, -1))
+    left = np.array((yield [h.at(theta) for theta in (*there, *back)]))
+    moved, answer = there - back, left[:len(signs)] - left[len(signs):]
+    J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
+    chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
     precision = region.likelihood.precision(f.r, f.discrepancy)
+    scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
     return replace(f, J=J, too_much=float(precision @ chance) * scatter)
 
 
-@dataclass(frozen=True)
-class _Moves:
-    """Hypotheses with what they leave: m that were moved one way, then the same moved back."""
-
-    seen: list[tuple[Hypothesis, Array]]
-
-    @property
-    def slopes(self) -> tuple[Array, Array, Array]:
-        """Slopes (n, k) of what is left; the variance (n,) of what they do not explain; of the slopes by that (k, k)."""
-        m = len(self.seen) // 2
-        theta, left = np.array([h.theta for h, _ in self.seen]), np.array([r for _, r in self.seen])
-        moved, answer = theta[:m] - theta[m:], left[:m] - left[m:]
-        J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
-        chance = np.square(answer - moved @ J.T).sum(axis=0) / max(m - moved.shape[1], 1)
-        return J, chance, np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
-
-
-def _moves(h: Hypothesis, spread: float, to_a_number: int = 1) -> Asks[_Moves]:
-    """All numbers moved at once, forth and back: signs of a Hadamard matrix, so that all moves tell each number (R. Plackett and
-    J. Burman, Biometrika 33, 1946), at least so many pairs to a number."""
-    k = len(h.theta)
-    signs = hadamard(1 << (to_a_number * k).bit_length())[:, 1:k + 1]
-    moves = spread * np.linspace(0.5, 1.5, len(signs))[:, None] * signs  # each a different one, however few numbers
-    wanted = [h.at(np.clip(h.theta + move, *h.bounds())) for move in (*moves, *-moves)]
-    left = yield wanted
-    return _Moves(list(zip(wanted, left)))
+def renewed(region: Region, options: EvidenceOptions, f: Fitted, r: Array) -> Fitted:
+    """A fit judged anew where it stands, by residuals that changed as other regions did, or by another correlation time."""
+    return judged(region, options, f.hypothesis, r, f.J)
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:

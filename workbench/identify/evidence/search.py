@@ -126,8 +126,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that foretell most: those are tried by a step, the best of all fitted,
-    and the beam polished."""
+    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     for f in states:
@@ -138,13 +137,8 @@ def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], 
     wanted: dict[Key, tuple[Fitted, Move]] = {}
     for f, m in sorted(moves, key=lambda fm: -(fm[0].log_posterior + fm[1].gain)):
         wanted.setdefault(m.hypothesis.key, (f, m))
-    tried = yield from side_by_side([fitting(region, options, m.hypothesis, f.discrepancy, 1, None, m.J)
-                                     for f, m in wanted.values()])
-    fits |= {f.hypothesis.key: f for f in tried}
-    tried = sorted(tried, key=lambda f: -f.log_posterior)[:options.refined]
-    made = yield from side_by_side([_moved(region, options, f, k < 2 * options.beam)
-                                    for k, f in enumerate(tried)])
-    fits = _with_better(fits, made)
+    made = yield from side_by_side([_moved(region, options, f, m) for f, m in wanted.values()])
+    fits |= {f.hypothesis.key: f for f in made}
     ahead = sorted(fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
     better = yield from side_by_side([polished(region, options, f) for f in ahead])
     fits = _with_better(fits, [*better, *(reduced(region, options, f) for f in (*made, *better))])
@@ -169,14 +163,14 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
     return f if h.key == f.hypothesis.key else judged(region, options, h, f.r, J)
 
 
-def _moved(region: Region, options: EvidenceOptions, f: Fitted, anew: bool) -> Asks[Fitted]:
-    """A move that was tried, fitted; slopes that lines did not tell are measured. anew: once more with the nominal law as it
+def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
+    """A move fitted, with the slopes that foretold it where they tell all its numbers; and once more with the nominal law as it
     stands, as what was recalibrated for want of an effect may hold a fit where it is."""
-    h, J = f.hypothesis, np.where(f.J.any(axis=0), f.J, np.nan)
-    nominal = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
-    parts = [fitting(region, options, h, f.discrepancy, options.iterations, f.r, J)]
-    parts += [fitting(region, options, nominal, f.discrepancy, options.iterations, None, J)] if anew else []
-    fits = yield from side_by_side(parts)
+    shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
+    h = m.hypothesis
+    anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
+    fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
+                                    fitting(region, options, anew, f.discrepancy, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
