@@ -1,5 +1,5 @@
-"""How far does heading wander on robots that nobody measured, and of what? Without zero offsets and unequal latency, with these
-alone, and with all.
+"""By how much does a gait's heading vary on robots that nobody measured, and what causes it? Without zero offsets and unequal
+latency, with these alone, and with all.
 
 Of the ROBOTIS walk and of the gaits that `workbench optimize --out runs/gaits/NAME` has written: the standard deviation of
 turning by distance over the same random robots, and the speed that is kept.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -61,7 +61,7 @@ class Machine:
         plant.RegisterAsSourceForSceneGraph(scene_graph)
         parser = Parser(plant)
         ConfigureParser(parser)
-        loaded = replace(model, effects=tuple(spec for effect, spec, _ in resolved(model) if effect.layer == "inertia"))
+        loaded = model.with_effects([spec for effect, spec, _ in resolved(model) if effect.layer == "inertia"])
         self.left_out = tuple(spec.effect for spec in model.effects if spec not in loaded.effects)
         description = physics_of(loaded).description
         with quiet_drake():

@@ -38,7 +38,7 @@ class Rival:
             effects[i] = EffectSpec(spec.effect, spec.where, {
                 p.name: (next(at), next(at), next(at)) if p.vector else next(at)
                 for p in effect_named(spec.effect).parameters if p.name in spec.parameters})
-        return replace(self, model=replace(self.model, effects=tuple(effects)))
+        return replace(self, model=self.model.with_effects(effects))
 
     def steps(self) -> Array:
         """A step of each number for sensitivities (p,), in units of `freedom`, away from the nearer bound."""

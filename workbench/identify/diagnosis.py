@@ -144,7 +144,7 @@ def _diagnosed(session: Session, config: SimulationConfig, began: float, progres
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(gap) and not slight, findings, left),
-        model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in chosen.missed))), nominal=session.model,
+        model=fitted.with_effects((*fitted.effects, *(m.spec for m in chosen.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=rejected(looked_at, fit, chosen.rounds, explained.posteriors, nominal.residuals),
         unexplained=left, posterior=posterior(fit, (*build.measured, *chosen.missed)),
         provenance=provenance(session.model, config, time.monotonic() - began)
@@ -174,7 +174,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
     left = left_over(evidence, after, floors)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(findings or left), findings, left),
-        model=replace(fitted, effects=(*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
+        model=fitted.with_effects((*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
         findings=findings, rejected=explained.losers(), unexplained=left,
         posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - began)

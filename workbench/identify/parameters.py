@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -178,4 +178,4 @@ def _by_number(parameters: Sequence[Parameter]) -> list[Parameter]:
 
 def with_effects(nominal: RobotModel, effects: Sequence[tuple[Candidate, Array]]) -> RobotModel:
     """The nominal robot with effects of given sizes, one after the other."""
-    return replace(nominal, effects=(*nominal.effects, *(c.spec(x) for c, x in effects)))
+    return nominal.with_effects((*nominal.effects, *(c.spec(x) for c, x in effects)))

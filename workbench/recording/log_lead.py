@@ -20,7 +20,7 @@ class LeadChecks:
     longest: leads and lags looked at [s]; share: of the log, at most, whose ends are then not looked at. rows: a lead is at
     least so many, as a row's goal may be sent after its position was read. step: fineness of leads, in rows. better: RMS that
     the lead leaves of the position, in shares of what the best lag leaves; near 1 for noise, and of a periodic motion, whose
-    leads are lags, too (of 44 real logs, 0.6 says nothing of all, 0.75 of one). likeness: share of the position's variance that
+    leads are lags, too (of 44 logs, 0.6 says nothing of any, 0.75 of one). likeness: share of the position's variance that
     the lead explains. goes: a joint that moves less tells nothing [deg]. fewest: rows that tell.
     """
 

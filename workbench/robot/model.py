@@ -121,8 +121,10 @@ class RobotModel:
         return self.with_effects((*self.effects, effect))
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
-        """The same robot with these effects in place of its own."""
-        return self._with_known(replace(self, effects=tuple(effects)))
+        """The same robot with these effects in place of its own; what is known of its description is not read again."""
+        other = replace(self, effects=tuple(effects))
+        vars(other).update({k: v for k, v in vars(self).items() if k in ("source", "kinematics", "foot_links")})
+        return other
 
     def with_masses(self, path: Path, masses: Mapping[str, float]) -> RobotModel:
         """The same robot by an SDF file made of its own, in which links have these masses [kg] and all else is as it was: what
@@ -130,11 +132,6 @@ class RobotModel:
         other = replace(self, description=str(path))
         k = replace(self.kinematics, path=path, masses=dict(masses))
         vars(other).update(source=ModelSource(path, path), kinematics=k, foot_links=self.foot_links)
-        return other
-
-    def _with_known(self, other: RobotModel) -> RobotModel:
-        """`other`, of the same description, with what was read of that so far."""
-        vars(other).update({k: v for k, v in vars(self).items() if k in ("source", "kinematics", "foot_links")})
         return other
 
     def with_servos(self, changes: Mapping[str, Any]) -> RobotModel:

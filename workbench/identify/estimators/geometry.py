@@ -88,7 +88,7 @@ class Geometry:
 
     def added_to(self, model: RobotModel) -> RobotModel:
         """The model with what was measured."""
-        return replace(model, effects=(*model.effects, *(m.spec for m in self.measured)))
+        return model.with_effects((*model.effects, *(m.spec for m in self.measured)))
 
     def asked(self, pool: Sequence[Candidate]) -> list[Candidate]:
         """Of a pool, what is still to be asked about."""

@@ -117,11 +117,6 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
     return replace(f, J=J, too_much=float(precision @ chance) * scatter)
 
 
-def renewed(region: Region, options: EvidenceOptions, f: Fitted, r: Array) -> Fitted:
-    """A fit judged anew where it stands, by residuals that changed as other regions did, or by another correlation time."""
-    return judged(region, options, f.hypothesis, r, f.J)
-
-
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:
     """A fit's hypothesis without some effects, and its slopes without theirs."""
     keep = list(range(len(f.hypothesis.numbers)))

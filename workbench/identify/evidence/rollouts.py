@@ -89,7 +89,7 @@ class Rollouts:
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
         model = recalibrated(self.nominal, z)
-        return replace(model, effects=(*model.effects, *(spec for h in hypotheses for spec in h.specs())))
+        return model.with_effects((*model.effects, *(spec for h in hypotheses for spec in h.specs())))
 
     def answers(self, wants: Sequence[Wants]) -> list[Array]:
         """Residuals (n,) of each want's region. Wants of different regions share rollouts."""
