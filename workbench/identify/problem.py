@@ -95,14 +95,6 @@ class TakeEvidence:
         simulated = self._shifted(self._lying_in_its_play(simulated, model))
         return (self.recorded - simulated) / self._frame_sigma
 
-    def early(self, residual: Array, until: float) -> Array:
-        """Residuals (N, c) as a rollout that ends `until` [s] after the first command leaves them: later frames are NaN, and say
-        nothing of the start."""
-        if self.since[-1] <= until:
-            return residual
-        seen = np.where(self.since[:, None] <= until, residual, np.nan)
-        return (self.recorded - self._shifted(self.recorded - seen * self._frame_sigma)) / self._frame_sigma
-
     @property
     def _frame_sigma(self) -> Array:
         return np.asarray(self.sigma * self.rough)

@@ -96,10 +96,6 @@ class RolloutEvaluator:
         rollouts = simulate_batch([replace(self.job(model, i, config), steadied=None) for i in everywhere], self.n_jobs)
         return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
 
-    def early(self, residuals: dict[int, Array], until: float) -> dict[int, Array]:
-        """Residuals as a question with this `until` would have them."""
-        return {i: self.evidence[i].early(r, until) for i, r in residuals.items()}
-
     def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
         """One rollout; each take's own servo changes apply."""
         e = self.evidence[take]

@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
 """What a part of a search asks, is answered, and returns."""
-Response = tuple[list[Array], list[list[Array]], float]
-"""Sizes at which a group was looked at, what each did to what is fitted, by block, and how long it was looked at [s]."""
+Response = tuple[list[Array], list[list[Array]]]
+"""Sizes at which a group was looked at, and what each did to what is fitted, by block."""
 ResponseBank = dict[tuple[object, ...], Response]
 """By group and takes."""
 

@@ -53,31 +53,29 @@ def subsets_for(
     trials: of a race beside `current` on these takes, whose base is fixed.
     """
     known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
-    until = min((looked[2] for _, looked in known), default=np.inf)
-    base = search.evaluator.early({i: current.residuals[i] for i in takes}, until)
-    rows = {j: _rows(search, current, takes, until, j, joint) for j in {t.joint for t, _ in known} | {joint}}
+    base = {i: current.residuals[i] for i in takes}
+    rows = {j: _rows(search, current, takes, j, joint) for j in {t.joint for t, _ in known} | {joint}}
     r0 = search.evaluator.vector(base, "fit", joint)[rows[joint]]
-    seen = [s for t, (points, did, _) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
+    seen = [s for t, (points, did) in known for s in variants(t, points, [v[rows[t.joint]] for v in did])]
     return best_sets(seen, r0) if seen else []
 
 
-def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array], float] | None:
-    """Sizes at which a candidate was looked at, what each did, and for how long it was looked at [s]."""
-    for name, (points, seen, until) in search.responses.items():
+def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array]] | None:
+    """Sizes at which a candidate was looked at, and what each did."""
+    for name, (points, seen) in search.responses.items():
         if name[-1] == takes and t.candidate.key in name[:-1]:
             b = name.index(t.candidate.key)
-            return points, [s[b] for s in seen], until
+            return points, [s[b] for s in seen]
     return None
 
 
-def _rows(search: Search, current: Fit, takes: tuple[int, ...], until: float, judged: str | None, joint: str
-          ) -> NDArray[np.bool_]:
-    """Of the vector of the channels of `judged` (None: of all), what is of a joint, and was looked at."""
+def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> NDArray[np.bool_]:
+    """Of the vector of the channels of `judged` (None: of all), what is of a joint."""
     inside = {}
     for i in takes:
         e = search.evaluator.evidence[i]
         inside[i] = np.zeros_like(current.residuals[i])
-        inside[i][np.ix_(e.since <= until, e.columns(joint))] = 1.0
+        inside[i][:, e.columns(joint)] = 1.0
     return search.evaluator.vector(inside, "fit", judged) != 0
 
 

@@ -36,8 +36,7 @@ class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier race's responses predict, that
     those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of one
     number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; unheld: whether no take
-    had a fixed base, so that floating-base takes alone tell what joints lack, however much; early: what there is without them
-    leaves, by takes and how long these are looked at."""
+    had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     screened_out: dict[str | None, float] = field(default_factory=dict)
@@ -45,7 +44,6 @@ class Race:
     wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0
     no_fixed_base: bool = False
-    early: dict[tuple[tuple[int, ...], float], dict[int, Array]] = field(default_factory=dict)
 
 
 def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains: Sequence[float]) -> None:

@@ -14,11 +14,6 @@ class ScreeningOptions:
     far_walking: float = 1.6
     """Times the size it was looked at that an effect's response is believed to grow: a foot grips or slips, which no line
     tells."""
-    looked: float = 2.5
-    looked_share: float = 0.3
-    looked_share_fixed: float = 0.5
-    """How long [s] takes are looked at, for an effect of one number, and the share of what is missing that must show by then, on
-    the ground and on a fixed base; else longer. Late in walks small differences have grown into others."""
     calm: float = 0.5
     """Share of what is beyond noise that responses of several numbers must explain. If they do not on all floating-base takes,
     but do on one of them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and
@@ -29,7 +24,7 @@ class ScreeningOptions:
     where that is cheap, and on a walk."""
     doubted: float = 0.6
     """Share of the least gain from which on the best are fitted where none is predicted all of it: responses say too little where
-    only a part of a walk was looked at."""
+    only one of the walks was looked at."""
     behind: float = 0.6
     """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
     remembered: float = 0.15

@@ -78,8 +78,6 @@ class CandidateEvaluation:
         self.power = {i: evaluator.cost({i: r}, "fit") for i, r in base.items()}
         alone = self.coarse and self.walking  # floating-base takes are expensive
         self.looked_at = (max(base, key=lambda i: self.power[i]),) if alone else self.takes
-        single_joint = len(nominal.joints) == 1  # all that it lacks is looked for together, and some of it comes late
-        self.until = self._shown() if self.coarse and not single_joint else np.inf
         self.without: dict[int, Array] = {}
         self._name = (*(c.key for c in group), self.looked_at)
 
@@ -116,11 +114,11 @@ class CandidateEvaluation:
         c = self.group[0]
         probes = scan(c, scan_sizes(c, self.walking, self.race.no_fixed_base), self.walking)
         looks = [self._question([], []), *(self._question(everyone, [p] * len(everyone)) for p in probes)]
-        plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse, until=self.until) for q in looks]
+        plain, *answers = yield [replace(q, takes=self.looked_at, step=PROBLEM.coarse) for q in looks]
         before = self._left(plain)
         responses = [[v - w for v, w in zip(self._left(a), before)] for a in answers]
-        self.responses[self._name] = probes, responses, self.until
-        guess = self._guessed(probes, responses, self.until)
+        self.responses[self._name] = probes, responses
+        guess = self._guessed(probes, responses)
         calm = None if self.coarse or not self.walking else self._calmest(probes, responses, guess[1][0])
         if calm is None:
             return guess
@@ -157,10 +155,9 @@ class CandidateEvaluation:
                 best, most = (i, x), share
         return best
 
-    def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]], until: float
-                 ) -> tuple[list[Array], list[float]]:
+    def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
         """Sizes to start from and what they gain, on all takes as on what was looked at."""
-        looked_at = self._early(until)
+        looked_at = {i: self.base[i] for i in self.looked_at}
         r0 = self._left(looked_at)
         far = SCREENING.far_walking if self.walking else SCREENING.far
         guesses = [
@@ -169,25 +166,9 @@ class CandidateEvaluation:
         share = max(self.evaluator.cost(looked_at, "fit"), 1e-9) / max(sum(self.power.values()), 1e-9)
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
-    def _shown(self) -> float:
-        """How long takes are looked at [s]: until each joint that is judged alone has shown enough."""
-        seen, until = {i: self.base[i] for i in self.looked_at}, SCREENING.looked
-        share = SCREENING.looked_share if self.walking else SCREENING.looked_share_fixed
-        least = {j: share * self.evaluator.cost(seen, "fit", j) for j in self.joints}
-        while any(self.evaluator.cost(self._early(until), "fit", j) < enough for j, enough in least.items()):
-            until += SCREENING.looked / 2
-        return until
-
     def _best(self, joint: str | None) -> float:
         seen = (self.race.screened_out, self.race.remembered)
         return max(max(of.values(), default=0.0) if joint is None else of.get(joint, 0.0) for of in seen)
-
-    def _early(self, until: float) -> dict[int, Array]:
-        """What there is already leaves of the takes that are looked at for so long [s]."""
-        key = self.looked_at, until
-        if key not in self.race.early:
-            self.race.early[key] = self.evaluator.early({i: self.base[i] for i in self.looked_at}, until)
-        return self.race.early[key]
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
         """Of the group, those that are not predicted to be far behind a rival."""
