@@ -181,9 +181,10 @@ def reacted(robot: Robot, row: Cell, at: int, told: list[StateMessage], servo: V
     assert first <= at + row.ms * MILLISECOND
 
 
-@pytest.mark.parametrize("name", ["silent servo", "heat", "babbling servo"])
-def test_a_fault_on_the_wire_is_met_as_in_the_core(name: str) -> None:
-    meet(name, *at_a_moment(1))
+@pytest.mark.parametrize(("name", "seed"), [("silent servo", 1), ("heat", 1), ("babbling servo", 1),
+                                            ("two servos with one ID", 6)])
+def test_a_fault_on_the_wire_is_met_as_in_the_core(name: str, seed: int) -> None:
+    meet(name, *at_a_moment(seed))
 
 
 def test_what_fails_apart_is_told_and_changes_nothing_here() -> None:
