@@ -195,7 +195,7 @@ def _unmet(request: Request, found: Found, certified: Certified | None) -> str:
         limits = certified.certificate.margins
     limit = binding(_without_speed(limits, found)) if not found.best.good else binding(limits)
     if limit is not None:
-        said += f"; {limit} binds ({100 * (limit.use - 1):+.0f} %)"
+        said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if found.nearest is not None and not found.best.good:
         said += f"; the nearest table that keeps every limit goes {_speed(request, found.nearest)}"
     return said
