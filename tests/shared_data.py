@@ -50,8 +50,7 @@ def practice(name: str) -> Path:
 
 @cache
 def _made(name: str) -> Path:
-    """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it, and how its nominal twin would
-    have looked: the layout of the practice sessions."""
+    """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it; laid out as those are."""
     folder = Path(tempfile.mkdtemp(prefix=f"{name}."))
     atexit.register(shutil.rmtree, folder, True)
     rng = np.random.default_rng(1)
