@@ -1,10 +1,32 @@
-"""Recordings that lie beside the project and are not its own; tests that need them skip where they are missing."""
+"""Recordings that lie beside the project and are not its own; tests that need them skip where they are missing. Of the practice
+sessions three are made here instead, shorter, by the project's own second engine."""
 
+import atexit
+import shutil
+import tempfile
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+import yaml
+
+from studies.concealed_effects.robots import quadruped
+from studies.other_engine.excitation import MotionRows
+from studies.other_engine.firmware import read_rows
+from studies.other_engine.make_session import TakePlan, plan_takes, random_camera, record, servo_yaml, session_entry
+from studies.other_engine.motive_file import write_motive_csv
+from workbench.robot import EffectSpec, Ground, data_file
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+MADE = {"p0_nothing_hidden": (), "p1_backlash": (EffectSpec("backlash", ("flm",), {"gap": 3.0}),),
+        "p6_stiff_gearbox": (EffectSpec("coulomb_friction", ("frm",), {"torque": 0.18}),)}
+"""Practice sessions that can be made here, and what is hidden in them."""
+FLOOR = Ground(friction=0.6, stiffness=1e5, dissipation=20.0)
+LASTS = {"stand": 4.6, "sway": 2.6, "hidden_stand": 3.6}
+"""After what a take's motion ends there [s]."""
+CYCLES = {"walk": 6, "hidden_walk": 4}
 
 
 def shared(relative: str) -> Path:
@@ -13,3 +35,49 @@ def shared(relative: str) -> Path:
     if not path.exists():
         pytest.skip(f"needs ../shared/{relative}, which lies beside the project, not in it")
     return path
+
+
+def practice(name: str) -> Path:
+    """The folder of a practice session; where ../shared is missing, one like it that is made here."""
+    if (SHARED / "practice" / name).exists() or name not in MADE:
+        return shared(f"practice/{name}")
+    return _made(name)
+
+
+@cache
+def _made(name: str) -> Path:
+    """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it, and how its nominal twin would
+    have looked: the layout of the practice sessions."""
+    folder = Path(tempfile.mkdtemp(prefix=f"{name}."))
+    atexit.register(shutil.rmtree, folder, True)
+    rng = np.random.default_rng(1)
+    for part in ("motions", "takes", "predict", "answer"):
+        (folder / part).mkdir()
+    model = replace(quadruped(rng), ground=FLOOR).model(folder / "robot.sdf")
+    (folder / "servo.yaml").write_text(servo_yaml(model))
+    camera, takes, predict = random_camera(rng), [], []
+    for plan in map(_shorter, plan_takes(MotionRows(*read_rows(data_file("robotis_walk.csv"))), rng)):
+        _, capture, _ = record(model.with_effects(MADE[name]), plan, camera, rng)
+        motion = f"{'predict' if plan.predict else 'motions'}/{plan.name}.csv"
+        (folder / motion).write_text(plan.motion.to_csv())
+        entry = {"name": plan.name, "motion": motion, "cycles": plan.cycles, "base": plan.base}
+        if plan.predict:
+            start = capture.cut(int(capture.starts_at * capture.rate) - 2)
+            write_motive_csv(folder / f"predict/{plan.name}_start.csv", start, plan.name, frames_in_take=len(capture))
+            write_motive_csv(folder / f"answer/{plan.name}.csv", capture, plan.name)
+            predict.append(entry | {"start": f"predict/{plan.name}_start.csv", "starts_at": capture.starts_at,
+                                    "frames": len(capture)})
+        else:
+            write_motive_csv(folder / f"takes/{plan.name}.csv", capture, plan.name)
+            takes.append(entry | {"recording": f"takes/{plan.name}.csv"})
+    session = session_entry(model, "robot.sdf", "servo.yaml") | {"takes": takes, "predict": predict}
+    (folder / "session.yaml").write_text(yaml.safe_dump(session, sort_keys=False))
+    return folder
+
+
+def _shorter(plan: TakePlan) -> TakePlan:
+    """The beginning of its motion, or fewer cycles."""
+    rows = plan.motion
+    kept = rows.times <= LASTS.get(plan.name, np.inf)
+    return TakePlan(plan.name, MotionRows(rows.joints, rows.times[kept], rows.angles[kept]), CYCLES.get(plan.name, plan.cycles),
+                    plan.base, plan.predict)

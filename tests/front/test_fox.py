@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from tests.command import succeeds
+from tests.command import refused, succeeds
 from workbench import load_model, load_motion
 from workbench.compare.footfalls import foot_phases
+from workbench.device import read_tables
 from workbench.experiment.limits import Reach
 from workbench.experiment.stance import BodyMoves
 from workbench.recording import BodyTrack, Measurement, Take, observe, write_motive
@@ -27,10 +27,7 @@ STARTS_AT, CYCLES, CYCLE = 0.4137, 3, 0.64
 
 @pytest.fixture(scope="module")
 def fox() -> RobotModel:
-    model = load_model("fox")
-    return replace(model, rigid_bodies={"Trunk": "trunk", **{f"{leg} shank": f"{leg}_SHANK" for leg in ("LF", "LH", "RF", "RH")},
-                                        **{f"{leg} thigh": f"{leg}_THIGH" for leg in ("LF", "LH", "RF", "RH")},
-                                        **{f"{leg} hip": f"{leg}_HIP" for leg in ("LF", "LH", "RF", "RH")}})
+    return load_model("fox")
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +91,25 @@ def test_a_session_is_compared_with_footfalls(session: Path, tmp_path: Path, cap
     ("inspect", str(TROT)),
     ("play", str(TROT), "--model", "fox", "--port", "virtual", "--base", "fixed", "--cycles", "1", "--out"),
     ("inverse-dynamics", str(TROT), "--model", "fox", "--cycles", "1", "--out"),
-    ("export", str(TROT), "--model", "fox", "--cycles", "1", "--force", "--out")], ids=lambda a: "_".join(a[:1]))
+    ("servos", "--model", "fox", "--port", "virtual", "--out")], ids=lambda a: "_".join(a[:1]))
 def test_other_verbs_take_it(arguments: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = [str(tmp_path / "out")] if arguments[-1] == "--out" else []
     assert succeeds(capsys, *arguments, *out)
+
+
+def test_its_tables_are_in_its_own_servos_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = succeeds(capsys, "export", str(TROT), "--model", "fox", "--cycles", "1", "--out", str(tmp_path / "out"))
+    assert "no motion.table: joint LF_HAA has a servo of the family XL-430" in said
+    assert not (tmp_path / "out" / "motion.table").exists()
+    table = read_tables(tmp_path / "out")
+    asked = load_motion(TROT).angles[1:]
+    assert np.abs(table.angles() - asked).max() <= np.radians(360 / 4096) / 2 + 1e-9
+    assert "servos    XL-430" in succeeds(capsys, "inspect", str(tmp_path / "out"))
+
+
+def test_the_cm530s_program_refuses_its_servos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "flash", str(TROT), "--model", "fox", "--dry-run", "--out", str(tmp_path))
+    assert "joint LF_HAA has a servo of the family XL-430; the CM-530's program plays the AX-12A's alone" in said
 
 
 @pytest.mark.slow

@@ -52,8 +52,9 @@ BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, var
 
 @dataclass(frozen=True)
 class OptimizeOptions:
-    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start from;
-    planned: whether solved kino-centroidal programmes are, too."""
+    """How long and from where a gait is sought. budget: of the search. certify: what the gait has to pass at the end. seed: of
+    the search; draws of the search and of the certificate come from it, different ones. n_jobs: threads and processes that
+    simulate. given: gaits to start from; planned: whether solved kino-centroidal programmes are, too."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
