@@ -1,5 +1,5 @@
-"""Recordings that lie beside the project and are not its own; tests that need them skip where they are missing. Of the practice
-sessions three are made here instead, shorter, by the project's own second engine."""
+"""Recordings that lie beside the project and are not its own; tests that need them skip where they are missing. Practice
+sessions are made here instead, shorter, by the project's own second engine."""
 
 import atexit
 import shutil
@@ -20,9 +20,15 @@ from studies.other_engine.motive_file import write_motive_csv
 from workbench.robot import EffectSpec, Ground, data_file
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-MADE = {"p0_nothing_hidden": (), "p1_backlash": (EffectSpec("backlash", ("flm",), {"gap": 3.0}),),
-        "p6_stiff_gearbox": (EffectSpec("coulomb_friction", ("frm",), {"torque": 0.18}),)}
-"""Practice sessions that can be made here, and what is hidden in them."""
+HIDDEN = {
+    "p0_nothing_hidden": (), "p1_backlash": (EffectSpec("backlash", ("flm",), {"gap": 3.0}),),
+    "p2_slippery_foot": (EffectSpec("foot_friction", ("brb",), {"friction": 0.15}),),
+    "p3_payload": (EffectSpec("payload", ("body_link",), {"mass": 0.25, "position": (-0.02, 0.03, 0.05)}),),
+    "p4_late_firmware": (EffectSpec("timing_drift", (), {"per_pose": 0.006}),),
+    "p5_sagging_supply": (EffectSpec("supply_voltage", (), {"voltage": 8.4}),),
+    "p6_stiff_gearbox": (EffectSpec("coulomb_friction", ("frm",), {"torque": 0.18}),),
+    "p7_two_at_once": (EffectSpec("servo_gain", ("brb",), {"ratio": 0.45}), EffectSpec("ground_friction", (), {"friction": 0.3}))}
+"""What is hidden in the practice sessions."""
 FLOOR = Ground(friction=0.6, stiffness=1e5, dissipation=20.0)
 LASTS = {"stand": 4.6, "sway": 2.6, "hidden_stand": 3.6}
 """After what a take's motion ends there [s]."""
@@ -39,15 +45,12 @@ def shared(relative: str) -> Path:
 
 def practice(name: str) -> Path:
     """The folder of a practice session; where ../shared is missing, one like it that is made here."""
-    if (SHARED / "practice" / name).exists() or name not in MADE:
-        return shared(f"practice/{name}")
-    return _made(name)
+    return SHARED / "practice" / name if (SHARED / "practice" / name).exists() else _made(name)
 
 
 @cache
 def _made(name: str) -> Path:
-    """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it, and how its nominal twin would
-    have looked: the layout of the practice sessions."""
+    """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it; laid out as those are."""
     folder = Path(tempfile.mkdtemp(prefix=f"{name}."))
     atexit.register(shutil.rmtree, folder, True)
     rng = np.random.default_rng(1)
@@ -57,7 +60,7 @@ def _made(name: str) -> Path:
     (folder / "servo.yaml").write_text(servo_yaml(model))
     camera, takes, predict = random_camera(rng), [], []
     for plan in map(_shorter, plan_takes(MotionRows(*read_rows(data_file("robotis_walk.csv"))), rng)):
-        _, capture, _ = record(model.with_effects(MADE[name]), plan, camera, rng)
+        _, capture, _ = record(model.with_effects(HIDDEN[name]), plan, camera, rng)
         motion = f"{'predict' if plan.predict else 'motions'}/{plan.name}.csv"
         (folder / motion).write_text(plan.motion.to_csv())
         entry = {"name": plan.name, "motion": motion, "cycles": plan.cycles, "base": plan.base}

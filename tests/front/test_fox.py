@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from matplotlib.collections import LineCollection
 from scipy.spatial.transform import Rotation
 
 from tests.command import refused, succeeds
@@ -19,6 +20,7 @@ from workbench.experiment.stance import BodyMoves
 from workbench.recording import BodyTrack, Measurement, Take, observe, write_motive
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.view.figures import film_strip
 
 TROT = data_file("fox/trot.csv")
 FEET = {"LF_KFE", "LH_KFE", "RF_KFE", "RH_KFE"}
@@ -105,6 +107,18 @@ def test_its_tables_are_in_its_own_servos_counts(tmp_path: Path, capsys: pytest.
     asked = load_motion(TROT).angles[1:]
     assert np.abs(table.angles() - asked).max() <= np.radians(360 / 4096) / 2 + 1e-9
     assert "servos    XL-430" in succeeds(capsys, "inspect", str(tmp_path / "out"))
+
+
+def test_a_film_strip_shows_legs_to_their_ends_and_the_left_ones_thin(fox: RobotModel) -> None:
+    stretched = np.radians([[-80.0 if j.endswith("HFE") else 0.0 for j in fox.joints]] * 9)
+    take = Take("pose", "simulation", np.linspace(-0.2, 0.6, 9), fox.joints, stretched, starts_at=0.0, base="fixed")
+    axes = film_strip(fox, take, instants=2).axes[0]
+    (sticks,) = (c for c in axes.collections if isinstance(c, LineCollection))
+    x = np.concatenate(sticks.get_segments())[:, 0]
+    assert np.ptp(x) > 25  # cm: legs ahead of the trunk
+    assert axes.get_xlim()[0] < x.min()
+    assert x.max() < axes.get_xlim()[1]
+    assert len(set(sticks.get_linewidths())) == 2
 
 
 def test_the_cm530s_program_refuses_its_servos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
