@@ -276,3 +276,25 @@ def test_data_beyond_the_size_that_was_said_are_refused() -> None:
     sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]
+
+
+def test_what_comes_on_a_link_waits_while_a_pose_is_a_millisecond_away_and_no_longer() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.messages()
+    ask, before_poses, waits = frame(FrameType.ASK), 0, 0
+    for _ in range(400):
+        sim.send(ask[:3])  # less than a millisecond's, which would go by
+        sim.send(ask[3:])
+        sim.run(1)
+        at_once = any(isinstance(m, AnswerMessage) for m in sim.messages())
+        poses = sim.get("poses")
+        sim.run(1)
+        later = any(isinstance(m, AnswerMessage) for m in sim.messages())
+        assert at_once + later == 1
+        if sim.get("poses") > poses:
+            assert later
+            before_poses += 1
+        waits += later
+    assert before_poses > 2
+    assert waits < 200
