@@ -87,6 +87,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
         report.add(take_section(compared, session.model, folder / f"replay-{compared.name}-recorded.html"))
     report.add(_firmware_section(motion, folder / "firmware", violations))
     report.add(gait_section(folder / "gait", model, progress))
+    progress("drawing the report", None)
     return Demo(_as_text(rows), headline(comparison), report.write(folder / "report.html"), comparison)
 
 
