@@ -141,8 +141,10 @@ static void check_answer(struct robot *r, bool right, uint8_t trouble) {
 static void bad(struct robot *r, uint32_t j, bool noise) {
     struct servo *s = &r->servo[j];
     r->failed_row++;
-    if (noise) r->garbled_row++;
-    if (noise) r->noise = true; /* two of one ID garble an answer, and the end of theirs the next question: nobody answers that */
+    if (noise) { /* two of one ID garble an answer, and the end of theirs the next question: nobody answers that */
+        r->garbled_row++;
+        r->noise = true;
+    }
     if (r->failed_row > 2u * r->joints) {
         react(r, 2u * r->garbled_row > r->failed_row ? REASON_BABBLE : REASON_DEAD_SUPPLY, 0xFF);
         r->failed_row = r->garbled_row = 0;
