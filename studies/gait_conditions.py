@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from studies.common import ROOT, publish, run_study, sign
 from workbench.compare.footfalls import foot_phases
 from workbench.dynamics import inverse_dynamics
-from workbench.gait.certificate import CLAIM
+from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.feet import feet_measure
 from workbench.gait.legs import legs_of
 from workbench.gait.measure import fallen, measure
@@ -85,7 +85,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     said = "no optimised gait under runs/gaits: the ROBOTIS walk alone" if best is None else (
         f"{best.name} goes {100 * told[best.name]['speed']:.0f} cm/s where the ROBOTIS walk goes "
         f"{100 * told['ROBOTIS walk']['speed']:.0f}")
-    report = Report("What a better gait does differently", f"On the model, {said}.", f"{__doc__}\n\n{CLAIM}", [],
+    report = Report("What a better gait does differently", f"On the model, {said}.", f"{__doc__}\n\n{PUPPY_CLAIM}", [],
                     Provenance.of(model))
     header = ["gait", "speed [cm/s]", "slip [cm/s]", "tilt [deg]", "worst RMS torque [N m]", "of", "electrical cost of transport",
               "mechanical"]

@@ -19,7 +19,7 @@ import numpy as np
 
 from studies.common import publish, run_study, sign
 from studies.gait_conditions import GAITS, SECONDS, Played, gaits
-from workbench.gait.certificate import CLAIM, NAME
+from workbench.gait.certificate import NAME, PUPPY_CLAIM
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.measure import GaitMeasure, fallen, measure
 from workbench.gait.rollouts import Rollouts
@@ -62,7 +62,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     columns = list(parts(Ensemble()))
     rows = [[name, *(_cell(n[c]) for c in columns), _said(n["other engine"])] for name, n in told.items()]
     report = Report("Where gaits wander", f"Heading of {len(found)} gaits on {count} random robots each.",
-                    f"{__doc__}\n\n{CLAIM}", [], Provenance.of(model))
+                    f"{__doc__}\n\n{PUPPY_CLAIM}", [], Provenance.of(model))
     report.add(Section("Spread of heading", [
         Table(["gait", *columns, "in the other engine"], rows, "Standard deviation and mean of turning [deg/m]; 5th percentile "
               "and mean of the speed over the ground [cm/s]; how many fell."),

@@ -10,6 +10,8 @@ import pytest
 from workbench.device import read_tables, write_tables
 from workbench.motion import PoseTable, load_motion
 from workbench.robot import BUS_IDS, InputError, data_file
+from workbench.robot.servo_profile_file import servo_profile
+from workbench.robot.servo_units import ServoUnits
 
 TABLE = load_motion(data_file("robotis_walk.csv")).as_table()
 
@@ -37,6 +39,32 @@ def test_layout_of_the_thesis_under_a_line_that_says_the_order(tmp_path: Path) -
     speed = (tmp_path / "speed.txt").read_text().splitlines()
     assert speed[:3] == [order, "4,", "159,128,128,190,284,66,315,97,59,159,28,3,0,62,62,"]
     assert (tmp_path / "timeDiff.txt").read_text().splitlines() == [order, "4,", "140,", "103,", "94,", "131,"]
+
+
+def test_tables_of_another_family_are_in_its_own_counts(tmp_path: Path) -> None:
+    xl, ax = ServoUnits.of(servo_profile("XL-430")), ServoUnits.of(servo_profile("AX-12A"))
+    angles = np.radians([[0.0, 0.0], [90.0, 90.0], [-170.0, -90.0]])
+    table = PoseTable.from_angles(("hip", "knee"), np.array([0.0, 0.5, 1.5]), angles, units=(xl, ax))
+    assert table.goals.tolist() == [[2048 + 1024, 512 + 307], [2048 - 1934, 512 - 307]]
+    assert table.speeds[0].tolist() == [round(180 / 6 / 0.229), round(180 / 6 * 1023 / 114)]
+    assert np.abs(np.degrees(table.angles() - angles[1:])).max(axis=0) == pytest.approx([0.0195, 0.0293], abs=1e-3)
+    assert table.commands().speeds[0] == pytest.approx([131 * np.radians(1.374), table.speeds[0, 1] * np.radians(0.666)])
+    write_tables(table, tmp_path, {"hip": 1, "knee": 2})
+    assert (tmp_path / "pos.txt").read_text().splitlines()[1] == "# servos: XL-430, AX-12A"
+    assert "XL-430: goal positions 0 to 4095" in (tmp_path / "motion.h").read_text()
+    back = read_tables(tmp_path)
+    assert back.units == table.units
+    assert np.array_equal(back.goals, table.goals)
+    (tmp_path / "speed.txt").write_text((tmp_path / "speed.txt").read_text().replace("XL-430", "MX-28"))
+    with pytest.raises(InputError, match=r"speed.txt: line 2: servos are not those of pos.txt"):
+        read_tables(tmp_path)
+    (tmp_path / "pos.txt").write_text((tmp_path / "pos.txt").read_text().replace("XL-430", "XL-999"))
+    with pytest.raises(InputError, match=r"pos.txt: line 2: no servo profile for 'XL-999'"):
+        read_tables(tmp_path)
+
+
+def test_the_formats_own_units_are_the_ax12as() -> None:
+    assert ServoUnits.of(servo_profile("AX-12A")) == ServoUnits()
 
 
 def test_read_back_to_the_same_table(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.quadruped import quadruped_sdf
 from tests.recording_robot import write_robot
 from tests.servo_rig import GRAVITY, LENGTH, rig_model
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_take
 from workbench.effects.apply import physics_of, seen
@@ -524,7 +524,7 @@ def test_a_quadruped_takes_all_of_them():
 
 def test_backlash_explains_another_engines_recording_of_it():
     """Four seconds on the stand of the practice session whose answer is 3 deg of play in flm: down to the noise."""
-    session = load_session(shared("practice/p1_backlash/session.yaml"))
+    session = load_session(practice("p1_backlash"))
     stand = next(t for t in read_takes(session)[0] if t.spec.name == "stand")
     errors = []
     for model in (stand.model, with_effects(stand.model, ("backlash", "flm", {"gap": 3.0}))):

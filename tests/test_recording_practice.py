@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.motion import load_motion
 from workbench.recording import observe, read_recording, register, session_yaw, take_from_recording
 from workbench.robot import RobotModel, load_servo_constants
@@ -18,7 +18,7 @@ SESSIONS = ("p0_nothing_hidden", "p1_backlash", "p2_slippery_foot", "p3_payload"
 
 
 def load(name: str) -> tuple[Path, dict, RobotModel]:
-    folder = shared(f"practice/{name}")
+    folder = practice(name)
     session = yaml.safe_load((folder / "session.yaml").read_text())
     model = RobotModel(description=str(folder / "robot.sdf"), rigid_bodies=session["robot"]["rigid_bodies"])
     return folder, session, replace(model, servos=dict.fromkeys(model.joints, load_servo_constants(folder / "servo.yaml")))

@@ -9,7 +9,7 @@ void read_begin(struct robot *r) {
     r->failed_row = r->garbled_row = 0;
     r->low_rounds = r->dead_rounds = 0;
     r->sweep_started = r->now;
-    r->round_over = false;
+    r->round_over = r->noise = false;
     for (uint32_t j = 0; j < r->joints; j++) {
         struct servo *s = &r->servo[j];
         s->missed = s->garbled = s->hot = s->overloaded = 0;
@@ -107,6 +107,7 @@ static uint8_t objection(const struct robot *r, uint32_t j, const uint8_t *all, 
 
 static void advance(struct robot *r) {
     r->tries = 0;
+    r->noise = false;
     r->turn++;
     if (r->turn < r->joints) return;
     r->turn = 0;
@@ -140,14 +141,17 @@ static void check_answer(struct robot *r, bool right, uint8_t trouble) {
 static void bad(struct robot *r, uint32_t j, bool noise) {
     struct servo *s = &r->servo[j];
     r->failed_row++;
-    if (noise) r->garbled_row++;
+    if (noise) { /* two of one ID garble an answer, and the end of theirs the next question: nobody answers that */
+        r->garbled_row++;
+        r->noise = true;
+    }
     if (r->failed_row > 2u * r->joints) {
         react(r, 2u * r->garbled_row > r->failed_row ? REASON_BABBLE : REASON_DEAD_SUPPLY, 0xFF);
         r->failed_row = r->garbled_row = 0;
     }
     if (++r->tries < TRIES) return;
     s->missed = (uint8_t)(s->missed + (s->missed < 255u));
-    if (noise) s->garbled = (uint8_t)(s->garbled + (s->garbled < 255u));
+    if (r->noise) s->garbled = (uint8_t)(s->garbled + (s->garbled < 255u));
     s->fresh = false;
     advance(r);
 }

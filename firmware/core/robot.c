@@ -66,8 +66,10 @@ void robot_step(struct robot *r, uint32_t now) {
         judge_stray(r);
         if (r->state == STATE_BRIDGE) bridge_tick(r);
     }
-    commands_bytes(r);
-    finish_upload(r);
-    if (!r->state_told) tell_state(r);
+    if (!r->bus.start && !reserved(r, 2)) { /* nothing long, as the sum of a frame, while a pose waits or is due at the next tick */
+        commands_bytes(r);
+        finish_upload(r);
+        if (!r->state_told) tell_state(r);
+    }
     if (bus_free(&r->bus)) next(r);
 }

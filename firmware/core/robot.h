@@ -87,7 +87,7 @@ struct robot {
     uint32_t turn, tries, sweep_started, failed_row, garbled_row;
     uint8_t check_for; /* what follows when every servo has been asked: a ramp to hold, or one to let go */
     uint8_t check_pass, low_rounds, dead_rounds;
-    bool round_over;
+    bool noise, round_over; /* noise: a try of the present servo was answered by it */
     uint16_t slow_turn;
 
     uint32_t stray_seen, stray_since;

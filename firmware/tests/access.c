@@ -55,6 +55,8 @@ uint64_t sim_get(struct sim *s, const char *what, uint32_t k) {
 void sim_set(struct sim *s, const char *what, uint32_t k, uint32_t value) {
     if (!strcmp(what, "position")) s->servo[k].milli = 1000 * (int64_t)value;
     if (!strcmp(what, "torque_limit")) put16(s->servo[k].table + DXL_TORQUE_LIMIT, value);
+    if (!strcmp(what, "turning")) put16(s->servo[k].table + DXL_PRESENT_SPEED, value);
+    if (!strcmp(what, "load")) put16(s->servo[k].table + DXL_LOAD, value);
     if (!strcmp(what, "cw_limit")) put16(s->servo[k].table + DXL_CW_LIMIT, value);
     if (!strcmp(what, "ccw_limit")) put16(s->servo[k].table + DXL_CCW_LIMIT, value);
     if (number(s, what)) *number(s, what) = value;

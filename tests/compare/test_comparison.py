@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import STARTS_AT, record_arm, session_content, write_session
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.compare_files import compare_files, file_kind
 from workbench.compare.compare_session import compare_session
 from workbench.compare.comparison import compare_takes
@@ -187,7 +187,7 @@ def test_any_two_files(folder, pair_files, a, b, error, floor):
 @pytest.mark.slow
 def test_practice_session_without_hidden_physics():
     """Issue 2: joint errors within 1.3 times the noise on the stand, within 2 times walking."""
-    comparison = compare_session(load_session(shared("practice/p0_nothing_hidden/session.yaml")))
+    comparison = compare_session(load_session(practice("p0_nothing_hidden")))
     assert [t.name for t in comparison.takes] == ["stand", "sway", "walk"]
     for take in comparison.takes:
         for channel in take.joints.values():
@@ -200,6 +200,6 @@ def test_practice_session_without_hidden_physics():
 
 @pytest.mark.slow
 def test_practice_session_with_backlash():
-    comparison = compare_session(load_session(shared("practice/p1_backlash/session.yaml")))
+    comparison = compare_session(load_session(practice("p1_backlash")))
     assert comparison.joints_by_error()[0] == "flm"
     assert all(t.joints_by_error()[0] == "flm" for t in comparison.takes if t.name in ("stand", "walk"))

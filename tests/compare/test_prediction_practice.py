@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.prediction import predict_session
 from workbench.compare.session import load_session
 from workbench.recording import BodyTrack
@@ -37,7 +37,7 @@ def _joint_error(predicted: Path, recorded: Path, child: str, parent: str) -> fl
 
 @pytest.mark.parametrize("name", HIDDEN)
 def test_the_hidden_robot_is_foretold_to_the_noise(name: str, tmp_path: Path) -> None:
-    folder = shared("practice") / name
+    folder = practice(name)
     session = load_session(folder / "session.yaml")
     child, parent, effect = HIDDEN[name]
     predict_session(session, session.model.with_effect(effect), tmp_path, nominal=session.model)
@@ -49,7 +49,7 @@ def test_the_hidden_robot_is_foretold_to_the_noise(name: str, tmp_path: Path) ->
 
 
 def test_a_standing_robot_is_foretold_to_the_noise(tmp_path: Path) -> None:
-    folder = shared("practice") / "p0_nothing_hidden"
+    folder = practice("p0_nothing_hidden")
     session = load_session(folder / "session.yaml")
     stand = replace(session, predict=tuple(p for p in session.predict if p.base == "fixed"))
     (path,) = predict_session(stand, session.model, tmp_path).paths

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.gap_sessions import MOTION, session_content, write_session
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.session import load_session
 from workbench.robot import BUS_IDS, RIGID_BODIES, InputError
 
@@ -160,7 +160,7 @@ def test_base_that_hangs_on_a_joint_cannot_float(tmp_path):
 
 @pytest.mark.parametrize("name", ["p0_nothing_hidden", "p4_late_firmware", "p7_two_at_once"])
 def test_practice_sessions_load(name):
-    session = load_session(shared(f"practice/{name}/session.yaml"))
+    session = load_session(practice(name))
     assert [t.name for t in session.takes] == ["stand", "sway", "walk"]
     assert [t.base for t in session.takes] == ["fixed", "free", "free"]
     assert session.model.ground.friction == 0.6

@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 
 import pytest
+import yaml
 
 from tests.command import refused, succeeds
 from tests.device.motive import MotiveOnSockets
@@ -25,14 +26,27 @@ from workbench.simulation.virtual_robot import VirtualRobot
 def test_a_session_reads_back_as_it_was_written(tmp_path):
     model = puppy_model()
     servos = {j: replace(s, supply_voltage=10.5, sd=(("supply_voltage", 0.5),)) for j, s in model.servos.items()}
-    model = replace(model, servos=servos)
+    model = replace(model, servos=servos, feet=("flb_link", "frb_link"))
     (tmp_path / "log.csv").write_text("time,goal.flm,position.flm\n0,0,0\n0.1,1,1\n")
     write_session(tmp_path, model, [{"name": "log", "recording": "log.csv"}])
     read = load_session(tmp_path).model
-    assert read.servos == model.servos
+    assert (read.servos, read.feet) == (model.servos, model.feet)
+    assert (tmp_path / "session.yaml").read_text().count("stall_torque") == 1  # alike: said once
     assert (read.bus_ids, read.rigid_bodies, read.base) == (model.bus_ids, model.rigid_bodies, model.base)
     assert read.ground.friction == model.ground.friction
     assert math.isinf(read.ground.stiffness)
+
+
+def test_a_session_elsewhere_finds_the_packages_of_meshes(tmp_path, monkeypatch):
+    """--package names a folder from where the command was called."""
+    (tmp_path / "meshes").mkdir()
+    monkeypatch.chdir(tmp_path)
+    model = replace(arm(tmp_path), packages={"kit": "meshes"})
+    (tmp_path / "run").mkdir()
+    write_session(tmp_path / "run", model, [])
+    monkeypatch.chdir("/")
+    content = yaml.safe_load((tmp_path / "run/session.yaml").read_text())
+    assert content["robot"]["packages"] == {"kit": str(tmp_path / "meshes")}
 
 
 def test_the_cameras_and_the_servos_agree(tmp_path):

@@ -63,7 +63,7 @@ def test_a_plug_in_is_proposed_by_what_it_says_of_itself(said, proposed, monkeyp
 
 def test_a_plug_in_that_is_a_point_mass_is_fitted_by_its_moments_and_within_its_reach(monkeypatch):
     mass = type("Ballast", (type(KNOWN["payload"]),), {"name": "ballast"})()
-    short = type("Short", (Plugged,), {"reach": lambda self, sdf, kinematics, where: 0.25})()
+    short = type("Short", (Plugged,), {"reach": lambda self, sdf, model, where: 0.25})()
     monkeypatch.setattr(proposals, "known_effects", lambda: {mass.name: mass, short.name: short})
     found = proposals.candidates(puppy_model(), [HELD])
     assert {type(c) for c in found if c.name == "ballast"} >= {PointMass}

@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.evidence.linear import candidate
 from tests.servo_rig import rig_model
 from workbench.effects.base import Registers
 from workbench.effects.registry import effect_named
+from workbench.effects.sdf import SdfRobot
 from workbench.identify.evidence.explain import what_changed
+from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.nuisance import Uncertain, recalibrated, uncertain_numbers
+from workbench.identify.evidence.plausible import at_their_end
+from workbench.identify.parameters import Candidate
 from workbench.robot import InputError, ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants
 
@@ -102,3 +107,28 @@ def test_registers_that_are_not_there_say_nothing():
     bare = [replace(registers(0.0, 1.0, k), voltage=None, duty={}) for k in range(4)]
     assert effect_named("supply_sag").in_registers(bare, ()) is None
     assert effect_named("servo_gain").in_registers(bare, ("j",)) is None
+
+
+def test_a_supply_that_would_burn_the_servo_is_refuted(tmp_path):
+    """On a servo of 7.4 V, 11.1 V is the end: what gets there is refuted, a sagging supply or full cells are not."""
+    model = rig_model(tmp_path, load_servo_constants(written(tmp_path)))
+    effect = effect_named("supply_voltage")
+    reach = effect.reach(SdfRobot(model.path), model, ())
+    free = Candidate.of(effect, (), effect.neutral(model))
+    supply = replace(free, reach=reach)
+    for volts, refuted in [(17.9, True), (11.1, True), (10.5, False), (5.0, False)]:
+        h = start(()).with_effect(supply, supply.sizes([volts]))
+        assert supply.values(h.theta)[0] == pytest.approx(min(volts, 11.1))
+        said = at_their_end(h, [supply])
+        assert list(said) == [supply] * refuted
+        assert all("voltage would have to be 11.1 V or beyond" in str(why) for why in said.values())
+    assert not at_their_end(start(()).with_effect(free, free.sizes([17.9])), [free])
+
+
+def test_ends_that_registers_set_refute_nothing():
+    """Half of what the pool lets it is where a register held it."""
+    gain = replace(candidate("servo_gain"), reach=0.4)
+    held = replace(gain, reach=0.2)
+    h = start(()).with_effect(held, held.bounds()[1])
+    assert not at_their_end(h, [gain])
+    assert at_their_end(h, [held])

@@ -17,7 +17,7 @@ from workbench.motion import PoseTable
 from workbench.robot import InputError
 
 TABLE = walk()
-LIMP, CHECK, NEUTRAL, PLAY = 1, 2, 4, 5
+LIMP, CHECK, RAMP, NEUTRAL, PLAY = 1, 2, 3, 4, 5
 
 
 @pytest.mark.parametrize(("held", "state"), [(19, NEUTRAL), (20, PLAY)])
@@ -276,3 +276,83 @@ def test_data_beyond_the_size_that_was_said_are_refused() -> None:
     sim.send(frame(FrameType.DATA, struct.pack("<H", 200) + bytes(51)))
     sim.run(5)
     assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == ["bytes are missing"]
+
+
+def test_what_comes_on_a_link_waits_while_a_pose_is_a_millisecond_away_and_no_longer() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.messages()
+    ask, before_poses, waits = frame(FrameType.ASK), 0, 0
+    for _ in range(400):
+        sim.send(ask[:3])  # less than a millisecond's, which would go by
+        sim.send(ask[3:])
+        sim.run(1)
+        at_once = any(isinstance(m, AnswerMessage) for m in sim.messages())
+        poses = sim.get("poses")
+        sim.run(1)
+        later = any(isinstance(m, AnswerMessage) for m in sim.messages())
+        assert at_once + later == 1
+        if sim.get("poses") > poses:
+            assert later
+            before_poses += 1
+        waits += later
+    assert before_poses > 2
+    assert waits < 200
+
+
+def test_the_log_tells_each_joints_slow_values_as_its_registers_hold_them() -> None:
+    sim = Sim(TABLE)
+    sim.to_neutral()
+    for j in range(15):
+        for what, value in (("turning", 300 + j), ("load", 600 + j), ("drop", j % 3), ("heat", 30 + j)):
+            sim.set(what, value, j)
+    volts = sim.get("volts")
+    sim.run(50)
+    sim.messages()
+    sim.run(200)
+    slow = {s.joint: s for m in sim.messages() if isinstance(m, LogMessage) for s in m.slow}
+    assert slow.keys() == set(range(15))
+    for j, s in slow.items():
+        assert (s.speed, s.load, s.voltage, s.temperature) == (300 + j, 600 + j, (volts - j % 3) / 10, 30 + j)
+
+
+def test_the_log_tells_how_many_poses_of_the_cycle_went_out() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    sim.run(20)
+    sim.messages()  # of before the first pose
+    poses = []
+    for _ in range(75):
+        sim.run(20)
+        poses += [m.pose for m in sim.messages() if isinstance(m, LogMessage)]
+    assert set(poses) == {1, 2, 3, 4}
+    assert all(after == before or after == before % 4 + 1 for before, after in pairwise(poses))
+
+
+def test_a_stop_in_the_ramp_of_power_on_changes_nothing() -> None:
+    sim = Sim(TABLE)
+    until(sim, {RAMP})
+    sim.send(frame(FrameType.STOP))
+    states = set()
+    for _ in range(4000):
+        sim.run(1)
+        states.add(sim.get("state"))
+        if NEUTRAL in states:
+            break
+    assert states == {RAMP, NEUTRAL}
+
+
+def test_a_button_that_hangs_does_not_start_what_was_stopped_otherwise() -> None:
+    sim = Sim(TABLE)
+    sim.play()
+    for k in range(60):
+        sim.remote(1)
+        sim.run(60)
+        if k == 5:
+            sim.send(frame(FrameType.STOP))
+    assert sim.get("state") == NEUTRAL
+    sim.remote(0)
+    sim.remote(1)
+    sim.remote(0)
+    sim.run(5)
+    assert sim.get("state") == PLAY

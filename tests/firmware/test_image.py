@@ -73,6 +73,25 @@ def test_five_hundred_poses_with_telemetry_remote_and_uploads() -> None:
     play(500)
 
 
+def test_a_part_of_an_upload_that_ends_just_before_a_pose_does_not_delay_it() -> None:
+    """Its sum takes 80 us: that has to wait until the pose is out."""
+    robot = Robot()
+    robot.to_neutral()
+    began = len(robot.ear.poses)
+    robot.remote(1)
+    robot.remote(0)
+    robot.run(20)
+    (first,) = (t for t, _ in robot.ear.poses[began:])
+    data = b"".join(upload_frames(walk(), 1)[:2])
+    due = first + MILLISECOND * np.cumsum(np.tile(DWELLS, 3))
+    for at, before in zip(due.tolist(), (np.linspace(0, 90, len(due)) * MICROSECOND).astype(int).tolist()):
+        robot.board.send(robot.board.pc, data, at - before - len(data) * (SECOND * 10 // 57_600))
+        robot.run((at - robot.clock.now) / MILLISECOND + 1)
+    late = np.array([t for t, _ in robot.ear.poses[began + 1:]]) - due
+    assert np.abs(late).max() < 15 * MICROSECOND
+    robot.sound()
+
+
 def long_walk(seed: int) -> tuple[str, float, float]:
     """Ten thousand poses: the trace's hash, the worst start of a packet [us], and processor time [s]."""
     began = time.process_time()

@@ -75,6 +75,22 @@ def test_the_shell_completes_verbs_and_options(tmp_path: Path) -> None:
     assert "--thorough" in completed("workbench diagnose --th")
 
 
+@pytest.mark.parametrize("command", [
+    ["simulate", "M"], ["inverse-dynamics", "M"], ["compare", "M", "M"], ["optimize"], ["export", "M"],
+    ["flash", "M", "--dry-run"],
+    ["servos", "--port", "virtual"], ["play", "M", "--port", "virtual"], ["run", "M"], ["view", "M"]], ids=lambda c: c[0])
+def test_every_verb_that_takes_packages_uses_them(command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    robot = tmp_path / "robot.urdf"
+    mesh = '<visual><geometry><mesh filename="package://kit/a.stl"/></geometry></visual>'
+    robot.write_text(f'<robot name="r"><link name="trunk">{mesh}</link></robot>')
+    monkeypatch.chdir(tmp_path)
+    trot = str(data_file("fox/trot.csv"))
+    said = refused(capsys, *[trot if c == "M" else c for c in command], "--model", str(robot), "--package", f"kit={tmp_path}",
+                   *(["--out", "out"] if command[0] != "view" else []))
+    assert f"in {tmp_path}" in said  # looked for where the option says, and not there
+
+
 def test_view_says_where_to_look_and_ends(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["view", "fox", "--seconds", "0.1"]) == 0
     assert capsys.readouterr().out.startswith("open http://localhost:")

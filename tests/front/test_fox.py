@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from matplotlib.collections import LineCollection
 from scipy.spatial.transform import Rotation
 
-from tests.command import succeeds
+from tests.command import refused, succeeds
 from workbench import load_model, load_motion
 from workbench.compare.footfalls import foot_phases
+from workbench.device import read_tables
 from workbench.experiment.limits import Reach
 from workbench.experiment.stance import BodyMoves
+from workbench.gait.evaluate import table_sha256
+from workbench.gait.machine import GaitMachine
+from workbench.gait.shape import GaitShape
+from workbench.gait.table import gait_table
+from workbench.motion import Motion
+from workbench.motion.files import motion_text
 from workbench.recording import BodyTrack, Measurement, Take, observe, write_motive
+from workbench.recording.formats.read import read_recording
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.view.figures import film_strip
 
 TROT = data_file("fox/trot.csv")
 FEET = {"LF_KFE", "LH_KFE", "RF_KFE", "RH_KFE"}
@@ -27,10 +36,7 @@ STARTS_AT, CYCLES, CYCLE = 0.4137, 3, 0.64
 
 @pytest.fixture(scope="module")
 def fox() -> RobotModel:
-    model = load_model("fox")
-    return replace(model, rigid_bodies={"Trunk": "trunk", **{f"{leg} shank": f"{leg}_SHANK" for leg in ("LF", "LH", "RF", "RH")},
-                                        **{f"{leg} thigh": f"{leg}_THIGH" for leg in ("LF", "LH", "RF", "RH")},
-                                        **{f"{leg} hip": f"{leg}_HIP" for leg in ("LF", "LH", "RF", "RH")}})
+    return load_model("fox")
 
 
 @pytest.fixture(scope="module")
@@ -89,15 +95,76 @@ def test_a_session_is_compared_with_footfalls(session: Path, tmp_path: Path, cap
     assert (tmp_path / "report.html").stat().st_size > 100_000
 
 
+def test_a_take_is_foretold(fox: RobotModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the frames before its first command alone; on a stand, where nothing parts by chaos."""
+    commands = load_motion(TROT, fox).commands(cycles=1)
+    take = Simulation(fox, SimulationConfig(base="fixed")).run(commands, 1.0, STARTS_AT + 0.02)
+    path = write_session(tmp_path, fox, take, 1)
+    recorded = read_recording(tmp_path / "trot.csv").rigid_bodies
+    head = (tmp_path / "trot.csv").read_text().splitlines(keepends=True)[:7 + 47]
+    (tmp_path / "start.csv").write_text("".join(head))
+    frames = len(recorded["body"].p)
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"predict": [
+        {"name": "again", "motion": str(TROT), "cycles": 1, "start": "start.csv", "starts_at": STARTS_AT, "frames": frames,
+         "base": "fixed"}]}))
+    succeeds(capsys, "predict", str(path), "--jobs", "1", "--out", str(tmp_path / "out"))
+    foretold = read_recording(tmp_path / "out" / "again.csv").rigid_bodies
+    assert set(foretold) == set(fox.rigid_bodies)
+    for asset, body in foretold.items():
+        turned = [Rotation.from_quat(b.quat, scalar_first=True) for b in (body, recorded[asset])]
+        assert np.rad2deg((turned[0].inv() * turned[1]).magnitude().max()) < 1.0, asset  # noise: 0.1 deg on each axis
+    shank = Rotation.from_quat(foretold["LF shank"].quat, scalar_first=True)
+    assert np.rad2deg((shank[0].inv() * shank).magnitude().max()) > 30
+
+
 @pytest.mark.parametrize("arguments", [
     ("inspect", "package://fox/fox.sdf"), ("inspect", "fox"), ("inspect", str(data_file("fox/model.yaml"))),
     ("inspect", str(TROT)),
     ("play", str(TROT), "--model", "fox", "--port", "virtual", "--base", "fixed", "--cycles", "1", "--out"),
     ("inverse-dynamics", str(TROT), "--model", "fox", "--cycles", "1", "--out"),
-    ("export", str(TROT), "--model", "fox", "--cycles", "1", "--force", "--out")], ids=lambda a: "_".join(a[:1]))
+    ("servos", "--model", "fox", "--port", "virtual", "--out")], ids=lambda a: "_".join(a[:1]))
 def test_other_verbs_take_it(arguments: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = [str(tmp_path / "out")] if arguments[-1] == "--out" else []
     assert succeeds(capsys, *arguments, *out)
+
+
+def test_its_tables_are_in_its_own_servos_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = succeeds(capsys, "export", str(TROT), "--model", "fox", "--cycles", "1", "--out", str(tmp_path / "out"))
+    assert "no motion.table: joint LF_HAA has a servo of the family XL-430" in said
+    assert not (tmp_path / "out" / "motion.table").exists()
+    table = read_tables(tmp_path / "out")
+    asked = load_motion(TROT).angles[1:]
+    assert np.abs(table.angles() - asked).max() <= np.radians(360 / 4096) / 2 + 1e-9
+    assert "servos    XL-430" in succeeds(capsys, "inspect", str(tmp_path / "out"))
+
+
+def test_a_gaits_table_is_in_its_counts_and_comes_back_from_its_file(fox: RobotModel, tmp_path: Path) -> None:
+    machine = GaitMachine(fox)
+    table = gait_table(machine, GaitShape("trot", (1, 1), 8, 2.0, stride=0.03, duty=0.6, lift=0.015, crouch=0.03))
+    assert {u.family for u in table.cycle.units} == {"XL-430"}
+    assert np.abs(table.cycle.angles() - table.asked).max() <= np.radians(360 / 4096) / 2 + 1e-12
+    assert (table.cycle.speeds <= machine.fastest).all()
+    assert table.cycle.rates().max() < 6.4  # rad/s: the servo at no load
+    path = tmp_path / "gait.csv"
+    path.write_text(motion_text(Motion.from_table(table.cycle)))
+    assert table_sha256(load_motion(path, fox).as_table()) == table_sha256(table.cycle)
+
+
+def test_a_film_strip_shows_legs_to_their_ends_and_the_left_ones_thin(fox: RobotModel) -> None:
+    stretched = np.radians([[-80.0 if j.endswith("HFE") else 0.0 for j in fox.joints]] * 9)
+    take = Take("pose", "simulation", np.linspace(-0.2, 0.6, 9), fox.joints, stretched, starts_at=0.0, base="fixed")
+    axes = film_strip(fox, take, instants=2).axes[0]
+    (sticks,) = (c for c in axes.collections if isinstance(c, LineCollection))
+    x = np.concatenate(sticks.get_segments())[:, 0]
+    assert np.ptp(x) > 25  # cm: legs ahead of the trunk
+    assert axes.get_xlim()[0] < x.min()
+    assert x.max() < axes.get_xlim()[1]
+    assert len(set(sticks.get_linewidths())) == 2
+
+
+def test_the_cm530s_program_refuses_its_servos(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = refused(capsys, "flash", str(TROT), "--model", "fox", "--dry-run", "--out", str(tmp_path))
+    assert "joint LF_HAA has a servo of the family XL-430; the CM-530's program plays the AX-12A's alone" in said
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.session import load_session
 from workbench.gait.evaluate import Evaluator
 from workbench.gait.machine import GaitMachine
@@ -11,7 +11,7 @@ from workbench.gait.shape import GaitShape
 
 
 def test_the_practice_quadruped_walks_by_the_same_numbers():
-    model = load_session(shared("practice/p0_nothing_hidden/session.yaml")).model
+    model = load_session(practice("p0_nothing_hidden")).model
     machine = GaitMachine(model)
     trot = GaitShape("trot", (-1, 1), 12, 2.4, stride=0.07, duty=0.6, lift=0.03, crouch=0.045, lead=1.0)
     forward, = Evaluator(machine, Request(), []).judged([trot], 0)

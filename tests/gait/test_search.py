@@ -10,10 +10,11 @@ from tests.command import refused
 from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
+from workbench.gait.finalists import finely
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of, out_of_reach
 from workbench.gait.request import Request
-from workbench.gait.search import Budget, raced, search, steered
+from workbench.gait.search import Budget, Found, raced, search, steered
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import paths_of
@@ -135,6 +136,22 @@ def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
     assert "the nearest table that keeps every limit goes" in result.problem
     assert result.table is not None
     assert not result.certified.certificate.kept
+
+
+def test_of_the_best_gaits_the_first_that_keeps_its_limits_for_as_long_as_the_certificate_walks(machine):
+    """The search's best is too slow there; what comes after it is not."""
+    lax = Request(limits=replace(Request().limits, drift=10.0, aside=10.0, tilt=3.0))
+    slow, fast = (GaitShape("trot", (1, 1), 8, 2.2, stride=stride, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
+                  for stride in (0.02, 0.06))
+    brief = replace(CertifyOptions(), seconds=1.0, step=2e-3)
+    begun = Evaluator(machine, lax, []).judged([slow, fast], 0)
+    found = Found(begun[0], None, 1, 2, (begun[1],))
+    between = 0.5 * sum(c.nominal.speed for c in begun)
+    chosen = finely(machine, replace(lax, speed=between), found, brief, None, 1).best
+    assert chosen.shape == replace(fast, turn=chosen.shape.turn)
+    assert chosen.good
+    unmet = finely(machine, replace(lax, speed=10 * between), found, brief, None, 1)
+    assert unmet is found
 
 
 def test_the_bundled_ensemble_draws_what_it_says(machine, tmp_path):

@@ -27,4 +27,6 @@ def test_a_pwm_servo_is_diagnosed_in_minutes_and_not_called_explained(tmp_path: 
     began = time.process_time()
     succeeds(capsys, "diagnose", str(tmp_path), "--out", str(tmp_path / "out"), "--jobs", "1")
     assert time.process_time() - began < LONGEST
-    assert json.loads((tmp_path / "out" / "findings.json").read_text())["verdict"] == "partly_explained"
+    said = json.loads((tmp_path / "out" / "findings.json").read_text())
+    assert said["verdict"] == "partly_explained"
+    assert "supply_voltage" not in {f["effect"] for f in said["findings"]}  # 17.9 V would be the likeliest, and burn it

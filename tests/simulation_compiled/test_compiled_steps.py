@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from studies.concealed_effects.robots import quadruped
-from tests.shared_data import shared
+from tests.shared_data import practice
 from tests.simulation_compiled.drake_steps import CompiledSteps, config_for, drake_steps, typical
 from tests.test_effects_structure import ARM, INERTIAL
 from workbench.compare.session import load_session
@@ -93,7 +93,7 @@ def test_a_quadruped_of_other_masses_and_lengths_moves_by_drakes_steps(seed, tmp
 
 @pytest.mark.parametrize("session", ["p0_nothing_hidden", "p3_payload", "p6_stiff_gearbox"])
 def test_a_practice_robot_moves_by_drakes_steps(session):
-    model = load_session(shared(f"practice/{session}/session.yaml")).model
+    model = load_session(practice(session)).model
     check(differences(model, "free", count=60))
 
 

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tests.shared_data import shared
+from tests.shared_data import practice
 from workbench.compare.session import load_session
 from workbench.identify.diagnosis import diagnose_session
 from workbench.simulation import SimulationConfig
@@ -21,7 +21,7 @@ SHARE = 0.1
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SESSIONS)
 def test_either_engine_finds_the_same(name, monkeypatch):
-    session = load_session(shared(f"practice/{name}/session.yaml"))
+    session = load_session(practice(name))
     compiled = diagnose_session(session).diagnosis
     assert compiled.provenance["engine"]["rollouts by"] == "the compiled station"
     monkeypatch.setattr("workbench.identify.diagnosis.SimulationConfig", partial(SimulationConfig, engine="drake"))

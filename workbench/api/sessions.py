@@ -108,6 +108,7 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
     """Simulates, registers and compares every take of a session (or of a session.yaml).
 
     config: of the rollouts, their base as each take says. model: another robot than the session's, such as a diagnosed one.
+    progress: called with the stage and the share done. jobs: processes that simulate.
     A damaged take is left out and named in `comparison.left_out`; InputError for bad input, or where no take remains.
     """
     session = _loaded(session)
@@ -131,7 +132,8 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
 def predict(session: Session | str | PathLike[str], folder: str | PathLike[str], model: RobotModel | None = None,
             config: SimulationConfig | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> Predicted:
     """Plays what a session asks to foretell on `model` (None: the session's own) and writes FOLDER/NAME.csv, as the cameras or
-    the servos' log would show it. Returns their paths. InputError for bad input, or where there is nothing to foretell."""
+    the servos' log would show it; returns the files' paths and what was left out. config: of the rollouts. progress: called with
+    the stage and the share done. jobs: processes that simulate. InputError for bad input, or nothing to foretell."""
     session = _loaded(session)
     Path(folder).mkdir(parents=True, exist_ok=True)
     return predict_session(session, model or session.model, Path(folder), progress, config=config, n_jobs=jobs)

@@ -36,7 +36,7 @@ def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | 
         return None
     from workbench.simulation.virtual_robot import VirtualRobot
 
-    real = load_model(args.robot) if args.robot else model
+    real = load_model(args.robot, args.packages) if args.robot else model
     base = "fixed" if model.kinematics.fixed_to_world else args.base
     return VirtualRobot(real, base, args.rate)
 

@@ -59,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"workbench export: warning: {uncertified}", file=sys.stderr)
     for violation in exported.violations:
         print(f"workbench export: warning: {violation}", file=sys.stderr)
-    print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}")
+    print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}"
+          + (f"; no motion.table: {exported.no_binary}" if exported.no_binary else ""))
     return 0
 
 

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     profile = load_loader_profile(args.loader)
     with Progress("flash") as progress:
         progress("building")
-        model = load_model(args.model)
+        model = load_model(args.model, args.packages)
         if Path(args.motion).suffix != ".table" and not args.force:
             uncertified = uncertified_by(args.motion, load_motion(args.motion, model), model)
             if uncertified is not None:

@@ -39,7 +39,10 @@ class OneLineParser(argparse.ArgumentParser):
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser with every verb's arguments; imports no room, so that help comes at once."""
-    parser = OneLineParser(prog="workbench", description=workbench.__doc__, allow_abbrev=False)
+    parser = OneLineParser(
+        prog="workbench", description=(workbench.__doc__ or "").partition("\n")[0], allow_abbrev=False,
+        epilog="`workbench VERB --help` explains each. Exit codes: 0 done, 1 a defect of the workbench, 2 bad input (one line: "
+        "file, place, what was expected), 130 interrupted. From Python: `import workbench`.")
     parser.add_argument("--version", action="version", version=f"workbench {workbench.__version__}")
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
     for verb in VERBS:

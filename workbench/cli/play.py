@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         journal = Path(args.finish)
         print(f"wrote {finish_log(journal, args.out / f'{journal.stem}.csv')}")
         return 0
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     refuse_broken_limits(motion.as_table(), model, args.force)
     log = args.out / f"{motion.name}.csv"

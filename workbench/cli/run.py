@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.motion import load_motion
     from workbench.view.report.comparison import write_comparison
 
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)

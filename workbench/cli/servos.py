@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.device.bus.survey import survey
     from workbench.robot.servo_registers import save_registers
 
-    model = load_model(args.model)
+    model = load_model(args.model, args.packages)
     with Progress("servos") as progress, open_bus(args, model, make_virtual(args, model)) as bus:
         found = survey(bus, model, progress=progress)
         if args.set_id:

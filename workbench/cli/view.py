@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.scene.subject import subject_of, take_of
 
     subject = subject_of(args.subject)
-    model = load_model(args.subject if subject == "model" else args.model)
+    model = load_model(args.subject if subject == "model" else args.model, args.packages)
     with Progress("view") as progress:
         if subject == "session":
             from workbench.compare.session import load_session

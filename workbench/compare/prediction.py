@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Predicted:
-    """What was written, and the session's takes that were left out as damaged: (name, reason)."""
+    """What was written (paths), and the session's takes that were left out as damaged (left_out): name and reason."""
 
     paths: tuple[Path, ...]
     left_out: LeftOut = ()

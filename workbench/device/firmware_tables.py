@@ -12,26 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.device.limits import Violation, refuse_broken_limits
-from workbench.device.table_file import JointBounds, TableFile, bounds_of, encode_table
+from workbench.device.table_file import JointBounds, TableFile, bounds_of, encode_table, unplayable
 from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, InputError, RobotModel, bus_ids
 from workbench.robot.files import read_text, write_together
 from workbench.robot.numerals import whole_of
+from workbench.robot.servo_profile_file import servo_profile
+from workbench.robot.servo_units import AX12A, ServoUnits
 
 Counts = NDArray[np.int64]
 
 GOALS, SPEEDS, DWELLS, HEADER, BINARY = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h", "motion.table"
-ORDER = "# joints:"
+ORDER, FAMILIES = "# joints:", "# servos:"
 _MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the table
 
 
 @dataclass(frozen=True)
 class Export:
-    """What `export` wrote, and what it had to say about it."""
+    """What `export` wrote, what it had to say about it, and why motion.table is not among the files ("" where it is)."""
 
     files: tuple[Path, ...]
     violations: tuple[Violation, ...]
+    no_binary: str = ""
 
 
 def export(
@@ -41,10 +44,13 @@ def export(
 
     simulated: the motion as it ran in simulation; without it torque goes unchecked. InputError, and nothing written,
     where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
+    motion.table is for the CM-530's program, and left out where the servos are none that it speaks to.
     """
     table = motion.as_table()
     violations = refuse_broken_limits(table, model, force, simulated, "not exported")
-    return Export(tuple(write_tables(table, out_dir, bus_ids(model), lambda: bounds_of(table, model))), tuple(violations))
+    other = unplayable(table)
+    bounds = None if other else lambda: bounds_of(table, model)
+    return Export(tuple(write_tables(table, out_dir, bus_ids(model), bounds)), tuple(violations), other)
 
 
 def write_tables(
@@ -54,7 +60,8 @@ def write_tables(
     """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where the joints' bounds are known, motion.table; all or none.
 
     The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
-    line that says the order of joints, the same in all files. InputError for a joint without a bus ID.
+    line that says the order of joints, the same in all files; where servos are none of the AX-12A's family, a second line says
+    which they are, as counts are theirs. InputError for a joint without a bus ID.
     """
     for joint in table.joints:
         if joint not in ids:
@@ -63,6 +70,8 @@ def write_tables(
     if shared:
         raise InputError(table.source, f"joints {' and '.join(shared)} share bus ID {ids[shared[0]]}")
     order = f"{ORDER} {' '.join(table.joints)}"
+    if any(u != AX12A for u in table.units):
+        order += f"\n{FAMILIES} {', '.join(u.family for u in table.units)}"
 
     def text(rows: Counts) -> str:
         return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
@@ -80,26 +89,31 @@ def write_tables(
 def read_tables(folder: str | Path) -> PoseTable:
     """Reads the three text files back; InputError where they disagree, or lack the line that says the order of joints."""
     folder = Path(folder)
-    joints, goals = _read(folder / GOALS)
+    joints, units, goals = _read(folder / GOALS)
     columns = {SPEEDS: len(joints), DWELLS: 1}
     counts = {}
     for name, width in columns.items():
-        order, counts[name] = _read(folder / name, width)
+        order, families, counts[name] = _read(folder / name, width)
         if order != joints:
             raise InputError(folder / name, f"line 1: joints are not in the order of {GOALS}")
+        if families != units:
+            raise InputError(folder / name, f"line 2: servos are not those of {GOALS}")
         if len(counts[name]) != len(goals):
             raise InputError(folder / name, f"{len(counts[name])} poses, but {len(goals)} in {GOALS}")
-    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder))
+    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder), units)
 
 
-def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], Counts]:
-    """Order of the joints, and a row of `width` counts (default: one for each joint) for each pose."""
+def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], tuple[ServoUnits, ...], Counts]:
+    """Order of the joints, units of their servos, and a row of `width` counts (default: one for each joint) for each pose."""
     lines = [line.strip() for line in read_text(path).splitlines() if line.strip()]
     if not lines or not lines[0].startswith(ORDER):
         raise InputError(path, f"line 1: expected '{ORDER} …', the order of joints")
     joints = tuple(lines[0].removeprefix(ORDER).split())
+    units, first = (AX12A,) * len(joints), 1
+    if lines[1:] and lines[1].startswith(FAMILIES):
+        units, first = _units(path, re.split(r",\s*", lines[1].removeprefix(FAMILIES).strip()), len(joints)), 2
     rows: list[list[int]] = []
-    for n, line in enumerate(lines[1:], start=2):
+    for n, line in enumerate(lines[first:], start=first + 1):
         rows.append([])
         for cell in re.split(r"[,\s]+", line.strip(", ")):
             value = whole_of(cell)
@@ -107,17 +121,28 @@ def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], Counts
                 raise InputError(path, f"line {n}: expected whole numbers up to {_MOST}, found '{cell[:40]}'")
             rows[-1].append(value)
     if not rows or rows[0] != [len(rows) - 1]:
-        raise InputError(path, f"line 2: expected the number of poses, and {max(len(rows) - 1, 0)} follow")
+        raise InputError(path, f"line {first + 1}: expected the number of poses, and {max(len(rows) - 1, 0)} follow")
     for k, row in enumerate(rows[1:], start=1):
         if len(row) != (width or len(joints)):
             raise InputError(path, f"pose {k}: expected {width or len(joints)} numbers, found {len(row)}")
-    return joints, np.array(rows[1:], dtype=np.int64)
+    return joints, units, np.array(rows[1:], dtype=np.int64)
+
+
+def _units(path: Path, families: list[str], n: int) -> tuple[ServoUnits, ...]:
+    if len(families) != n:
+        raise InputError(path, f"line 2: expected the families of {n} servos, found {len(families)}")
+    try:
+        return tuple(ServoUnits.of(servo_profile(family)) for family in families)
+    except InputError as e:
+        raise InputError(path, f"line 2: {e.problem}") from None
 
 
 def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
     """Constant arrays for the controller's program; rows are poses, columns are joints in the order of motion_joints."""
     names = ", ".join(json.dumps(joint) for joint in table.joints)
     ids = _listed([numbers[joint] for joint in table.joints], ", ")
+
+    families = "\n".join(f"/* {units} */" for units in dict.fromkeys(table.units))
 
     def rows(counts: Counts) -> str:
         return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)
@@ -137,12 +162,14 @@ static const char *const motion_joints[MOTION_JOINTS] = {{{names}}};
 
 static const uint8_t motion_bus_ids[MOTION_JOINTS] = {{{ids}}};
 
-/* Goal positions, 0 to 1023 over 300 degrees, 512 = neutral. */
+{families}
+
+/* Goal positions. */
 static const uint16_t motion_goals[MOTION_POSES][MOTION_JOINTS] = {{
 {rows(table.goals)}
 }};
 
-/* Moving speeds, 0.111 rpm, 0 = at once. */
+/* Moving speeds. */
 static const uint16_t motion_speeds[MOTION_POSES][MOTION_JOINTS] = {{
 {rows(table.speeds)}
 }};

@@ -13,7 +13,7 @@ from scipy.ndimage import minimum_filter1d
 
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
-from workbench.robot import COUNT, SPEED_UNIT, InputError, RobotModel, ServoConstants
+from workbench.robot import InputError, RobotModel, ServoConstants
 from workbench.robot.ranges import joint_ranges
 
 Array = NDArray[np.float64]
@@ -77,7 +77,7 @@ def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     for i, joint in enumerate(table.joints):
         own = ranges[joint]
         for bound, side in ((own.lower, -1), (own.upper, 1)):
-            for k in np.flatnonzero(side * (angles[:, i] - bound) > COUNT / 2):
+            for k in np.flatnonzero(side * (angles[:, i] - bound) > table.count[i] / 2):
                 value, limit = math.degrees(angles[k, i]), math.degrees(bound)
                 text = (f"goal {table.goals[k, i]} is {value:.1f} deg, beyond the joint's limit of {limit:.1f} deg "
                         f"({own.source})")
@@ -89,7 +89,7 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     overcomes the servo's own friction. Speed 0 (at once) asks for the travel over the dwell."""
     angles = table.angles()
     travel = np.abs(angles - np.roll(angles, 1, axis=0)) / (table.dwells_ms[:, None] / 1000)
-    asked = np.where(table.speeds > 0, table.speeds * SPEED_UNIT, travel) / RPM
+    asked = np.where(table.speeds > 0, table.rates(), travel) / RPM
     for i, joint in enumerate(table.joints):
         servo = model.servo(joint)
         no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage / RPM

@@ -11,6 +11,8 @@ from enum import IntEnum
 SYNC = b"\xa5\x5a"
 PAYLOAD = 204
 """Longest payload of a frame [bytes]."""
+HEAD = 5
+"""Of a frame: two bytes, type, number, length."""
 
 
 class FrameType(IntEnum):
@@ -151,41 +153,27 @@ def frame(kind: int, payload: bytes = b"", number: int = 0) -> bytes:
 
 
 class FrameReader:
-    """Finds whole frames with a right sum in a stream; everything else is skipped, byte for byte as the controller skips it."""
+    """Finds whole frames with a right sum in a stream. What only began as a frame, as one that a reset cut off, is looked through
+    again: it may hold the beginning of others."""
 
     def __init__(self) -> None:
-        self._body = bytearray()
-        self._sync = 0
-        self.broken = 0
-        """Frames whose sum was wrong."""
+        self._pending = bytearray()
 
     def feed(self, data: bytes) -> Iterator[Frame]:
         """Frames that end in these bytes."""
-        for value in data:
-            got = self._take(value)
-            if got is not None:
-                yield got
-
-    def _take(self, value: int) -> Frame | None:
-        if self._sync < 2:
-            if value == SYNC[self._sync]:
-                self._sync += 1
-            else:
-                self._sync = 1 if value == SYNC[0] else 0
-            return None
-        body = self._body
-        body.append(value)
-        if len(body) < 3 or (body[2] <= PAYLOAD and len(body) < body[2] + 5):
-            return None
-        whole = bytes(body)
-        body.clear()
-        self._sync = 0
-        if whole[2] > PAYLOAD:
-            return None
-        if crc16(whole[:-2]) != struct.unpack("<H", whole[-2:])[0]:
-            self.broken += 1
-            return None
-        return Frame(whole[0], whole[1], whole[3:-2])
+        pending = self._pending
+        pending += data
+        while True:
+            at = pending.find(SYNC)
+            del pending[:at if at >= 0 else len(pending) - pending.endswith(SYNC[:1])]
+            if len(pending) < HEAD or (pending[HEAD - 1] <= PAYLOAD and len(pending) < HEAD + pending[HEAD - 1] + 2):
+                return
+            whole = bytes(pending[len(SYNC):HEAD + pending[HEAD - 1] + 2])
+            if pending[HEAD - 1] > PAYLOAD or crc16(whole[:-2]) != struct.unpack("<H", whole[-2:])[0]:
+                del pending[:len(SYNC)]
+                continue
+            del pending[:len(SYNC) + len(whole)]
+            yield Frame(whole[0], whole[1], whole[3:-2])
 
 
 def message(got: Frame) -> Message | None:

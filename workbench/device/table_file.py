@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from workbench.motion import PoseTable
-from workbench.motion.table import CENTRE, LARGEST
-from workbench.robot import BUS_IDS, COUNT, SPEED_UNIT, InputError, RobotModel, bus_ids
+from workbench.robot import BUS_IDS, InputError, RobotModel, bus_ids
 from workbench.robot.ranges import joint_ranges
+from workbench.robot.servo_units import AX12A
 
 MAGIC = b"WBTB"
 VERSION = 1
 STOPS = 1
 AX12A_NUMBER = 12
+CENTRE, LARGEST = AX12A.centre, AX12A.highest
 MOST_JOINTS = 26
 """A Sync Write of goal and speed stays below the AX-12A's receive buffer of 143 bytes."""
 SHORTEST_MS, LONGEST_MS = 10, 600_000
@@ -56,20 +57,33 @@ class TableFile:
 def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | None = None) -> tuple[JointBounds, ...]:
     """Bounds of a model's joints in counts, no narrower than what the table itself asks (`export` has checked it, or was forced).
 
-    numbers: model number of each joint's servo (default: the AX-12A's).
+    numbers: model number of each joint's servo (default: the AX-12A's). InputError for a servo of another family, which the
+    controller's program does not speak to.
     """
+    other = unplayable(table)
+    if other:
+        raise InputError(table.source, other)
     ids, ranges = bus_ids(model), joint_ranges(model)
     bounds = []
     for i, joint in enumerate(table.joints):
         servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)
-        low, high = (min(max(round(CENTRE + limit / COUNT), 0), LARGEST) if math.isfinite(limit) else edge
+        low, high = (min(max(round(CENTRE + limit / AX12A.count), 0), LARGEST) if math.isfinite(limit) else edge
                      for limit, edge in zip(limits, (0, LARGEST)))
         no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
         bounds.append(JointBounds(
             ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
             low=min(low, CENTRE, int(table.goals[:, i].min())), high=max(high, CENTRE, int(table.goals[:, i].max())),
-            fastest=max(1, min(LARGEST, round(no_load / SPEED_UNIT)), int(table.speeds[:, i].max()))))
+            fastest=max(1, min(LARGEST, round(no_load / AX12A.speed_unit)), int(table.speeds[:, i].max()))))
     return tuple(bounds)
+
+
+def unplayable(table: PoseTable) -> str:
+    """Why the controller's program cannot play a table, "" where it can: it speaks to servos of the AX-12A's family alone."""
+    others = [(j, u.family) for j, u in zip(table.joints, table.units) if u != AX12A]
+    if not others:
+        return ""
+    joint, family = others[0]
+    return f"joint {joint} has a servo of the family {family}; the CM-530's program plays the AX-12A's alone"
 
 
 def encode_table(file: TableFile) -> bytes:

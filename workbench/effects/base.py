@@ -23,7 +23,6 @@ from workbench.servo import ServoLaw, ServoTerm
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
-    from workbench.robot.kinematics import Kinematics
 
 Array = NDArray[np.float64]
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
@@ -147,8 +146,9 @@ class Effect:
         """Whether this robot, playing these commands, could show it at all."""
         return True
 
-    def reach(self, sdf: SdfRobot, kinematics: Kinematics, where: tuple[str, ...]) -> float:
-        """How far a search moves its numbers from neutral at most, in the contract's units."""
+    def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
+        """How far its numbers may lie from neutral on this robot, in the contract's units: a search moves them no further, and of
+        servo logs it refutes what wants to go there."""
         return math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:

@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.motion import Motion
-from workbench.robot import COUNT, InputError, RobotModel
+from workbench.robot import InputError, RobotModel
 from workbench.robot.servo_profile_file import servo_profile
+from workbench.robot.servo_units import units_of
 
 Array = NDArray[np.float64]
 
 
 class Reach:
-    """Limits of one robot. speeds: (n,) [rad/s] that each servo can keep, by the model's order of joints."""
+    """Limits of one robot. speeds: (n,) [rad/s] that each servo can keep, units: (n,) its counts; in the model's order."""
 
     def __init__(self, model: RobotModel) -> None:
-        self.model = model
+        self.model, self.units = model, units_of(model, model.joints)
         self.speeds = np.array([_reached(model, j) for j in model.joints])
 
     def within(self, joint: str, angle: float, room: float = 0.0) -> float:
@@ -42,13 +43,13 @@ class Reach:
     def allows(self, segment: Segment) -> bool:
         """Whether a motion table (docs/formats.md, section 2), ranges and speeds hold what is asked."""
         try:
-            table = Motion(segment.name, segment.times, self.model.joints, segment.angles).as_table()
+            table = Motion(segment.name, segment.times, self.model.joints, segment.angles, units=self.units).as_table()
         except InputError:
             return False
         ends = np.array([self.range(j) for j in self.model.joints])
         asked = np.abs(np.diff(segment.angles, axis=0)) / np.diff(segment.times)[:, None]
         angles = table.angles()
-        return bool((angles > ends[:, 0] - COUNT).all() and (angles < ends[:, 1] + COUNT).all()
+        return bool((angles > ends[:, 0] - table.count).all() and (angles < ends[:, 1] + table.count).all()
                     and (asked <= self.speeds * 1.001).all())
 
     def cleared(self, segment: Segment) -> Segment | None:

@@ -33,7 +33,7 @@ class Runs:
     def motion(self, segments: Sequence[Segment]) -> Motion:
         """Segments as one motion."""
         whole = joined(segments)
-        return Motion(whole.name, whole.times, self.reach.model.joints, whole.angles, "next experiment")
+        return Motion(whole.name, whole.times, self.reach.model.joints, whole.angles, "next experiment", units=self.reach.units)
 
     def played(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
                time_step: float = EXPERIMENT.time_step) -> list[list[Take]]:

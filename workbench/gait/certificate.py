@@ -19,8 +19,8 @@ from workbench.robot.files import read_text
 NAME = "certificate.json"
 MARK = "made by workbench optimize; its certificate is certificate.json beside it"
 """What stands in the first line of a motion that has a certificate."""
-CLAIM = ("All numbers are the model's. On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went "
-         "37: a speed here is a claim about the model until a robot has walked it.")
+CLAIM = "All numbers are the model's: a speed here is a claim about the model until a robot has walked it."
+PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went 37."
 
 
 @dataclass(frozen=True)

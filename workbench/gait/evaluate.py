@@ -73,16 +73,17 @@ class Candidate:
 
 
 class Evaluator:
-    """Simulates gaits of one request. memory: a file in which measures are kept, so that a run that was stopped goes on."""
+    """Simulates gaits of one request. memory: a file in which measures are kept, so that a run that was stopped goes on.
+    seconds: of walking, after the first cycle."""
 
     def __init__(self, machine: GaitMachine, request: Request, draws: Sequence[RobotModel], memory: Path | None = None,
-                 n_jobs: int = 2, config: SimulationConfig = SEARCH) -> None:
-        self.machine, self.request, self.config = machine, request, config
+                 n_jobs: int = 2, config: SimulationConfig = SEARCH, seconds: float = SECONDS) -> None:
+        self.machine, self.request, self.config, self.seconds = machine, request, config, seconds
         self._rollouts = Rollouts(n_jobs)
         self.nominal = request.on_slope(machine.model)
         self.draws = tuple(request.on_slope(d) for d in draws)
         self._memory, self._known = memory, _read(memory)
-        self._config = hashlib.sha256(repr(config).encode()).hexdigest()[:8]
+        self._config = hashlib.sha256(repr((config, seconds)).encode()).hexdigest()[:8]
         self._tables: dict[GaitShape, tuple[GaitTable | None, list[Margin]]] = {}
         self.rollouts = 0
 
@@ -153,7 +154,7 @@ class Evaluator:
         """Into what is known, and into the memory."""
         jobs, lines = [], []
         for table, model in wanted.values():
-            cycles = max(CYCLES, math.ceil(SECONDS / table.period))
+            cycles = max(CYCLES, math.ceil(self.seconds / table.period))
             end = table.start_seconds + (1 + cycles) * table.period
             jobs.append(Job(model, self.config, table.commands(1 + cycles), end, LEAD))
         self.rollouts += len(jobs)

@@ -11,7 +11,6 @@ import numpy as np
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.table import GaitTable
-from workbench.robot import SPEED_UNIT
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
             out.append(_of("range", joint, np.degrees(angles[k, i]), np.degrees(bound), "deg", float(angles[k, i] / bound)))
     no_load = machine.law.full_torque / machine.law.back_emf
     for i, joint in enumerate(model.joints):
-        asked = float(table.cycle.speeds[:, i].max()) * SPEED_UNIT
+        asked = float(table.cycle.rates()[:, i].max())
         out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))
     for i, leg in enumerate(machine.legs):
         out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))

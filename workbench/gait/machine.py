@@ -14,8 +14,9 @@ from workbench.effects.apply import physics_of
 from workbench.gait.legs import Leg, legs_of
 from workbench.gait.self_contact import SelfContact
 from workbench.gait.shape import GaitShape, foot_path
-from workbench.robot import SPEED_UNIT, InputError, RobotModel
+from workbench.robot import InputError, RobotModel
 from workbench.robot.ranges import JointRange, joint_ranges
+from workbench.robot.servo_units import ServoUnits, units_of
 from workbench.servo import ServoLaw
 
 Array = NDArray[np.float64]
@@ -74,10 +75,21 @@ class GaitMachine:
         return min(leg.length for leg in self.legs)
 
     @cached_property
+    def units(self) -> tuple[ServoUnits, ...]:
+        """The counts (n,) of each joint's servo, which tables are written in."""
+        return units_of(self.model, self.model.joints)
+
+    @cached_property
+    def speed_unit(self) -> Array:
+        """One count of moving speed (n,) [rad/s]."""
+        return np.array([u.speed_unit for u in self.units])
+
+    @cached_property
     def fastest(self) -> NDArray[np.int64]:
         """Moving speed (n,) [counts] that full duty just reaches against the servo's own friction: the most that is asked."""
         law = self.law
-        return np.floor(np.maximum(law.full_torque - law.coulomb, 0) / law.damping / SPEED_UNIT).astype(np.int64)
+        reached = np.floor(np.maximum(law.full_torque - law.coulomb, 0) / law.damping / self.speed_unit).astype(np.int64)
+        return np.minimum(reached, [u.fastest for u in self.units])
 
     def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Joint angles (N, n) [rad] that put the feet on the shape's path at phases (N,), joints outside legs at zero; how far

@@ -17,6 +17,7 @@ from workbench.gait.certificate import MARK, NAME
 from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
+from workbench.gait.finalists import finely
 from workbench.gait.limits import Margin, binding
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import measure
@@ -51,8 +52,9 @@ BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, var
 
 @dataclass(frozen=True)
 class OptimizeOptions:
-    """seed: of the search; draws of the search and of the certificate come from it, different ones. given: gaits to start from;
-    planned: whether solved kino-centroidal programmes are, too."""
+    """How long and from where a gait is sought. budget: of the search. certify: what the gait has to pass at the end. seed: of
+    the search; draws of the search and of the certificate come from it, different ones. n_jobs: threads and processes that
+    simulate. given: gaits to start from; planned: whether solved kino-centroidal programmes are, too."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
@@ -94,6 +96,9 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             again = Evaluator(machine, request, draws, memory, options.n_jobs)
             (best,) = again.judged([found.best.shape], options.budget.draws, list)
             found = replace(found, best=best) if best.good else found
+        if found.best.good:
+            progress("the best gaits as the certificate walks them", None)
+            found = finely(machine, request, found, options.certify, memory, options.n_jobs)
         chosen = found.best if found.best.good else found.nearest
         if chosen is None:
             return Optimized(request, False, _unmet(request, found, None), None, None, found)
@@ -194,7 +199,7 @@ def _unmet(request: Request, found: Found, certified: Certified | None) -> str:
         limits = certified.certificate.margins
     limit = binding(_without_speed(limits, found)) if not found.best.good else binding(limits)
     if limit is not None:
-        said += f"; {limit} binds ({100 * (limit.use - 1):+.0f} %)"
+        said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
     if found.nearest is not None and not found.best.good:
         said += f"; the nearest table that keeps every limit goes {_speed(request, found.nearest)}"
     return said

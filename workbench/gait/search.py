@@ -38,7 +38,7 @@ class Budget:
     ensemble, from the one that does best on them of `pool` good gaits that differ. width: first standard deviation in the
     unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit. hopeless: it
     ends before the ensemble comes in if the best gait has less than this share of the speed, which no robust generations have
-    been seen to make up for.
+    been seen to make up for. finalists: gaits that may go to the certificate.
     """
 
     seeds: int = 100
@@ -51,17 +51,19 @@ class Budget:
     width: float = 0.15
     enough: int = 3
     hopeless: float = 0.6
+    finalists: int = 12
 
 
 @dataclass(frozen=True)
 class Found:
     """What a search ended with. best: the best gait; nearest: the best that keeps all limits but the speed asked for, if `best`
-    does not keep that; generations and rollouts: how many it took."""
+    does not keep that; generations and rollouts: how many it took; others: that keep every limit, too, the best first."""
 
     best: Candidate
     nearest: Candidate | None
     generations: int
     rollouts: int
+    others: tuple[Candidate, ...] = ()
 
     @property
     def binds(self) -> Margin | None:
@@ -87,7 +89,7 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
             if run.enough():
                 break
     assert run.best is not None
-    return Found(run.best, run.nearest, run.generation, evaluator.rollouts)
+    return Found(run.best, run.nearest, run.generation, evaluator.rollouts, run.others())
 
 
 class _Run:
@@ -130,7 +132,7 @@ class _Run:
         was tried on it counts."""
         pool = self._different([r.best for r in runs])
         self.progress(f"ensemble: {len(pool)} gaits on {self.budget.draws} robots{self._told()}", None)
-        self._streak, self._robust, self.best, self.nearest = 0, True, None, None
+        self._streak, self._robust, self._good, self.best, self.nearest = 0, True, [], None, None
         tried = raced(self.evaluator, pool, self.budget.draws, all_of_them=True)
         self._note(tried)
         first = tried[_ordered(tried)[0]]
@@ -148,6 +150,10 @@ class _Run:
                 pool.append(c)
         return pool
 
+    def others(self) -> tuple[Candidate, ...]:
+        """What keeps every limit beside the best."""
+        return tuple(c for c in sorted(self._good, key=Candidate.rank) if c is not self.best)[:self.budget.finalists - 1]
+
     def hopeless(self) -> bool:
         """Whether the speed asked for is far from what was found."""
         asked, found = self.evaluator.request.speed, self.nearest or self.best
@@ -162,7 +168,7 @@ class _Run:
 
     def _note(self, candidates: list[Candidate]) -> None:
         told = [c for c in candidates if len(c.draws) >= self.budget.draws or not self._robust]
-        self._good += [c for c in told if c.good and not self._robust]
+        self._good += [c for c in told if c.good]
         for c in told:
             if self.best is None or c.rank() < self.best.rank():
                 self.best = c

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
-from workbench.motion.table import CENTRE, LARGEST
-from workbench.robot import COUNT, SPEED_UNIT, InputError
 
 Array = NDArray[np.float64]
 
@@ -104,7 +102,8 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tup
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
     """Goals no farther than joints turn, unless the path itself is: what is asked beyond the angles ends there."""
     lower, upper = machine.bounds
-    return np.clip(goals, np.minimum(q, lower + COUNT / 2), np.maximum(q, upper - COUNT / 2))
+    half = np.array([u.count for u in machine.units]) / 2
+    return np.clip(goals, np.minimum(q, lower + half), np.maximum(q, upper - half))
 
 
 def _dwells(shape: GaitShape) -> NDArray[np.int64]:
@@ -115,15 +114,14 @@ def _dwells(shape: GaitShape) -> NDArray[np.int64]:
 
 def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np.int64], hurry: float, source: str) -> PoseTable:
     """Goals (P, n) [rad], each reached from `before` (P, n) at the end of its dwell, or as fast as the servo can."""
-    counts = CENTRE + np.round(goals / COUNT).astype(np.int64)
-    for k, i in np.argwhere((counts < 0) | (counts > LARGEST))[:1]:
-        raise InputError(source, f"pose {k + 1}, joint {machine.model.joints[i]}: goal {counts[k, i]} is outside 0 to {LARGEST}")
-    speed = hurry * np.abs(goals - before) / (dwells[:, None] / 1000) / SPEED_UNIT
+    units = machine.units
+    counts = np.array([u.centre for u in units]) + np.round(goals / np.array([u.count for u in units])).astype(np.int64)
+    speed = hurry * np.abs(goals - before) / (dwells[:, None] / 1000) / machine.speed_unit
     speeds = np.clip(np.ceil(speed), 1, machine.fastest).astype(np.int64)
-    return PoseTable(machine.model.joints, counts, speeds, dwells, source)
+    return PoseTable(machine.model.joints, counts, speeds, dwells, source, units)
 
 
 def _joined(parts: list[PoseTable], source: str) -> PoseTable:
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
-    return PoseTable(first.joints, goals, speeds, dwells, source)
+    return PoseTable(first.joints, goals, speeds, dwells, source, first.units)

@@ -19,7 +19,7 @@ from pydrake.solvers import IpoptSolver, MathematicalProgram, SnoptSolver, Solve
 from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape, foot_path
-from workbench.robot import GRAVITY, SPEED_UNIT
+from workbench.robot import GRAVITY
 
 Array = NDArray[np.float64]
 
@@ -160,7 +160,7 @@ class _Programme:
         prog, machine, law = self.prog, self.machine, self.machine.law
         friction = machine.model.ground.friction
         mu = FRICTION_SHARE * (0.5 if friction is None else friction) / np.sqrt(2)  # a pyramid inside the cone
-        fastest = self.dt * machine.fastest * SPEED_UNIT
+        fastest = self.dt * machine.fastest * machine.speed_unit
         prog.AddBoundingBoxConstraint(-LARGEST_TILT, LARGEST_TILT, self.tilt.flatten())
         prog.AddBoundingBoxConstraint(-0.6 * machine.leg_length, 0.02, self.p[:, 2])
         prog.AddBoundingBoxConstraint(-0.3 * machine.leg_length, 0.3 * machine.leg_length, self.place.flatten())

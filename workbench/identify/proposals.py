@@ -36,7 +36,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
             if effect.point_mass:
                 out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))
             else:
-                out.append(replace(Candidate.of(effect, where, neutral), reach=effect.reach(sdf, model.kinematics, where)))
+                out.append(replace(Candidate.of(effect, where, neutral), reach=effect.reach(sdf, model, where)))
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from workbench.motion.mtn import load_mtn
 from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel, bus_ids
 from workbench.robot.files import write_whole
 from workbench.robot.numerals import number_of
+from workbench.robot.servo_units import units_of
 from workbench.robot.tables import plain_text
 
 MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
@@ -27,12 +29,15 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
 
     Columns are found by the header's names; without a header they are `time` and the model's joints in alphabetical
     order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of all joints or of none, are moving speeds in place of
-    the travel over the dwell. InputError names line and column of what is wrong, or a joint `model` lacks.
+    the travel over the dwell. What the motion is rounded to when it is played are the counts of the model's servos (without a
+    model, the AX-12A's). InputError names line and column of what is wrong, or a joint `model` lacks.
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
-        return load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS)
-    return _parse(path, plain_text(path), model)
+        motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS)
+    else:
+        motion = _parse(path, plain_text(path), model)
+    return motion if model is None else replace(motion, units=units_of(model, motion.joints))
 
 
 def save_motion(motion: Motion, path: str | Path) -> Path:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from workbench.motion.commands import Commands
 from workbench.motion.table import PoseTable
 from workbench.robot import InputError
+from workbench.robot.servo_units import ServoUnits
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,8 @@ class Motion:
     """Poses at their arrival times; the first row is where the cycle closes, and is not sent (docs/formats.md, section 2).
 
     times: (K,) [s], increasing, K at least 2. joints: (n,) names. angles: (K, n) [rad], zero = servo centre. speeds: (K, n)
-    [rad/s] moving speeds, where they are not the travel over the dwell; the first row's count for nothing.
+    [rad/s] moving speeds, where they are not the travel over the dwell; the first row's count for nothing. units: (n,) counts of
+    the joints' servos, to which all is rounded when it is played (default: the AX-12A's; `load_motion` takes the model's).
     """
 
     name: str
@@ -28,6 +30,7 @@ class Motion:
     angles: Array
     source: str = "motion"
     speeds: Array | None = None
+    units: tuple[ServoUnits, ...] = ()
 
     def __post_init__(self) -> None:
         if self.angles.shape != (len(self.times), len(self.joints)):
@@ -59,7 +62,7 @@ class Motion:
         angles, speeds = table.angles(), table.moving_speeds()
         times = np.concatenate([[0.0], np.cumsum(table.dwells_ms) / 1000])
         return Motion(table.source, times, table.joints, np.vstack([angles[-1:], angles]), table.source,
-                      np.vstack([speeds[-1:], speeds]))
+                      np.vstack([speeds[-1:], speeds]), table.units)
 
     @property
     def duration(self) -> float:
@@ -73,7 +76,7 @@ class Motion:
 
     def as_table(self) -> PoseTable:
         """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for what the registers cannot hold."""
-        return PoseTable.from_angles(self.joints, self.times, self.angles, self.source, self.speeds)
+        return PoseTable.from_angles(self.joints, self.times, self.angles, self.source, self.speeds, self.units)
 
     def commands(self, cycles: int = 1) -> Commands:
         """What the firmware sends for so many cycles, rounded to the servo's counts and milliseconds."""

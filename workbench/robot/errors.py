@@ -9,8 +9,10 @@ _LONGEST = 1000
 
 
 class InputError(ValueError):
-    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with
-    2."""
+    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with 2.
+
+    source: the file, None where there is none. problem: the place in it, and what was expected.
+    """
 
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
         self.source = None if source is None else "".join(c if c.isprintable() else repr(c)[1:-1] for c in str(source))

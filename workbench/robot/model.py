@@ -45,7 +45,8 @@ class Ground:
 
 @dataclass(frozen=True)
 class EffectSpec:
-    """One piece of physics beyond the nominal model, in the contract's words and units (section 7)."""
+    """One piece of physics beyond the nominal model. effect: its name. where: joints, links or feet at which it acts; empty: the
+    whole robot. parameters: its numbers, in the units of docs/formats.md, section 7 (degrees, not radians)."""
 
     effect: str
     where: tuple[str, ...] = ()

@@ -62,24 +62,16 @@ def parameter_names(effects: Sequence[EffectSpec]) -> tuple[str, ...]:
 
 def save_model(model: RobotModel, path: str | Path, posterior: Posterior | None = None,
                provenance: Mapping[str, Any] | None = None) -> Path:
-    """Writes model.yaml, whole or not at all; InputError where it cannot be written."""
+    """Writes model.yaml, whole or not at all; returns its path. posterior: of the effects' parameters, provenance: how they were
+    found; both are kept for a reader and change nothing. InputError where it cannot be written."""
     return write_whole(path, model_text(model, Path(path).parent, posterior, provenance))
 
 
 def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = None,
                provenance: Mapping[str, Any] | None = None) -> str:
     """The text of a model.yaml that is to lie in `folder`: an SDF inside that is named relative to it, another absolutely."""
-    servos = {j: model.servo(j).written() for j in model.joints}
-    alike = len({repr(s) for s in servos.values()}) == 1
-    content: dict[str, Any] = {
-        "format": 1,
-        "robot": {"model": _description(model, folder.resolve()), "base": model.base, "rigid_bodies": dict(model.rigid_bodies),
-                  "bus_ids": dict(model.bus_ids), **({"packages": dict(model.packages)} if model.packages else {})},
-        "ground": {k: v for k, v in asdict(model.ground).items() if v is not None},
-        "servos": next(iter(servos.values())) if alike else servos,
-    }
-    if model.feet is not None:
-        content["robot"]["feet"] = list(model.feet)
+    content = {"format": 1} | robot_content(model, folder)
+    content["servos"] = content["robot"].pop("servos")
     if model.effects:
         content["effects"] = [_effect_content(e) for e in model.effects]
     if posterior is not None and posterior.names:
@@ -88,6 +80,21 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
     if provenance:
         content["provenance"] = dict(provenance)
     return yaml_text(content)
+
+
+def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
+    """The keys `robot` and `ground` of a file that is to lie in `folder`, its effects left out. Servos that are alike stand there
+    once; paths outside the folder are absolute."""
+    servos = {j: model.servo(j).written() for j in model.joints}
+    robot: dict[str, Any] = {
+        "model": _description(model, folder.resolve()), "base": model.base,
+        "servos": next(iter(servos.values())) if len({repr(s) for s in servos.values()}) == 1 else servos,
+        "rigid_bodies": dict(model.rigid_bodies), "bus_ids": dict(model.bus_ids)}
+    if model.packages:
+        robot["packages"] = {name: str(Path(place).resolve()) for name, place in model.packages.items()}
+    if model.feet is not None:
+        robot["feet"] = list(model.feet)
+    return {"robot": robot, "ground": {k: v for k, v in asdict(model.ground).items() if v is not None}}
 
 
 def _effect_content(e: EffectSpec) -> dict[str, Any]:

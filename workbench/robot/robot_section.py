@@ -16,8 +16,7 @@ _CONSTANTS = set(ServoConstants().constants())
 
 
 def read_model(top: Fields) -> RobotModel:
-    """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected.
-    """
+    """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected."""
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
     packages = _packages(f)

@@ -83,7 +83,8 @@ class ServoProfile:
     """One family of bus servos. SI and radians.
 
     models: name by model number. protocol: of the bus. counts over span [rad]: of positions, `centre` the count of angle zero.
-    speed_unit [rad/s], largest_speed: of the register moving_speed, where 0 is as fast as it can. load_unit: share of full
+    speed_unit [rad/s], largest_speed: of the register moving_speed, where 0 is as fast as it can; table_unit [rad/s]: what the
+    conversion of a motion table takes that unit for, where it is another. load_unit: share of full
     output a count. supply: voltages [V] at which it works. full_torque: count of max_torque and torque_limit that limits
     nothing. bit_rates: bit/s by value of baud_rate. return_delay_unit [s]. eeprom_below: address where RAM begins. law:
     registers behind the keys of the nominal law. nominal: those keys, and how well they are known of a servo nobody measured.
@@ -113,6 +114,7 @@ class ServoProfile:
     alarms: Mapping[int, str]
     refusals: Mapping[int, str]
     position_mode: Mapping[str, int]
+    table_unit: float | None = None
     unlock: Switch | None = None
     watchdog: tuple[str, float] | None = None
     marker: str | None = None

@@ -38,6 +38,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         counts=position.required("counts", position.whole("counts", least=2)),
         span=math.radians(_number(position, "span")), centre=position.required("centre", position.whole("centre")),
         speed_unit=math.radians(_number(speed, "unit")), largest_speed=speed.required("largest", speed.whole("largest", least=1)),
+        table_unit=None if (of_tables := speed.number("table_unit", least=0)) is None else math.radians(of_tables),
         load_unit=_number(load, "unit"), full_torque=top.required("full_torque", top.whole("full_torque", least=1)),
         bit_rates=_bit_rates(_needed(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
         eeprom_below=top.required("eeprom_below", top.whole("eeprom_below")), registers=registers,

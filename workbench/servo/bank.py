@@ -76,8 +76,8 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction
 
 def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel, period: float | None = None,
               friction: Friction | None = None, law: ServoLaw | None = None, terms: Sequence[ServoTerm] = ()) -> ServoBank:
-    """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose `goal_position` and
-    `moving_speed` inputs are left to connect.
+    """Puts the model's servos on the joints of the caller's plant and wires them; returns the bank, whose inputs `goal_position`
+    (n) [rad] and `moving_speed` (n) [rad/s], joints in `model.joints`' order, are left to connect.
 
     Call it on a plant that is not yet finalized, as the servos change its joints; it finalizes the plant. `period` [s] of
     the goal ramp: the plant's step, or 1 ms in a continuous one. Takes the plant's applied_generalized_force input and, for
@@ -86,7 +86,8 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     CENIC's does not: it steps over them and slides on without friction). `law`: in place of the model's nominal constants.
     `terms`: what servos do beyond the law. In a discrete plant they take `period` to be its step, and make its output ports
     unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that varies
-    needs bristles or a discrete plant.
+    needs bristles or a discrete plant. InputError for a plant that is finalized, lacks a joint, or does not go with `friction`,
+    and for a model with effects, which MakeStation takes.
     """
     if model.effects and law is None:
         raise InputError(None, f"effect '{model.effects[0].effect}' is for MakeStation: it may change more than servos")

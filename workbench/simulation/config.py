@@ -11,7 +11,7 @@ ENGINES = ("auto", "drake", "compiled")
 
 @dataclass(unsafe_hash=True)  # not frozen: Drake's YAML loader fills an instance in
 class SimulationConfig:
-    """Loadable by `pydrake.common.yaml.yaml_load_typed`.
+    """How a robot is simulated; loadable by `pydrake.common.yaml.yaml_load_typed`.
 
     time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic",
     … as in Drake's GetIntegrationSchemes) to `accuracy`. approximation: of discrete contact. base: "free", "fixed" (held

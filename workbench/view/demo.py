@@ -87,6 +87,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
         report.add(take_section(compared, session.model, folder / f"replay-{compared.name}-recorded.html"))
     report.add(_firmware_section(motion, folder / "firmware", violations))
     report.add(gait_section(folder / "gait", model, progress))
+    progress("drawing the report", None)
     return Demo(_as_text(rows), headline(comparison), report.write(folder / "report.html"), comparison)
 
 
@@ -138,7 +139,7 @@ def _firmware_section(motion: Motion, folder: Path, violations: tuple[Violation,
     said = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
     return Section("Onto the robot", [
         Text(f"{names} in `firmware/`, checked against each servo's range, speed and, as it ran in simulation, torque."),
-        Table(["pose", "dwell [ms]", *table.joints], rows, "Goal positions, 512 is neutral."),
+        Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, dict.fromkeys(table.units))) + "."),
         Details("What the check says", [Text(said)])])
 
 

@@ -35,6 +35,7 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
     parts: list[Part] = [Text(_said(result))]
     if result.table is not None and result.certified is not None:
         write_gait(folder, result.table, result.certified)
+        progress("a new gait: drawing its page", None)
         write_gait_page(folder, model, result)
         if result.met:
             export(load_motion(folder / "gait.csv", model), model, folder / "firmware", result.certified.take)

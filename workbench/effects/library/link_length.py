@@ -7,7 +7,6 @@ import numpy as np
 from workbench.effects.base import Effect, Parameter, scalar, si_values
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
-from workbench.robot.kinematics import Kinematics
 
 SHARE = 0.5
 """Of a link's length, by which a search changes it at most."""
@@ -27,9 +26,9 @@ class LinkLength(Effect):
     estimator = "length between axes"
     parameters = (Parameter("change", "m", -0.2, 0.2, 0.003),)
 
-    def reach(self, sdf: SdfRobot, kinematics: Kinematics, where: tuple[str, ...]) -> float:
+    def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
         (link,) = where
-        return SHARE * float(np.linalg.norm(sdf.way(kinematics, link)))
+        return SHARE * float(np.linalg.norm(sdf.way(model.kinematics, link)))
 
     def sentence(self, spec: EffectSpec) -> str:
         change = scalar(spec, "change")

@@ -9,8 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, Parameter
+from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
+
+STANDS = 1.5
+"""Most voltage that a servo is run at, over what it is rated at or said to get: a full pack of two cells on
+a servo rated at 6 V is 1.4; more burns it."""
 
 
 class SupplyVoltage(Effect):
@@ -27,6 +32,10 @@ class SupplyVoltage(Effect):
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
         return (float(np.mean([model.servo(j).supply_voltage for j in model.joints])),)
+
+    def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
+        (nominal,) = self.neutral(model)
+        return STANDS * max(nominal, *(model.servo(j).rated_voltage for j in model.joints)) - nominal
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         return replace(law, full_torque=law.torque_per_volt * values["voltage"])

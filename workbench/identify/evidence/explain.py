@@ -25,6 +25,7 @@ from workbench.identify.evidence.nuisance import (
     uncertain_numbers,
 )
 from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
 from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
@@ -34,7 +35,7 @@ from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected
-from workbench.identify.results.reasons import LessLikely, SpokenAgainst
+from workbench.identify.results.reasons import LessLikely, Reason, SpokenAgainst
 from workbench.identify.results.ties import Tie
 from workbench.identify.rollouts import RolloutEvaluator
 from workbench.robot import RobotModel
@@ -44,7 +45,7 @@ Array = NDArray[np.float64]
 FINE = 0.5
 """Step of the last fits, in steps of the search."""
 ROUNDS = 3
-"""Most times that effects are taken out by takes kept back."""
+"""Most times that effects are taken out, by what is plausible or by takes kept back."""
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 
@@ -161,16 +162,14 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     rollouts, found = search(rollouts, options, progress)
     rejected = list(refuted)
     for _ in range(ROUNDS):
-        progress("takes kept back", None)
-        folds = [folds_of(evidence, [p.take for p in f.region.parts]) for f in found]
-        said = lockstep(rollouts, {k: vetoed(f.region, options, f.best, fold) for k, (f, fold) in enumerate(zip(found, folds))
-                                   if f.best.hypothesis.effects and fold})
-        if not any(said.values()):
+        said = [at_their_end(f.best.hypothesis, felt) for f in found]
+        if not any(said):
+            progress("takes kept back", None)
+            said = _kept_back(rollouts, evidence, found, options)
+        if not any(said):
             break
-        for k, gains in said.items():
-            for c, gain in gains.items():
-                rejected.append(Rejected(c.name, c.where, SpokenAgainst(-gain)))
-            found = tuple(without_names(f, gains) if i == k else f for i, f in enumerate(found))
+        rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
+        found = tuple(without_names(f, gone) for f, gone in zip(found, said))
         rollouts, found = gone_on(rollouts, found, options, progress)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
@@ -181,6 +180,15 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     whole.rollouts += evaluator.rollouts
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     return Explanation(nominal, standing(rollouts, found), found, believed, tuple(rejected), options)
+
+
+def _kept_back(rollouts: Rollouts, evidence: Sequence[TakeEvidence], found: Sequence[Found], options: EvidenceOptions
+               ) -> list[dict[Candidate, Reason]]:
+    """By region, the effects that takes kept back speak against."""
+    folds = [folds_of(evidence, [p.take for p in f.region.parts]) for f in found]
+    said = lockstep(rollouts, {k: vetoed(f.region, options, f.best, fold) for k, (f, fold) in enumerate(zip(found, folds))
+                               if f.best.hypothesis.effects and fold})
+    return [{c: SpokenAgainst(-gain) for c, gain in said.get(k, {}).items()} for k in range(len(found))]
 
 
 def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:

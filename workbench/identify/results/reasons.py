@@ -129,6 +129,20 @@ class RefutedByRegister(Reason):
         return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{unit}"
 
 
+@dataclass(frozen=True)
+class AtItsEnd(Reason):
+    """Fitted, its parameter went as far as it may on this robot, to `value` in `unit`."""
+
+    parameter: str
+    value: float
+    unit: str
+
+    def said(self, naming: Naming = effect_at) -> str:
+        """The reason in words, effects named by `naming`."""
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"its {self.parameter} would have to be {self.value:.3g}{unit} or beyond, which is not plausible on this robot"
+
+
 class Description(Statement):
     """What something that stays unexplained looks like."""
 

@@ -33,7 +33,7 @@ def film_strip(
     if recorded is not None:
         films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
     shapes = robot_shapes(model)
-    reach = 80 * shapes.height
+    reach = max(80 * shapes.height, 2 + 100 * max(_farthest(film, shapes.feet, played) for film, *_ in films))
     figure = new_figure(12, 2.9)
     grid = figure.subplots(1, instants, sharey=True)
     for k, axes in enumerate(np.atleast_1d(grid), start=1):
@@ -53,11 +53,26 @@ def film_strip(
     return figure
 
 
+def _farthest(film: Playback, feet: dict[str, tuple[str, Array]], played: Playback) -> float:
+    """How far ahead of or behind the base that the pictures are centred on a joint or foot ever is [m]."""
+    places = [film.in_world(link) for link in film.links]
+    tips = [(film.in_world(link), tip) for link, tip in feet.values()]
+    x = [p[:, 0] for p, _ in places] + [(p + R @ tip)[:, 0] for (p, R), tip in tips]
+    return float(np.nanmax(np.abs(np.array(x)[:, 1:] - played.base_p[None, 1:, 0])))
+
+
+def _left(model: RobotModel) -> set[str]:
+    """Links that lie to the left of the base in neutral, by more than a centimetre."""
+    k = model.kinematics
+    neutral = k.forward(np.zeros((1, len(model.joints))), model.joints)
+    return {link for link in k.links if neutral[link][0][0, 1] > 0.01}
+
+
 def _draw_sticks(
     axes: Axes, model: RobotModel, film: Playback, k: int, feet: dict[str, tuple[str, Array]], colour: str, alpha: float,
 ) -> None:
     kinematics = model.kinematics
-    segments, widths = [], []
+    segments, widths, left = [], [], _left(model)
     for link in kinematics.links:
         p, R = (x[k] for x in film.in_world(link))
         joint = kinematics.joint_of(link)
@@ -68,5 +83,5 @@ def _draw_sticks(
             ends.append(p + R @ feet[joint][1])
         for end in ends:
             segments.append(100 * np.array([p[[0, 2]], end[[0, 2]]]))
-            widths.append(1.4 if joint is not None and joint[1:2] == "l" and len(joint) == 3 else 2.8)
+            widths.append(1.4 if link in left else 2.8)
     axes.add_collection(LineCollection(segments, colors=colour, linewidths=widths, alpha=alpha, capstyle="round", zorder=3))

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.footfalls import foot_phases
-from workbench.gait.certificate import CLAIM, Certificate
+from workbench.gait.certificate import CLAIM, PUPPY_CLAIM, Certificate
 from workbench.gait.limits import each
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.optimize import WALK, Optimized
 from workbench.gait.table import GaitTable
 from workbench.motion import load_motion
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel, data_file
+from workbench.robot import PUPPY, InputError, RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import (
     body_attitude,
@@ -46,7 +46,8 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
     on = result.request.on_slope(model)
     walk = _vendor_walk(on, float(take.time[-1]))
     replay = write_replay(folder / "replay.html", on, take, None if walk is None else walk[0], title="optimised gait").path
-    report = Report("Optimised gait", _headline(result), CLAIM, _key_numbers(certificate), _provenance(certificate, model))
+    claim = PUPPY_CLAIM if model.description == PUPPY else CLAIM
+    report = Report("Optimised gait", _headline(result), claim, _key_numbers(certificate), _provenance(certificate, model))
     ghost = "" if walk is None else " The ghost is the ROBOTIS walk on the same model, from the same place."
     strip = film_strip(on, take, None if walk is None else walk[0])
     if result.problem:
@@ -87,9 +88,10 @@ def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
     turns = n["unit"] == "rad/s"
     factor, unit = (180 / math.pi, "deg/s") if turns else (100.0, "cm/s")
     worst = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
+    advised = [f"ROBOTIS advises {m.limit:.2f}" for m in certificate.margins if m.advice and m.unit == "N m"]
     numbers = [("speed", f"{factor * n['speed']:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} by the step"),
                ("limit that binds", worst.name, f"{worst.value:.3g} of {worst.limit:.3g} {worst.unit}, {worst.where}"),
-               ("largest RMS torque", f"{max(n['RMS torque N m'].values()):.2f} N m", "ROBOTIS advises 0.28"),
+               ("largest RMS torque", f"{max(n['RMS torque N m'].values()):.2f} N m", advised[0] if advised else ""),
                ("electrical power", f"{n['electrical power W']:.0f} W",
                 f"cost of transport {n['electrical cost of transport']:.1f}")]
     if d.get("count"):
@@ -171,7 +173,7 @@ def _table_section(table: GaitTable) -> Section:
     return Section("The table", [
         Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it asks for `certificate.json` beside "
              "it."),
-        Table(["pose", "dwell [ms]", *cycle.joints], rows, "Goal positions, 512 is neutral."),
+        Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, dict.fromkeys(cycle.units))) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 
 

@@ -64,7 +64,7 @@ class Inspection:
             "assets": _names(self.assets), "markers": _names(self.markers), "joints": _names(self.joints),
             "gaps": None if self.share_of_gaps is None else f"{100 * self.share_of_gaps:.2f} %",
             **{f"  {name}": f"{100 * share:.2f} %" for name, share in list(self.gaps.items())[:_LISTED]},
-            **{key: _names(value) if isinstance(value, list) else value for key, value in self.details.items()}}
+            **{key: (_names(value) or "none") if isinstance(value, list) else value for key, value in self.details.items()}}
         said = {_line(key): _line(str(value)) for key, value in lines.items() if value not in (None, "")}
         width = max(map(len, said))
         out = [_line(self.file)] + [f"  {key:<{width}}  {value}" for key, value in said.items()]
@@ -201,7 +201,7 @@ def _firmware_tables(folder: Path) -> Inspection:
     table = read_tables(folder)
     return Inspection(
         str(folder), "firmware_tables", units="counts, ms", duration=float(table.dwells_ms.sum()) / 1000,
-        joints=table.joints, details={"poses": len(table)})
+        joints=table.joints, details={"poses": len(table), "servos": ", ".join(dict.fromkeys(u.family for u in table.units))})
 
 
 def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
@@ -269,7 +269,7 @@ def _fitted_model(path: Path) -> Inspection:
         problems = model_problems_of(model)
     except InputError as e:  # of an effect, which knows no file
         raise e if e.source else InputError(path, f"effects: {e.problem}") from None
-    return Inspection(str(path), "fitted_model", "1", joints=model.joints, details={"effects": named or ["none"]},
+    return Inspection(str(path), "fitted_model", "1", joints=model.joints, details={"effects": named},
                       problems=tuple(problems))
 
 
