@@ -229,6 +229,8 @@ class ConclusionOptions:
     """An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
     surest: float = 0.98
     """What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
+    at_its_end: float = 0.99
+    """Share of how far an effect's numbers may lie from neutral, from which on it wants to go further than is plausible."""
     aside: float = math.tan(math.radians(15.0))
     """Share of a force's vertical part that it may pull aside by and still is one straight down."""
 

@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 
 from workbench.identify.evidence.hypothesis import Hypothesis
+from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.reasons import AtItsEnd, Reason
-
-AT_ITS_END = 0.99
-"""Share of how far an effect's numbers may lie from neutral, from which on it wants to go further."""
 
 
 def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Reason]:
@@ -18,7 +16,7 @@ def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Re
     not with what registers say."""
     reaches, out = {c.key: c.reach for c in pool}, dict[Candidate, Reason]()
     for c, x in h.sizes():
-        far = AT_ITS_END * reaches.get(c.key, math.inf)
+        far = CONCLUSIONS.at_its_end * reaches.get(c.key, math.inf)
         ended = next(((p, v) for p, v, n in zip(c.parameters, c.values(x), c.neutral) if abs(v - n) >= far), None)
         if ended is not None:
             p, v = ended
