@@ -154,3 +154,13 @@ def test_a_batch_mixes_engines_and_keeps_its_order(robot):
     short = [replace(walk_job(robot, "fixed"), duration=0.02 * (1 + i), name=str(i), times=times) for i in range(4)]
     jobs = [replace(j, config=replace(j.config, engine="drake")) if i % 2 else j for i, j in enumerate(short)]
     assert [t.name for t in simulate_batch(jobs, 2)] == ["0", "1", "2", "3"]
+
+
+def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robot):
+    """They would end in a crash, or in each other's takes."""
+    limp = replace(robot, servos={j: replace(robot.servo(j), stall_torque=1e-3, coulomb_friction=0.0) for j in robot.joints})
+    job = replace(walk_job(limp, "free"), duration=0.6, times=np.arange(0.0, 0.6, 0.01))
+    job = replace(job, config=replace(job.config, engine="auto"))
+    alone = run_job(job)
+    for take in simulate_batch([replace(job, name=str(k)) for k in range(4)], 2):
+        np.testing.assert_array_equal(take.q, alone.q)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -67,6 +68,8 @@ def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
 
 
 _stations: OrderedDict[Any, Simulation] = OrderedDict()
+_one_at_a_time = threading.Lock()
+"""Threads whose jobs turn out to be Drake's after all share these stations, of which each plays one job at a time."""
 
 
 def run_job(job: Job) -> Take:
@@ -99,11 +102,12 @@ def _by_drake(job: Job) -> Job:
 def _run_by_drake(job: Job) -> Take:
     """On a kept station where model and configuration are those of an earlier job."""
     key = (job.model.sha256, replace(job.config, engine="drake"))
-    if key not in _stations:
-        _stations[key] = Simulation(job.model, job.config)
-    _stations.move_to_end(key)
-    while len(_stations) > KEPT_STATIONS:
-        _stations.popitem(last=False)
-    take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, start=job.start,
-                              elapsed=job.elapsed, steadied=job.steadied, name=job.name)
+    with _one_at_a_time:
+        if key not in _stations:
+            _stations[key] = Simulation(job.model, job.config)
+        _stations.move_to_end(key)
+        while len(_stations) > KEPT_STATIONS:
+            _stations.popitem(last=False)
+        take = _stations[key].run(job.commands, job.duration, job.lead, trajectory=job.trajectory, path=job.path, start=job.start,
+                                  elapsed=job.elapsed, steadied=job.steadied, name=job.name)
     return take if job.times is None else replace(take, torque=None, contact={}).resampled(job.times)
