@@ -10,13 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from studies.concealed_effects.robots import quadruped
 from studies.other_engine.excitation import MotionRows
 from studies.other_engine.firmware import read_rows
-from studies.other_engine.make_session import TakePlan, plan_takes, random_camera, record, servo_yaml, session_entry
-from studies.other_engine.motive_file import write_motive_csv
+from studies.other_engine.make_session import TakePlan, plan_takes, random_camera, write_recordings
 from workbench.robot import EffectSpec, Ground, data_file
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -51,31 +49,14 @@ def practice(name: str) -> Path:
 @cache
 def _made(name: str) -> Path:
     """A quadruped with the puppy's names, filmed by the second engine with what is hidden in it; laid out as those are."""
-    folder = Path(tempfile.mkdtemp(prefix=f"{name}."))
-    atexit.register(shutil.rmtree, folder, True)
+    made = Path(tempfile.mkdtemp(prefix=f"{name}."))
+    atexit.register(shutil.rmtree, made, True)
     rng = np.random.default_rng(1)
-    for part in ("motions", "takes", "predict", "answer"):
-        (folder / part).mkdir()
-    model = replace(quadruped(rng), ground=FLOOR).model(folder / "robot.sdf")
-    (folder / "servo.yaml").write_text(servo_yaml(model))
-    camera, takes, predict = random_camera(rng), [], []
-    for plan in map(_shorter, plan_takes(MotionRows(*read_rows(data_file("robotis_walk.csv"))), rng)):
-        _, capture, _ = record(model.with_effects(HIDDEN[name]), plan, camera, rng)
-        motion = f"{'predict' if plan.predict else 'motions'}/{plan.name}.csv"
-        (folder / motion).write_text(plan.motion.to_csv())
-        entry = {"name": plan.name, "motion": motion, "cycles": plan.cycles, "base": plan.base}
-        if plan.predict:
-            start = capture.cut(int(capture.starts_at * capture.rate) - 2)
-            write_motive_csv(folder / f"predict/{plan.name}_start.csv", start, plan.name, frames_in_take=len(capture))
-            write_motive_csv(folder / f"answer/{plan.name}.csv", capture, plan.name)
-            predict.append(entry | {"start": f"predict/{plan.name}_start.csv", "starts_at": capture.starts_at,
-                                    "frames": len(capture)})
-        else:
-            write_motive_csv(folder / f"takes/{plan.name}.csv", capture, plan.name)
-            takes.append(entry | {"recording": f"takes/{plan.name}.csv"})
-    session = session_entry(model, "robot.sdf", "servo.yaml") | {"takes": takes, "predict": predict}
-    (folder / "session.yaml").write_text(yaml.safe_dump(session, sort_keys=False))
-    return folder
+    model = replace(quadruped(rng), ground=FLOOR).model(made / "drawn.sdf")
+    camera = random_camera(rng)
+    plans = [_shorter(p) for p in plan_takes(MotionRows(*read_rows(data_file("robotis_walk.csv"))), rng)]
+    write_recordings(made / name, model, model.with_effects(HIDDEN[name]), plans, camera, rng)
+    return made / name
 
 
 def _shorter(plan: TakePlan) -> TakePlan:

@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import tempfile
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -105,18 +106,32 @@ def make_session(out: Path, model: RobotModel, walk: MotionRows, seed: int, gaps
 
 
 def _write_session(folder: Path, model: RobotModel, walk: MotionRows, seed: int, gaps: float) -> None:
-    for sub in ("motions", "takes", "predict", "answer"):
-        (folder / sub).mkdir(parents=True)
     rng = np.random.default_rng(seed)
     camera = random_camera(rng, gaps)
+    truth = {}
+    for plan, rollout, capture, clean in write_recordings(folder, model, model, plan_takes(walk, rng), camera, rng):
+        truth[plan.name] = _truth(rollout, plan, capture)
+        if plan.predict:
+            write_motive_csv(folder / f"answer/{plan.name}.nominal.csv", clean, plan.name)
+    answer = {"name": "nothing_hidden", "effects": [], "seed": seed, "takes": truth}
+    (folder / "answer/truth.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+
+
+def write_recordings(folder: Path, model: RobotModel, hidden: RobotModel, plans: Sequence[TakePlan], camera: Camera,
+                     rng: np.random.Generator) -> list[tuple[TakePlan, Rollout, Capture, Capture]]:
+    """Writes a session of a model, with recordings of the robot `hidden`, and the recordings that are to be foretold under
+    answer/. Returns each plan with what `record` made of it."""
+    for sub in ("motions", "takes", "predict", "answer"):
+        (folder / sub).mkdir(parents=True)
     shipped = model.description.startswith("package://")
     if not shipped:
         shutil.copyfile(model.path, folder / "robot.sdf")
     (folder / "servo.yaml").write_text(servo_yaml(model), encoding="utf-8")
     session = session_entry(model, model.description if shipped else "robot.sdf", "servo.yaml")
-    takes, predict, truth = [], [], {}
-    for plan in plan_takes(walk, rng):
-        rollout, capture, clean = record(model, plan, camera, rng)
+    takes, predict, made = [], [], []
+    for plan in plans:
+        rollout, capture, clean = record(hidden, plan, camera, rng)
+        made.append((plan, rollout, capture, clean))
         motion = f"{'predict' if plan.predict else 'motions'}/{plan.name}.csv"
         (folder / motion).write_text(plan.motion.to_csv(), encoding="utf-8")
         entry: dict[str, object] = {"name": plan.name, "motion": motion, "cycles": plan.cycles}
@@ -125,17 +140,14 @@ def _write_session(folder: Path, model: RobotModel, walk: MotionRows, seed: int,
             start = capture.cut(int(capture.starts_at * capture.rate) - 2)
             write_motive_csv(folder / f"predict/{plan.name}_start.csv", start, plan.name, frames_in_take=len(capture))
             write_motive_csv(folder / f"answer/{plan.name}.csv", capture, plan.name)
-            write_motive_csv(folder / f"answer/{plan.name}.nominal.csv", clean, plan.name)
             entry |= {"start": f"predict/{plan.name}_start.csv", "starts_at": capture.starts_at, "frames": len(capture)}
             predict.append(entry | {"base": plan.base})
         else:
             write_motive_csv(folder / f"takes/{plan.name}.csv", capture, plan.name)
             takes.append(entry | {"recording": f"takes/{plan.name}.csv", "base": plan.base})
-        truth[plan.name] = _truth(rollout, plan, capture)
     text = yaml.safe_dump(session | {"takes": takes, "predict": predict}, sort_keys=False)
     (folder / "session.yaml").write_text(text, encoding="utf-8")
-    answer = {"name": "nothing_hidden", "effects": [], "seed": seed, "takes": truth}
-    (folder / "answer/truth.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+    return made
 
 
 def _truth(rollout: Rollout, plan: TakePlan, capture: Capture) -> dict[str, object]:

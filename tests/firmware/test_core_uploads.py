@@ -14,7 +14,7 @@ from workbench.device.table_file import decode_table
 from workbench.robot import InputError
 
 TABLE = walk()
-LIMP, CHECK, RAMP, NEUTRAL, PLAY = 1, 2, 3, 4, 5
+PLAY = 5
 
 
 def test_sequence_numbers_are_ahead_by_less_than_half_the_circle() -> None:

@@ -133,9 +133,14 @@ def test_a_log_that_begins_in_motion_with_a_servo_switched_off(tmp_path, logged,
     assert np.ptp(compiled.q) > 0.3
 
 
-def test_a_robot_that_falls_on_its_belly_is_drakes(robot):
+def fall(robot: RobotModel) -> Job:
+    """Onto its belly, as its servos hold nothing: what the compiled station gives up while it runs."""
     limp = replace(robot, servos={j: replace(robot.servo(j), stall_torque=1e-3, coulomb_friction=0.0) for j in robot.joints})
-    job = replace(walk_job(limp, "free"), duration=0.6, times=np.arange(0.0, 0.6, 0.01))
+    return replace(walk_job(limp, "free"), duration=0.6, times=np.arange(0.0, 0.6, 0.01))
+
+
+def test_a_robot_that_falls_on_its_belly_is_drakes(robot):
+    job = fall(robot)
     drake, compiled = drake_and_compiled(job)
     with pytest.raises(InputError, match="shapes touch"):
         run_job(compiled)
@@ -158,8 +163,7 @@ def test_a_batch_mixes_engines_and_keeps_its_order(robot):
 
 def test_threads_that_fall_back_to_drake_do_not_play_on_one_station_at_once(robot):
     """They would end in a crash, or in each other's takes."""
-    limp = replace(robot, servos={j: replace(robot.servo(j), stall_torque=1e-3, coulomb_friction=0.0) for j in robot.joints})
-    job = replace(walk_job(limp, "free"), duration=0.6, times=np.arange(0.0, 0.6, 0.01))
+    job = fall(robot)
     job = replace(job, config=replace(job.config, engine="auto"))
     alone = run_job(job)
     for take in simulate_batch([replace(job, name=str(k)) for k in range(4)], 2):

@@ -142,7 +142,7 @@ def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
     names = ", ".join(json.dumps(joint) for joint in table.joints)
     ids = _listed([numbers[joint] for joint in table.joints], ", ")
 
-    families = "\n".join(f"/* {units} */" for units in dict.fromkeys(table.units))
+    families = "\n".join(f"/* {units} */" for units in table.families)
 
     def rows(counts: Counts) -> str:
         return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)

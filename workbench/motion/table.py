@@ -82,6 +82,11 @@ class PoseTable:
         return np.asarray((self.goals - self._of(lambda u: u.centre)) * self.count, dtype=float)
 
     @property
+    def families(self) -> tuple[ServoUnits, ...]:
+        """The units, each once."""
+        return tuple(dict.fromkeys(self.units))
+
+    @property
     def count(self) -> Array:
         """One count of position (n,) [rad] of each joint's servo."""
         return self._of(lambda u: u.count)

@@ -139,7 +139,7 @@ def _firmware_section(motion: Motion, folder: Path, violations: tuple[Violation,
     said = "\n\n".join(str(v) for v in violations) or "Every servo stays within its limits."
     return Section("Onto the robot", [
         Text(f"{names} in `firmware/`, checked against each servo's range, speed and, as it ran in simulation, torque."),
-        Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, dict.fromkeys(table.units))) + "."),
+        Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, table.families)) + "."),
         Details("What the check says", [Text(said)])])
 
 

@@ -125,8 +125,7 @@ class RefutedByRegister(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{unit}"
+        return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,13 @@ class AtItsEnd(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"its {self.parameter} would have to be {self.value:.3g}{unit} or beyond, which is not plausible on this robot"
+        value = f"{self.value:.3g}{_behind_number(self.unit)}"
+        return f"its {self.parameter} would have to be {value} or beyond, which is not plausible on this robot"
+
+
+def _behind_number(unit: str) -> str:
+    """A unit with the space before it; nothing for a ratio."""
+    return "" if unit in ("", "1") else f" {unit}"
 
 
 class Description(Statement):

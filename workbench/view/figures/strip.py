@@ -32,7 +32,7 @@ def film_strip(
     films = [(played, SIMULATED, names[0], 1.0)]
     if recorded is not None:
         films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
-    shapes = robot_shapes(model)
+    shapes, left = robot_shapes(model), _left(model)
     reach = max(80 * shapes.height, 2 + 100 * max(_farthest(film, shapes.feet, played) for film, *_ in films))
     figure = new_figure(12, 2.9)
     grid = figure.subplots(1, instants, sharey=True)
@@ -40,7 +40,7 @@ def film_strip(
         axes.axhline(0, color=COMMAND, linewidth=1.0, zorder=1)
         middle = played.base_p[k, 0]
         for film, colour, label, alpha in films:
-            _draw_sticks(axes, model, film, k, shapes.feet, colour, alpha)
+            _draw_sticks(axes, model, film, k, shapes.feet, left, colour, alpha)
             axes.plot([], [], color=colour, label=label)
         axes.set_xlim(100 * middle - reach, 100 * middle + reach)
         axes.set_ylim(-3, 120 * shapes.height + 100 * STAND_CLEARANCE)
@@ -69,10 +69,11 @@ def _left(model: RobotModel) -> set[str]:
 
 
 def _draw_sticks(
-    axes: Axes, model: RobotModel, film: Playback, k: int, feet: dict[str, tuple[str, Array]], colour: str, alpha: float,
+    axes: Axes, model: RobotModel, film: Playback, k: int, feet: dict[str, tuple[str, Array]], left: set[str], colour: str,
+    alpha: float,
 ) -> None:
     kinematics = model.kinematics
-    segments, widths, left = [], [], _left(model)
+    segments, widths = [], []
     for link in kinematics.links:
         p, R = (x[k] for x in film.in_world(link))
         joint = kinematics.joint_of(link)

@@ -173,7 +173,7 @@ def _table_section(table: GaitTable) -> Section:
     return Section("The table", [
         Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it asks for `certificate.json` beside "
              "it."),
-        Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, dict.fromkeys(cycle.units))) + "."),
+        Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 
 

@@ -201,7 +201,7 @@ def _firmware_tables(folder: Path) -> Inspection:
     table = read_tables(folder)
     return Inspection(
         str(folder), "firmware_tables", units="counts, ms", duration=float(table.dwells_ms.sum()) / 1000,
-        joints=table.joints, details={"poses": len(table), "servos": ", ".join(dict.fromkeys(u.family for u in table.units))})
+        joints=table.joints, details={"poses": len(table), "servos": ", ".join(u.family for u in table.families)})
 
 
 def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
