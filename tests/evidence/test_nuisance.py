@@ -125,6 +125,27 @@ def test_a_supply_that_would_burn_the_servo_is_refuted(tmp_path):
     assert not at_their_end(start(()).with_effect(free, free.sizes([17.9])), [free])
 
 
+def test_a_centre_of_mass_moved_by_half_its_link_is_refuted(tmp_path):
+    """On an arm of 100 mm, 50 mm is the end, whichever way."""
+    model = rig_model(tmp_path, ServoConstants())
+    effect = effect_named("com_shift")
+    free = Candidate.of(effect, ("arm",), effect.neutral(model))
+    shift = replace(free, reach=effect.reach(SdfRobot(model.path), model, ("arm",)))
+    for offset, refuted in [((0.0, 0.0, 0.09), True), ((0.04, 0.0, 0.04), True), ((0.03, 0.0, -0.03), False)]:
+        h = start(()).with_effect(shift, shift.sizes(offset))
+        said = at_their_end(h, [shift])
+        assert list(said) == [shift] * refuted
+    assert "its offset would have to be 0.0566 m or beyond" in str(
+        at_their_end(start(()).with_effect(shift, shift.sizes((0.04, 0.0, 0.04))), [shift])[shift])
+
+
+def test_what_vanishes_at_infinity_is_at_no_end(tmp_path):
+    """A gear's stiffness is as far from neutral as can be, however stiff; where no reach is said, that refutes nothing."""
+    effect = effect_named("joint_compliance")
+    soft = Candidate.of(effect, ("j",), effect.neutral(rig_model(tmp_path, ServoConstants())))
+    assert not at_their_end(start(()).with_effect(soft, np.ones(1)), [soft])
+
+
 def test_ends_that_registers_set_refute_nothing():
     """Half of what the pool lets it is where a register held it."""
     gain = replace(candidate("servo_gain"), reach=0.4)

@@ -147,8 +147,8 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """How far its numbers may lie from neutral on this robot, in the contract's units: a search moves them no further, and of
-        servo logs it refutes what wants to go there."""
+        """How far its numbers may lie from neutral on this robot, in the contract's units, a vector by its length: a search moves
+        no number further, and of servo logs it refutes what wants to go there."""
         return math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:

@@ -5,6 +5,10 @@ from __future__ import annotations
 from workbench.effects.base import Effect, Parameter, si_values, vector
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
+from workbench.robot.model_source import link_sizes
+
+SHARE = 0.5
+"""Of a link's size, by which a search moves its centre of mass at most: beyond it, one in the middle leaves the link."""
 
 
 class ComShift(Effect):
@@ -17,6 +21,10 @@ class ComShift(Effect):
     family = "mass"
     moves_center = True
     parameters = (Parameter("offset", "m", -0.2, 0.2, 0.005, vector=True),)
+
+    def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
+        (link,) = where
+        return SHARE * link_sizes(sdf.path)[link]
 
     def sentence(self, spec: EffectSpec) -> str:
         x, y, z = spec.parameters["offset"]  # type: ignore[misc]

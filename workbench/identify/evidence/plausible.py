@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Parameter
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.reasons import AtItsEnd, Reason
+
+Array = NDArray[np.float64]
 
 
 def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Reason]:
@@ -17,8 +24,18 @@ def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Re
     reaches, out = {c.key: c.reach for c in pool}, dict[Candidate, Reason]()
     for c, x in h.sizes():
         far = CONCLUSIONS.at_its_end * reaches.get(c.key, math.inf)
-        ended = next(((p, v) for p, v, n in zip(c.parameters, c.values(x), c.neutral) if abs(v - n) >= far), None)
+        ended = next(((p, v) for p, v, away in _distances(c, x) if math.isfinite(far) and away >= far), None)
         if ended is not None:
             p, v = ended
             out[c] = AtItsEnd(p.name, v, p.unit)
     return out
+
+
+def _distances(c: Candidate, x: Array) -> Iterator[tuple[Parameter, float, float]]:
+    """Each parameter, what it is, and how far that is from neutral; of a vector, its length in place of what it is."""
+    values, neutral = iter(c.values(x)), iter(c.neutral)
+    for p in c.given:
+        n = 3 if p.vector else 1
+        v, at = np.array(list(islice(values, n))), np.array(list(islice(neutral, n)))
+        away = float(np.linalg.norm(v - at))
+        yield p, float(np.linalg.norm(v)) if p.vector else float(v[0]), away

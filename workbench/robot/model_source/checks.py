@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +69,8 @@ def quiet_drake() -> Iterator[None]:
         raise RuntimeError(errors.found[0])
 
 
-@cached_by_content(maxsize=32)
-def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
-    """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
-    none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either."""
+def _built(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
+    """Plant, scene graph and model instances that Drake makes of `path`; InputError names `source` where it makes none."""
     from pydrake.geometry import SceneGraph
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
@@ -88,6 +87,14 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
             plant.Finalize()
     except (RuntimeError, ValueError) as e:
         raise InputError(source, f"Drake cannot read this model: {drake_error(e)}") from None
+    return plant, scene_graph, instances
+
+
+@cached_by_content(maxsize=32)
+def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
+    """A line for each thing that is doubtful in the robot that Drake makes of `path`; InputError names `source` where it makes
+    none. held: link whose mass does not matter, as it is held wherever the robot is used; then it need not stand either."""
+    plant, scene_graph, instances = _built(path, source)
     if len(instances) != 1:
         return ()
     bodies = [plant.get_body(b) for b in plant.GetBodyIndices(instances[0])]
@@ -95,6 +102,20 @@ def model_problems(path: Path, source: Path, held: str = "") -> tuple[str, ...]:
     groups = {name: group for name, group in groups.items() if held not in group}
     feet = () if held else _feet(plant, scene_graph, bodies)
     return (*_without_mass(plant, groups), *_unlikely(plant, scene_graph, bodies, held), *feet)
+
+
+@cached_by_content(maxsize=32)
+def link_sizes(path: Path) -> dict[str, float]:
+    """By link, the largest distance between two of its shapes' corners, its centre of mass, its joint and the next ones [m], at
+    least `ModelChecks.smallest`; InputError where Drake cannot read the SDF at `path`."""
+    plant, scene_graph, instances = _built(path, path)
+    bodies = [plant.get_body(b) for instance in instances for b in plant.GetBodyIndices(instance)]
+    out = {}
+    for body in bodies:
+        points = _points(plant, scene_graph, body)
+        apart = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        out[body.name()] = max(float(apart.max(initial=0.0)), CHECKS.smallest)
+    return out
 
 
 def _fixed_together(plant: Any) -> dict[str, set[str]]:
@@ -146,11 +167,17 @@ def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any], held: str) -> Ite
 
 
 def _reach(plant: Any, scene_graph: Any, body: Any) -> float:
-    """How far a link's shapes, centre of mass and next joints are from its frame [m]."""
+    """How far a link's shapes, centre of mass and joints are from its frame [m]."""
+    return float(np.linalg.norm(_points(plant, scene_graph, body), axis=1).max(initial=0.0))
+
+
+def _points(plant: Any, scene_graph: Any, body: Any) -> Array:
+    """A link's ends: its centre of mass, the corners of its shapes' boxes, its joint and the next ones, (N, 3) [m] in its
+    frame."""
     from pydrake.geometry import HalfSpace, Role
 
     inspector = scene_graph.model_inspector()
-    far = [float(np.linalg.norm(body.default_com())) if body.default_mass() > 0 else 0.0]
+    points = [body.default_com()] if body.default_mass() > 0 else []
     frame = plant.GetBodyFrameIdOrThrow(body.index())
     for role in (Role.kProximity, Role.kIllustration):
         for g in inspector.GetGeometries(frame, role):
@@ -158,12 +185,12 @@ def _reach(plant: Any, scene_graph: Any, body: Any) -> float:
                 continue
             box = inspector.GetObbInGeometryFrame(g)
             X = inspector.GetPoseInFrame(g).multiply(box.pose())
-            far.append(float(np.linalg.norm(X.translation()) + np.linalg.norm(box.half_width())))
-    for index in plant.GetJointIndices():
-        joint = plant.get_joint(index)
-        if joint.parent_body().index() == body.index():
-            far.append(float(np.linalg.norm(joint.frame_on_parent().GetFixedPoseInBodyFrame().translation())))
-    return max(far)
+            points += [X.multiply(box.half_width() * signs) for signs in product((-1.0, 1.0), repeat=3)]
+    for joint in map(plant.get_joint, plant.GetJointIndices()):
+        for end, on in ((joint.parent_body(), joint.frame_on_parent()), (joint.child_body(), joint.frame_on_child())):
+            if end.index() == body.index():
+                points.append(on.GetFixedPoseInBodyFrame().translation())
+    return np.reshape(points, (-1, 3)).astype(float)
 
 
 def _feet(plant: Any, scene_graph: Any, bodies: list[Any]) -> Iterator[str]:
