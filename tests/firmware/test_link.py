@@ -44,8 +44,8 @@ def test_python_finds_what_c_finds(parts: list[bytes], flips: list[tuple[int, in
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.lists(frames, min_size=1, max_size=4), frames, st.integers(1, 220), st.integers(1, 50))
 def test_a_frame_that_was_cut_hides_none_of_those_behind_it(parts: list[bytes], other: bytes, cut: int, step: int) -> None:
-    """As a reset in the middle of a log, before the one frame that says why. Where just one byte is missing, the next frame's first
-    may happen to be it: then nobody can tell."""
+    """As a reset in the middle of a log, before the one frame that says why. Where just one byte is missing, the next frame's
+    first may happen to be it: then nobody can tell."""
     data, reader = other[:min(cut, len(other) - 1)] + b"".join(parts) + bytes(220), FrameReader()
     assume(not data.startswith(other))
     found = [f for at in range(0, len(data), step) for f in reader.feed(data[at:at + step])]
