@@ -11,7 +11,7 @@ from workbench.identify.evidence.holdout import vetoed
 from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import posterior_of
-from workbench.identify.evidence.search import lockstep, search
+from workbench.identify.evidence.search import lockstep, search, without_names
 
 NAMES = ("coulomb_friction", "viscous_friction", "load_friction", "backlash", "torque_saturation", "parallel_spring")
 NUMBER = "number 0"
@@ -129,3 +129,13 @@ def test_slopes_by_moves_are_those_by_differences_where_nothing_sticks():
     slopes = np.column_stack([-rollouts.does[NUMBER], -rollouts.does["backlash.gap"]])
     np.testing.assert_allclose(again.J, slopes, atol=1e-9)
     np.testing.assert_allclose(again.covariance(of, OPTIONS), replace(fit, J=slopes).covariance(of, OPTIONS), rtol=1e-6)
+
+
+def test_taking_the_names_of_all_fits_out_leaves_the_best_one_without_them():
+    """As after an effect that every likely model has was refuted."""
+    rollouts, found, _ = searched(robot({"load_friction": 2.0, "backlash": 1.5}))
+    gone = [c for c, _ in found.best.hypothesis.sizes() if c.name == "load_friction"]
+    with_it = {key: f for key, f in found.fits.items() if any(name == "load_friction" for name, *_ in key)}
+    left = lockstep(rollouts, {0: without_names(replace(found, fits=with_it), OPTIONS, gone)})[0]
+    assert {c.name: x[0] for c, x in left.best.hypothesis.sizes()} == pytest.approx({"backlash": 1.5}, rel=0.1)
+    assert "load_friction" not in {c.name for c in left.region.candidates}

@@ -169,7 +169,8 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
         if not any(said):
             break
         rejected += [Rejected(c.name, c.where, why) for gone in said for c, why in gone.items()]
-        found = tuple(without_names(f, gone) for f, gone in zip(found, said))
+        left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
+        found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = gone_on(rollouts, found, options, progress)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)

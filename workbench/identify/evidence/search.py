@@ -198,12 +198,15 @@ def _all_of(rollouts: Rollouts, parts: Sequence[Generator[Any, Any, Any]]) -> li
     return [done[i] for i in range(len(parts))]
 
 
-def without_names(found: Found, gone: Collection[Candidate]) -> Found:
-    """Without all fits that have one of these effects, which are not to be looked at again."""
-    names = {(c.name, c.where) for c in gone}
-    fits = {key: f for key, f in found.fits.items() if not any((c.name, c.where) in names for c in f.hypothesis.effects)}
-    region = replace(found.region, candidates=tuple(c for c in found.region.candidates if (c.name, c.where) not in names))
-    return replace(found, region=region, fits=fits)
+def without_names(found: Found, options: EvidenceOptions, gone: Collection[Candidate]) -> Asks[Found]:
+    """Without all fits that have one of these effects, which are not to be looked at again; the best of them is fitted anew from
+    where it stands without them, as there may be no other fit."""
+    names, best = {c.key for c in gone}, found.best
+    h, J = without(best, lambda c: c.key in names)
+    fit = yield from fitting(found.region, options, h, best.discrepancy, options.iterations, None, J)
+    fits = {key: f for key, f in found.fits.items() if not any(c.key in names for c in f.hypothesis.effects)}
+    region = replace(found.region, candidates=tuple(c for c in found.region.candidates if c.key not in names))
+    return replace(found, region=region, fits=_with_better(fits, [fit]))
 
 
 def standing(rollouts: Rollouts, found: Sequence[Found]) -> Rollouts:
