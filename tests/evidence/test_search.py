@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.evidence.linear import FRAME, candidate, linear, region
+from tests.evidence.linear import FRAME, Linear, candidate, linear, region
 from workbench.identify.evidence.fit import fitting, regressed
 from workbench.identify.evidence.holdout import vetoed
 from workbench.identify.evidence.hypothesis import start
@@ -51,6 +51,34 @@ def test_two_effects_are_named_with_their_sizes():
     assert {name: prob > 0.9 for (name, _), prob in p.named.items()} == {n: n in sizes for n, _ in p.named}
     assert p.families["friction"] > 0.9
     assert np.sqrt(np.diag(p.best.covariance(found.region, OPTIONS)))[-1] < 0.1
+
+
+class Coarse(Linear):
+    """At a coarse step dry friction does a third more than it does."""
+
+    def left(self, h):
+        r = super().left(h)
+        for c, x in h.sizes():
+            if c.name == "coulomb_friction" and self.step > 1.0:
+                r = r - 0.3 * x[0] * self.does["coulomb_friction.torque"]
+        return r
+
+
+def test_what_a_coarse_step_fitted_wrongly_is_fitted_anew_before_it_is_judged():
+    """Four rivals that do nearly the same: dry friction, which it is, is less like it than any of them with its size from the
+    coarse step."""
+    names = NAMES[:2] + NAMES[3:]
+    of = region([candidate(n) for n in names], noise=2e-3, takes=1)
+    n = len(of.likelihood.known)
+    signal, number, *others = waves(0, n, len(names) + 1)
+    does = {NUMBER: 0.3 * number, "coulomb_friction.torque": signal}
+    for name, other in zip(names[1:], others):
+        does[f"{name}.{candidate(name).parameters[0].name}"] = signal + 0.1 * other
+    truth = 2.0 * signal + np.random.default_rng(0).normal(size=n) * 2e-3
+    rollouts = Coarse(None, None, (of,), (start(of.numbers),), truth=truth, does=does)
+    _, _, p = searched(rollouts)
+    assert [c.name for c in p.best.hypothesis.effects] == ["coulomb_friction"]
+    assert p.best.hypothesis.theta[-1] == pytest.approx(2.0, rel=0.05)
 
 
 def test_what_recalibration_explains_is_no_effect():

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
-from workbench.identify.evidence.hypothesis import Term, start
+from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
@@ -84,6 +84,8 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
         rollouts = standing(rollouts, found)
 
     everywhere(lambda f: _renewed(f, options, exploring, True), range(len(found)))
+    if not exploring:
+        everywhere(lambda f: _refitted(f, options), range(len(found)))
     open_ = set(range(len(found)))
     for level in range(options.most):
         report(f"effects, {what}, level {level + 1}", level / options.most)
@@ -168,9 +170,8 @@ def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks
     stands, as what was recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis
-    anew = h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
     fits = yield from side_by_side([fitting(region, options, h, f.discrepancy, options.iterations, None, None if shaped else m.J),
-                                    fitting(region, options, anew, f.discrepancy, options.iterations)])
+                                    fitting(region, options, _as_published(h), f.discrepancy, options.iterations)])
     return max(fits, key=lambda g: g.log_posterior)  # type: ignore[no-any-return]
 
 
@@ -186,6 +187,22 @@ def _renewed(found: Found, options: EvidenceOptions, exploring: bool, again: boo
     region = found.region.correlated(min(tau, options.explored) if exploring else tau)
     fits = {f.hypothesis.key: judged(region, options, f.hypothesis, x, f.J) for f, x in zip(near, left)}
     return replace(found, region=region, fits=fits)
+
+
+def _refitted(found: Found, options: EvidenceOptions) -> Asks[Found]:
+    """The likeliest fits gone on with, and made once more with the nominal law as it stands, as they are of a coarser step and of
+    another correlation time: by how far each is off by now, one name would win over another that does as well."""
+    region, least = found.region, found.best.log_posterior - 3 * options.occam
+    near = [f for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior) if f.log_posterior > least][:options.refined]
+    made = yield from side_by_side([
+        *(polished(region, options, f) for f in near),
+        *(fitting(region, options, _as_published(f.hypothesis), f.discrepancy, options.iterations) for f in near)])
+    return replace(found, fits=_with_better(found.fits, [*made, *(reduced(region, options, f) for f in made)]))
+
+
+def _as_published(h: Hypothesis) -> Hypothesis:
+    """With none of the nominal law's numbers recalibrated."""
+    return h.at(np.concatenate([np.zeros(len(h.numbers)), h.theta[len(h.numbers):]]))
 
 
 def lockstep(rollouts: Rollouts, parts: Mapping[int, Generator[Any, Any, Any]]) -> dict[int, Any]:
