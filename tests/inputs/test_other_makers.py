@@ -6,10 +6,11 @@ import json
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.command import succeeds
-from tests.inputs.other_makers import bus_session, pwm_session
+from tests.inputs.other_makers import PWM, bus_session, pwm_session
 
 LONGEST = 300.0  # s of processor
 
@@ -29,4 +30,8 @@ def test_a_pwm_servo_is_diagnosed_in_minutes_and_not_called_explained(tmp_path: 
     assert time.process_time() - began < LONGEST
     said = json.loads((tmp_path / "out" / "findings.json").read_text())
     assert said["verdict"] == "partly_explained"
-    assert "supply_voltage" not in {f["effect"] for f in said["findings"]}  # 17.9 V would be the likeliest, and burn it
+    numbers = {f["effect"]: f["parameters"] for f in said["findings"]}
+    if "supply_voltage" in numbers:  # 17.9 V would be the likeliest, and burn it
+        assert numbers["supply_voltage"]["voltage"]["value"] < 1.5 * 6.8
+    if "com_shift" in numbers:  # 95 mm likewise, and no rod of 170 mm has it there
+        assert np.linalg.norm(numbers["com_shift"]["offset"]["value"]) < 0.5 * PWM.length
