@@ -13,6 +13,9 @@ LOOP = 2e-3
 """Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that, so that every
 model may set out that much sooner or later, and no delay is known better."""
 
+SAME = 1e-9
+"""Instants no further apart are one [s]."""
+
 
 def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Commands:
     """The commands without some to one joint, which keeps the goal and speed that it had."""
@@ -36,7 +39,8 @@ def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands
         changes |= (values != np.vstack([np.full_like(values[:1], neutral), values[:-1]])).any(axis=1)
     changes[:1] |= late < 0
     times = np.union1d(commands.times, commands.times[changes] + late)
-    now, before = (np.searchsorted(commands.times, times - s + 1e-9, side="right") - 1 for s in (0.0, late))
+    times = times[np.diff(times, prepend=-np.inf) > SAME]
+    now, before = (np.searchsorted(commands.times, times - s + SAME, side="right") - 1 for s in (0.0, late))
     still, first, shifted = (now < 0)[:, None], np.maximum(now, 0), np.maximum(before, 0)  # still in neutral
 
     def held(rows: np.ndarray, neutral: float) -> np.ndarray:

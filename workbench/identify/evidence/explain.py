@@ -29,8 +29,10 @@ from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
 from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
+from workbench.identify.evidence.robot_search import RobotFound, search_robot
+from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts
-from workbench.identify.evidence.search import Found, gone_on, lockstep, search, standing, without_names
+from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
@@ -52,13 +54,14 @@ WORTH_SAYING = 0.01
 
 @dataclass(frozen=True)
 class Explanation:
-    """The likeliest model, and all that was believed beside it. regions, fits, posteriors: alike, one a region; rejected:
-    refuted by registers or by takes kept back."""
+    """The likeliest model, and all that was believed beside it. regions, fits, posteriors: alike, one a region; robot: what acts
+    in all of them; rejected: refuted by registers or by takes kept back."""
 
     nominal: RobotModel
     rollouts: Rollouts
     found: tuple[Found, ...]
     posteriors: tuple[RegionPosterior, ...]
+    robot: RobotFound
     rejected: tuple[Rejected, ...]
     options: EvidenceOptions
 
@@ -75,7 +78,7 @@ class Explanation:
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The likeliest model's effects, the surest first."""
-        out = []
+        out = self._of_robot(evidence, before, after)
         for region, p in zip(self.rollouts.regions, self.posteriors):
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
             for (c, x), s in zip(h.sizes(), h.slices()):
@@ -87,6 +90,20 @@ class Explanation:
                     c.effect.sentence(c.spec(x)),
                     family=None if family is None else FamilyBelief(family, p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
+
+    def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:
+        """What acts in all joints at once."""
+        out, at, sure = [], self.robot.together, self.robot.sure
+        nats = at.log_posterior
+        for (c, x), s in zip(at.shared.sizes(), at.shared.slices()):
+            others = tuple(Alternative(o.name, o.where, sure * math.exp(min(0.0, other - nats)))
+                           for o, other in self.robot.instead if o is not None)
+            fit, validation = (change(evidence, c.where, before, after, use) for use in ("fit", "validate"))
+            out.append(Finding(
+                c.name, c.where, sure, estimates(c, x, at.covariance[s, s]), fit, validation,
+                tuple(o for o in others if o.confidence >= WORTH_SAYING)[:1], c.effect.sentence(c.spec(x)),
+                family=None if c.effect.family is None else FamilyBelief(c.effect.family, sure)))
+        return out
 
     def posterior(self) -> Posterior:
         """Of all numbers of the model's effects, in the contract's units; a recalibrated zero is one of them."""
@@ -102,6 +119,10 @@ class Explanation:
             for (c, x), s in zip(h.sizes(), h.slices()):
                 slopes = value_slopes(c, x)
                 blocks[c.name, c.where] = slopes @ covariance[s, s] @ slopes.T
+        robot = self.robot.together
+        for (c, x), s in zip(robot.shared.sizes(), robot.shared.slices()):
+            slopes = value_slopes(c, x)
+            blocks[c.name, c.where] = slopes @ robot.covariance[s, s] @ slopes.T
         mean = np.concatenate([np.empty(0), *(np.ravel(v) for e in model.effects for v in e.parameters.values())])
         whole, at = np.zeros((len(mean), len(mean))), 0
         for e in model.effects:
@@ -158,9 +179,10 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     felt = [c for c in pool if c.where != (nominal.base,)]
     asked, refuted = within_registers(felt, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
-    rollouts = Rollouts(evaluator, nominal, regions, tuple(start(r.numbers) for r in regions))
-    rollouts, found = search(rollouts, options, progress)
-    rejected = list(refuted)
+    shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 else []
+    robot, rejected = _searched(Rollouts(evaluator, nominal, regions, tuple(start(r.numbers) for r in regions)), shared, felt,
+                                options, progress)
+    rollouts, found, rejected = robot.rollouts, robot.found, [*refuted, *rejected]
     for _ in range(ROUNDS):
         said = [at_their_end(f.best.hypothesis, felt) for f in found]
         if not any(said):
@@ -176,11 +198,31 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
     finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
-    last = lockstep(replace(rollouts, evaluator=whole, regions=entire, step=FINE), finishing)
+    fine = replace(rollouts, evaluator=whole, regions=entire, step=FINE)
+    last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
+    fine = standing(fine, found)
+    last_fits = [f.best for f in found]
+    together = Whole(fine, (), options).fitted(Whole(fine, (), options).begun(last_fits))
+    robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     whole.rollouts += evaluator.rollouts
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
-    return Explanation(nominal, standing(rollouts, found), found, believed, tuple(rejected), options)
+    return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
+                       tuple(rejected), options)
+
+
+def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,
+              progress: Progress) -> tuple[RobotFound, list[Rejected]]:
+    """Joints and robot searched; again where an effect of the whole robot went as far as is plausible."""
+    rejected: list[Rejected] = []
+    for _ in range(ROUNDS):
+        robot = search_robot(rollouts, names, options, progress)
+        gone = at_their_end(robot.together.shared, felt)
+        if not gone:
+            break
+        rejected += [Rejected(c.name, c.where, why) for c, why in gone.items()]
+        names = [c for c in names if c.key not in {g.key for g in gone}]
+    return robot, rejected
 
 
 def _kept_back(rollouts: Rollouts, evidence: Sequence[TakeEvidence], found: Sequence[Found], options: EvidenceOptions

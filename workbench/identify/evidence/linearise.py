@@ -39,7 +39,7 @@ class Move:
 
 
 @dataclass(frozen=True)
-class _Probe:
+class Probe:
     """A candidate at sizes x, of which number `moved` says how much there is of it (-1: it is there as it is); r: what that
     leaves."""
 
@@ -66,13 +66,19 @@ def _neutral(effect: Effect) -> tuple[float, ...]:
 
 def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
     """Every extension at some sizes, and what it foretells at its best one; the best first."""
-    asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in _points(c, f.hypothesis)]
+    asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
-    ways: dict[object, list[_Probe]] = {}
-    for (c, x, k), r in zip(asked, left):
-        shape = tuple(np.delete(x, k).round(6)) if k >= 0 else ()
-        ways.setdefault((c.name, c.where, c.options, k, shape), []).append(_Probe(c, x, k, r))
-    return best_of_each([_best_along(region, options, f, along) for along in ways.values()])
+    along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
+    return best_of_each([_best_along(region, options, f, probes) for probes in along])
+
+
+def ways(probes: Sequence[Probe]) -> list[list[Probe]]:
+    """Probes that differ by one number alone together."""
+    out: dict[object, list[Probe]] = {}
+    for p in probes:
+        shape = tuple(np.delete(p.x, p.moved).round(6)) if p.moved >= 0 else ()
+        out.setdefault((p.candidate.key, p.candidate.options, p.moved, shape), []).append(p)
+    return list(out.values())
 
 
 def best_of_each(moves: Sequence[Move]) -> list[Move]:
@@ -117,7 +123,7 @@ def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move)
         for label, column in zip(m.hypothesis.labels, m.J.T):
             if label not in at:
                 J[:, h.labels.index(label)] = column
-    return _judged(region, options, f, *_led(region, options, f, h, r, J, led), (*a.added, two))
+    return _judged(region, options, f, *led_after(region, options, f, h, r, J, led), (*a.added, two))
 
 
 def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
@@ -128,7 +134,7 @@ def slopes_for(f: Fitted, h: Hypothesis) -> tuple[Array, NDArray[np.bool_]]:
     return J, known
 
 
-def _points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
+def points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
     """Sizes at which a candidate is looked at, and which number is moved there."""
     low, high = c.bounds()
     if c.read_off or not c.size:
@@ -150,21 +156,21 @@ def _points(c: Candidate, h: Hypothesis) -> list[tuple[Array, int]]:
     return out
 
 
-def _on_lines(f: Fitted, along: Sequence[_Probe]) -> list[tuple[Array, Array]]:
-    """Sizes along one way of a candidate and what each is foretold to leave: by lines between those that were seen, none of it
-    being the first, and drawn out beyond the last and to the other side."""
+def on_lines(none: Array, along: Sequence[Probe]) -> list[tuple[Array, Array]]:
+    """Sizes along one way of a candidate and what each is predicted to leave: by lines between those that were seen, none of it
+    being the first, and drawn out beyond the last and to the other side. none (n,): what is left without it."""
     k = along[0].moved
     if k < 0:
         return [(p.x, p.r) for p in along]
     low, high = along[0].candidate.bounds()
     seen = sorted(along, key=lambda p: abs(p.x[k]))
-    knots = [(0.0, f.r), *((float(p.x[k]), p.r) for p in seen)]
+    knots = [(0.0, none), *((float(p.x[k]), p.r) for p in seen)]
     read = [*knots[1:]]
     for (a, ra), (b, rb) in pairwise(knots):
         read += [(a + share * (b - a), ra + share * (rb - ra)) for share in BETWEEN]
     (a, ra), (b, rb) = knots[-2:]
     read += [(b + share * (b - a), rb + share * (rb - ra)) for share in BEYOND]
-    read += [(-share * knots[1][0], f.r - share * (knots[1][1] - f.r)) for share in (*BETWEEN, *BEYOND)]
+    read += [(-share * knots[1][0], none - share * (knots[1][1] - none)) for share in (*BETWEEN, *BEYOND)]
     out = []
     for amount, r in read:
         if low[k] <= amount <= high[k]:
@@ -174,10 +180,10 @@ def _on_lines(f: Fitted, along: Sequence[_Probe]) -> list[tuple[Array, Array]]:
     return out
 
 
-def _best_along(region: Region, options: EvidenceOptions, f: Fitted, along: Sequence[_Probe]) -> Move:
+def _best_along(region: Region, options: EvidenceOptions, f: Fitted, along: Sequence[Probe]) -> Move:
     """The best move along one way of a candidate."""
     c, k, s = along[0].candidate, along[0].moved, f.discrepancy
-    led = [_led(region, options, f, *_at(f, c, k, x, r)) for x, r in _on_lines(f, along)]
+    led = [led_after(region, options, f, *_at(f, c, k, x, r)) for x, r in on_lines(f.r, along)]
     prior = Prior.of(led[0][0], options)
     best = max(led, key=lambda m: region.likelihood.log(m[1], s) + prior.log(m[0].theta))
     return _judged(region, options, f, *best, (c,))
@@ -195,7 +201,7 @@ def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis
     return h, r, J, led
 
 
-def _led(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
+def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
          ) -> tuple[Hypothesis, Array, Array]:
     """A hypothesis with the numbers that the fit had led after it on lines, what that leaves, and slopes."""
     prior = Prior.of(h, options)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.hypothesis import Hypothesis
+from workbench.identify.evidence.hypothesis import Hypothesis, start
 from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
 from workbench.identify.evidence.region import Region
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
@@ -75,13 +75,14 @@ def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
 @dataclass(frozen=True)
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
-    step: in steps of the search."""
+    step: in steps of the search. shared: effects of the whole robot, which act in all regions."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
     regions: tuple[Region, ...]
     standing: tuple[Hypothesis, ...]
     step: float = 1.0
+    shared: Hypothesis = field(default_factory=lambda: start(()))
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""
@@ -89,7 +90,13 @@ class Rollouts:
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
         model = recalibrated(self.nominal, z)
-        return model.with_effects((*model.effects, *(spec for h in hypotheses for spec in h.specs())))
+        return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
+
+    def everywhere(self, states: Sequence[tuple[Hypothesis, Sequence[Hypothesis]]]) -> list[tuple[Array, ...]]:
+        """Residuals (n,) of every region, of shared effects with a hypothesis for each region."""
+        takes = tuple(sorted({p.take for region in self.regions for p in region.parts}))
+        questions = [RolloutRequest(replace(self, shared=shared).model(each), takes, self.step) for shared, each in states]
+        return [tuple(region.vector(r) for region in self.regions) for r in residuals_of(self.evaluator, questions)]
 
     def answers(self, wants: Sequence[Wants]) -> list[Array]:
         """Residuals (n,) of each want's region. Wants of different regions share rollouts."""

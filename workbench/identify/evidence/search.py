@@ -48,22 +48,33 @@ class Found:
 
 
 def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
-    """Searches all regions side by side, level by level; returns them with what stands in each.
+    """Searches all regions side by side, level by level; returns them with what stands in each."""
+    return searched(*begun(rollouts, options, report), rollouts.step, options, report)
+
+
+def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
+    """The nominal law recalibrated in all regions, at the coarse step of exploring."""
+    report("the nominal law recalibrated", None)
+    rollouts = replace(rollouts, step=PROBLEM.coarse)
+    first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
+    found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
+    return standing(rollouts, found), found
+
+
+def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report
+             ) -> tuple[Rollouts, tuple[Found, ...]]:
+    """What was begun searched to its end. step: of rollouts by which it is judged.
 
     How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
     something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
     longer than `options.explored` and at a coarse step, and then judges what it fitted, and goes on, by what the closest fits
     leave.
     """
-    report("the nominal law recalibrated", None)
-    whole, rollouts = rollouts, replace(rollouts, step=PROBLEM.coarse)
-    first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
-    found = [Found(r, {f.hypothesis.key: f}) for r, f in first]
-    rollouts = standing(rollouts, found)
+    states = list(found)
     for exploring in (True, False):
-        step = PROBLEM.coarse if exploring else whole.step
-        rollouts, found = _all_levels(replace(rollouts, step=step), found, options, exploring, report)
-    return rollouts, tuple(found)
+        rollouts, states = _all_levels(replace(rollouts, step=PROBLEM.coarse if exploring else step), states, options, exploring,
+                                       report)
+    return rollouts, tuple(states)
 
 
 def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Report

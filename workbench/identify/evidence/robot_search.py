@@ -1,0 +1,130 @@
+"""The search of a robot of several joints: of its joints side by side, and of what acts in all of them at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.identify.evidence.fit import Fitted, judged
+from workbench.identify.evidence.hypothesis import Hypothesis
+from workbench.identify.evidence.linearise import linearised
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.robot_wide import Together, Whole
+from workbench.identify.evidence.rollouts import Rollouts
+from workbench.identify.evidence.search import Found, Report, begun, gone_on, lockstep, search, searched, standing
+from workbench.identify.parameters import Candidate
+
+MOST = 3
+"""Effects of the whole robot, and rounds in which they are looked for beside what the joints were found to have."""
+FIRST = 0.5
+"""Share of what the best effects of all joints explain from which one of the whole robot goes first: which of both it is, is seen
+when each was searched to its end."""
+
+
+@dataclass(frozen=True)
+class RobotFound:
+    """What stands: rollouts with it, what was found by region, and all of it together. instead: the likeliest other model [nats]
+    by the effect of the whole robot that it puts in the place of ours; None: the joints alone."""
+
+    rollouts: Rollouts
+    found: tuple[Found, ...]
+    together: Together
+    instead: tuple[tuple[Candidate | None, float], ...] = ()
+
+    @property
+    def sure(self) -> float:
+        """Probability of the effects of the whole robot, all others being what was tried in their place."""
+        if not self.together.shared.effects:
+            return 0.0
+        others = [min(nats - self.together.log_posterior, 700.0) for _, nats in self.instead]
+        return float(1.0 / (1.0 + np.exp(others).sum()))
+
+
+def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: EvidenceOptions, report: Report) -> RobotFound:
+    """Searches joints and robot. names: effects that act in all joints at once. What acts in all goes first where it explains a
+    good part of what the best effect in each joint would, and is then weighed against the search without it; else it is looked
+    for beside what the joints are found to have."""
+    if not names:
+        whole, found = search(rollouts, options, report)
+        return RobotFound(whole, found, Whole(whole, (), options).begun([f.best for f in found]))
+    start, found = begun(rollouts, options, report)
+    first = _first(start, found, names, options, report)
+    at = _to_the_end(*first, names, rollouts.step, options, report)
+    if not at.together.shared.effects:
+        return at
+    if first[0].shared.effects:
+        report("the same without effects of the whole robot", None)
+        alone, alone_found = searched(start, found, rollouts.step, options, report)
+    else:
+        alone, alone_found = gone_on(replace(at.rollouts, shared=start.shared), at.found, options, report)
+    return _weighed(at, RobotFound(alone, alone_found, Whole(alone, (), options).begun([f.best for f in alone_found])),
+                    names, options)
+
+
+def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Report
+           ) -> tuple[Rollouts, tuple[Found, ...]]:
+    """What was begun, with an effect of the whole robot where that comes first."""
+    report("effects of the whole robot", None)
+    whole = Whole(rollouts, tuple(names), options)
+    alone = whole.begun([f.best for f in found])
+    moves = lockstep(rollouts, {k: linearised(f.region, options, f.best) for k, f in enumerate(found)})
+    by_joints = sum(max(0.0, moves[k][0].gain) if moves[k] else 0.0 for k in range(len(found)))
+    added = whole.predicted(alone)
+    fit = whole.fitted(added) if added is not None and added.log_posterior > alone.log_posterior else None
+    if fit is None or fit.log_posterior <= alone.log_posterior + FIRST * by_joints:
+        return rollouts, tuple(found)
+    return _beside(rollouts, [replace(f, fits={}) for f in found], fit)
+
+
+def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], step: float, options: EvidenceOptions,
+                report: Report) -> RobotFound:
+    """Joints searched, and effects of the whole robot added as long as they pay."""
+    rollouts, found = searched(rollouts, found, step, options, report)
+    for _ in range(MOST):
+        whole = Whole(rollouts, tuple(names), options)
+        now = whole.fitted(whole.begun([f.best for f in found]))
+        rollouts, found = _beside(rollouts, found, now)
+        report("effects of the whole robot", None)
+        more = whole.predicted(now) if len(now.shared.effects) < MOST else None
+        if more is None or more.log_posterior <= now.log_posterior:
+            break
+        more = whole.fitted(more)
+        if more.log_posterior <= now.log_posterior:
+            break
+        rollouts, found = gone_on(*_beside(rollouts, found, more), options, report)
+    whole = Whole(rollouts, tuple(names), options)
+    return RobotFound(rollouts, tuple(found), whole.fitted(whole.begun([f.best for f in found])))
+
+
+def _beside(rollouts: Rollouts, found: Sequence[Found], at: Together) -> tuple[Rollouts, tuple[Found, ...]]:
+    """With shared effects, and the fits beside them, standing."""
+    states = tuple(replace(f, fits={**f.fits, fit.hypothesis.key: fit}) for f, fit in zip(found, at.fits))
+    return standing(replace(rollouts, shared=at.shared), states), states
+
+
+def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], options: EvidenceOptions) -> RobotFound:
+    """The likelier one, beside the others, all judged by the same correlation times: the shorter, as a poor model's are long."""
+    taus = [min(a.region.likelihood.tau, b.region.likelihood.tau) for a, b in zip(at.found, alone.found)]
+
+    def anew(of: Together, rollouts: Rollouts) -> Together:
+        regions = tuple(r.correlated(tau) for r, tau in zip(rollouts.regions, taus))
+        whole = Whole(replace(rollouts, regions=regions), tuple(names), options)
+        fits: list[Fitted] = [judged(r, options, f.hypothesis, f.r, f.J) for r, f in zip(regions, of.fits)]
+        return whole.judged(of.shared, fits, of.slopes)
+
+    ours, theirs = anew(at.together, at.rollouts), anew(alone.together, alone.rollouts)
+    whole = Whole(at.rollouts, tuple(names), options)
+    others: list[tuple[Candidate | None, float]] = [(None, theirs.log_posterior)]
+    for c in at.together.shared.effects:
+        left: Hypothesis = at.together.shared.without(lambda other, c=c: other is c)
+        fits = at.together.fits
+        bare = whole.judged(left, fits, [np.zeros((len(f.r), len(left.theta))) for f in fits])
+        instead = replace(whole, names=tuple(n for n in names if n.key != c.key)).predicted(whole.fitted(bare))
+        if instead is not None:
+            instead = whole.fitted(instead)
+            others.append((instead.shared.effects[-1], instead.log_posterior + ours.log_posterior - at.together.log_posterior))
+    if theirs.log_posterior > ours.log_posterior:
+        return alone
+    return replace(at, together=ours, instead=tuple(others))

@@ -1,0 +1,169 @@
+"""Effects of the whole robot beside those of its joints, in logs of several joints: each joint is a region of its own, and what
+acts in all of them is judged by what all gain together.
+
+With the joints' numbers theta_j and the shared ones g, the information matrix has the form of an arrow, so that
+
+    log evidence = sum over joints of log evidence(theta_j | g) + log p(g) + k/2 log 2 pi - 1/2 log |S|,
+    S = H_gg - sum of H_gj H_jj^-1 H_jg                                                       (Schur complement of the joints)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.evidence.fit import Fitted, judged
+from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
+from workbench.identify.evidence.linearise import Probe, led_after, on_lines, points, ways
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.rollouts import Rollouts
+from workbench.identify.parameters import Candidate
+
+Array = NDArray[np.float64]
+SHARES = (1.0, 0.5, 0.25)
+"""Of a step that are tried."""
+CLOSE = 0.1
+"""Gain of a step [nats] below which a fit ends."""
+
+
+@dataclass(frozen=True)
+class Together:
+    """What stands in all regions. shared: effects of the whole robot; fits: by region, beside them; slopes (n, k): by region, of
+    its residuals by the shared numbers; covariance (k, k) of these; log_posterior [nats] of all."""
+
+    shared: Hypothesis
+    fits: tuple[Fitted, ...]
+    slopes: tuple[Array, ...] = field(repr=False)
+    covariance: Array = field(repr=False)
+    log_posterior: float
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Judges regions together. names: effects of the whole robot that could be there."""
+
+    rollouts: Rollouts
+    names: tuple[Candidate, ...]
+    options: EvidenceOptions
+
+    @property
+    def regions(self) -> tuple[Region, ...]:
+        """Of the robot."""
+        return self.rollouts.regions
+
+    def begun(self, fits: Sequence[Fitted]) -> Together:
+        """Regions beside what is shared, of which no slopes are known yet."""
+        shared = self.rollouts.shared
+        return self.judged(shared, fits, [np.zeros((len(f.r), len(shared.theta))) for f in fits])
+
+    def judged(self, shared: Hypothesis, fits: Sequence[Fitted], slopes: Sequence[Array]) -> Together:
+        """All regions and what they share, where they stand."""
+        prior = Prior.of(shared, self.options)
+        S = np.diag(prior.precision(shared.theta))
+        for region, f, G in zip(self.regions, fits, slopes):
+            H, C, precision = self._blocks(region, f, G)
+            S = S + (G.T * precision) @ G - C.T @ np.linalg.solve(H, C)
+        names = len(self.names) + max(len(r.candidates) for r in self.regions)
+        price = len(shared.effects) * log_odds(names, self.options.expected)
+        laplace = 0.5 * len(S) * float(np.log(2 * np.pi)) - 0.5 * float(np.linalg.slogdet(S)[1])
+        total = sum(f.log_posterior for f in fits) + prior.log(shared.theta) + laplace + price
+        return Together(shared, tuple(fits), tuple(slopes), np.asarray(np.linalg.inv(S), dtype=float), total)
+
+    def predicted(self, at: Together) -> Together | None:
+        """The best effect more of the whole robot, by lines through rollouts; None where there is none to be added."""
+        there = {c.key for c in at.shared.effects}
+        asked = [(c, x, k) for c in self.names if c.key not in there for x, k in points(c, at.shared)]
+        if not asked:
+            return None
+        each = [f.hypothesis for f in at.fits]
+        left = self.rollouts.everywhere([(at.shared.with_effect(c, x), each) for c, x, _ in asked])
+        probes = [Probe(c, x, k, np.concatenate(r)) for (c, x, k), r in zip(asked, left)]
+        none = np.concatenate([f.r for f in at.fits])
+        return max((self._best_along(at, none, along) for along in ways(probes)), key=lambda t: t.log_posterior)
+
+    def _best_along(self, at: Together, none: Array, along: Sequence[Probe]) -> Together:
+        c, k, best = along[0].candidate, along[0].moved, (-np.inf, at)
+        ends = np.cumsum([len(f.r) for f in at.fits])[:-1]
+        for x, r in on_lines(none, along):
+            shared = at.shared.with_effect(c, x)
+            led = [led_after(region, self.options, f, f.hypothesis, part, f.J, np.ones(len(f.hypothesis.theta), bool))
+                   for region, f, part in zip(self.regions, at.fits, np.split(r, ends))]
+            value = self._objective(at, shared, [h for h, _, _ in led], [part for _, part, _ in led])
+            if value > best[0]:
+                column = (r - none) / (x[k] if k >= 0 and abs(x[k]) > 1e-6 else 1.0)
+                best = (value, self._moved(at, shared, [(h, part) for h, part, _ in led], k, np.split(column, ends)))
+        return best[1]
+
+    def _moved(self, at: Together, shared: Hypothesis, led: Sequence[tuple[Hypothesis, Array]], k: int, columns: Sequence[Array]
+               ) -> Together:
+        """With one effect more, which does what `columns` say by its number k."""
+        fits = [judged(region, self.options, h, r, f.J) for region, f, (h, r) in zip(self.regions, at.fits, led)]
+        own, slopes = shared.slices()[-1], []
+        for G, column in zip(at.slopes, columns):
+            more = np.zeros((len(column), own.stop - own.start))
+            if more.shape[1]:
+                more[:, max(k, 0)] = column
+            slopes.append(np.hstack([G, more]))
+        return self.judged(shared, fits, slopes)
+
+    def fitted(self, at: Together) -> Together:
+        """All numbers fitted at once, by differences of the shared ones and the slopes that the regions' own have."""
+        for _ in range(self.options.iterations):
+            (left,) = self.rollouts.everywhere([(at.shared, [f.hypothesis for f in at.fits])])
+            at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], left)
+            tried = [self._step(at, share) for share in SHARES]
+            answers = self.rollouts.everywhere(tried)
+            now = self._objective(at, at.shared, [f.hypothesis for f in at.fits], left)
+            values = [self._objective(at, shared, each, r) for (shared, each), r in zip(tried, answers)]
+            best = int(np.argmax(values))
+            if values[best] < now + CLOSE:
+                break
+            at = self._rolled_out(at, *tried[best], answers[best])
+        return at
+
+    def _rolled_out(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> Together:
+        """Where it stands by rollouts, with slopes by the shared numbers measured there."""
+        _, high = shared.bounds()
+        ways = np.where(shared.theta + self.options.stride <= high, self.options.stride, -self.options.stride)
+        moved = self.rollouts.everywhere([(shared.at(shared.theta + m), each) for m in np.diag(ways)])
+        slopes = [np.reshape([(m[j] - r) / by for m, by in zip(moved, ways)], (len(ways), len(r))).T for j, r in enumerate(left)]
+        fits = [judged(region, self.options, h, r, f.J) for region, f, h, r in zip(self.regions, at.fits, each, left)]
+        return self.judged(shared, fits, slopes)
+
+    def _step(self, at: Together, share: float) -> tuple[Hypothesis, list[Hypothesis]]:
+        """A share of the Gauss-Newton step of all numbers."""
+        prior = Prior.of(at.shared, self.options)
+        P = prior.precision(at.shared.theta)
+        S, b, parts = np.diag(P), P * (at.shared.theta - prior.center), []
+        for region, f, G in zip(self.regions, at.fits, at.slopes):
+            H, C, precision = self._blocks(region, f, G)
+            own = Prior.of(f.hypothesis, self.options)
+            gradient = f.J.T @ (precision * f.r) + own.precision(f.hypothesis.theta) * (f.hypothesis.theta - own.center)
+            S = S + (G.T * precision) @ G - C.T @ np.linalg.solve(H, C)
+            b = b + G.T @ (precision * f.r) - C.T @ np.linalg.solve(H, gradient)
+            parts.append((H, C, gradient))
+        by = np.asarray(-np.linalg.solve(S, b), dtype=float)
+        each = [_within(f.hypothesis, np.asarray(-share * np.linalg.solve(H, gradient + C @ by), dtype=float))
+                for f, (H, C, gradient) in zip(at.fits, parts)]
+        return _within(at.shared, share * by), each
+
+    def _blocks(self, region: Region, f: Fitted, G: Array) -> tuple[Array, Array, Array]:
+        """Of the information: H of a region's own numbers, C of these and the shared ones; and each frame's precision."""
+        precision = region.likelihood.precision(f.r, f.discrepancy)
+        prior = Prior.of(f.hypothesis, self.options).precision(f.hypothesis.theta)
+        return (f.J.T * precision) @ f.J + np.diag(prior), (f.J.T * precision) @ G, precision
+
+    def _objective(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> float:
+        """Log likelihood and prior [nats] at the discrepancies of `at`."""
+        told = (region.likelihood.log(r, f.discrepancy) + Prior.of(h, self.options).log(h.theta)
+                for region, f, h, r in zip(self.regions, at.fits, each, left))
+        return sum(told) + Prior.of(shared, self.options).log(shared.theta)
+
+
+def _within(h: Hypothesis, by: Array) -> Hypothesis:
+    """A hypothesis with its numbers moved, within their bounds."""
+    return h.at(np.clip(h.theta + by, *h.bounds()))
