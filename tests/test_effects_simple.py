@@ -120,7 +120,8 @@ def test_a_delay_of_one_joint_moves_its_goals_alone(commands, delay):
 def test_one_joint_may_be_later_than_all_are(commands):
     """Instants that differ by rounding alone are one: by the delay of all, added to them, they would become equal."""
     joint = 0.3 - 0.2  # another command's time, but for rounding
-    both = PUPPY.with_effects((EffectSpec("command_delay", ("flm",), {"delay": joint}), EffectSpec("command_delay", (), {"delay": 0.4})))
+    both = PUPPY.with_effects((EffectSpec("command_delay", ("flm",), {"delay": joint}),
+                               EffectSpec("command_delay", (), {"delay": 0.4})))
     late = played(commands, both)
     assert np.diff(late.times).min() > 1e-6
     assert late.end == pytest.approx(0.6 + joint + 0.4)

@@ -24,7 +24,7 @@ from workbench.identify.evidence.nuisance import (
     turned_horn,
     uncertain_numbers,
 )
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
 from workbench.identify.evidence.region import Region, region_of
@@ -44,10 +44,6 @@ from workbench.robot import RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
 
 Array = NDArray[np.float64]
-FINE = 0.5
-"""Step of the last fits, in steps of the search."""
-ROUNDS = 3
-"""Most times that effects are taken out, by what is plausible or by takes kept back."""
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 
@@ -183,7 +179,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     robot, rejected = _searched(Rollouts(evaluator, nominal, regions, tuple(start(r.numbers) for r in regions)), shared, felt,
                                 options, progress)
     rollouts, found, rejected = robot.rollouts, robot.found, [*refuted, *rejected]
-    for _ in range(ROUNDS):
+    for _ in range(NUMERICS.rounds):
         said = [at_their_end(f.best.hypothesis, felt) for f in found]
         if not any(said):
             progress("takes kept back", None)
@@ -198,7 +194,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
     finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
-    fine = replace(rollouts, evaluator=whole, regions=entire, step=FINE)
+    fine = replace(rollouts, evaluator=whole, regions=entire, step=NUMERICS.fine)
     last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
     fine = standing(fine, found)
@@ -215,7 +211,7 @@ def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Can
               progress: Progress) -> tuple[RobotFound, list[Rejected]]:
     """Joints and robot searched; again where an effect of the whole robot went as far as is plausible."""
     rejected: list[Rejected] = []
-    for _ in range(ROUNDS):
+    for _ in range(NUMERICS.rounds):
         robot = search_robot(rollouts, names, options, progress)
         gone = at_their_end(robot.together.shared, felt)
         if not gone:

@@ -11,18 +11,12 @@ from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
-CLOSE = 1e-6
-"""Distance of two points that are one, in standard deviations of the prior or typical sizes."""
-LAST, GAIN = 2, 0.1
-"""Steps at the end of a fit, at most, as long as each is predicted to gain so much [nats]."""
-SINGULAR = 1e-3
-"""Ways in which points lie by less than this share of their widest tell no slope."""
 Asks = Generator[list[Hypothesis], list[Array], T]
 """Yields hypotheses to be rolled out, is sent the residuals (n,) [rad] that each leaves."""
 
@@ -93,10 +87,10 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
     _, left = seen[there.theta.tobytes()]
     J = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if J is None else J
     J = _slopes(there.theta, left, list(seen.values()), J, options.stride)
-    for _ in range(LAST):  # least squares settle by shares of what is left, evidence by nats
+    for _ in range(NUMERICS.last):  # least squares settle by shares of what is left, evidence by nats
         further = there.at(np.clip(there.theta + gauss_newton(region, options, there, left, J, s), low, high))
         predicted = left + J @ (further.theta - there.theta)
-        if _log(region, options, further, predicted, s) < _log(region, options, there, left, s) + GAIN:
+        if _log(region, options, further, predicted, s) < _log(region, options, there, left, s) + NUMERICS.gain:
             break
         (r,) = yield [further]
         seen[further.theta.tobytes()] = further.theta, r
@@ -122,13 +116,13 @@ def _slopes(theta: Array, r: Array, seen: Sequence[tuple[Array, Array]], roughly
     """Slopes of r (n,) by theta (k,) from what was seen about there; where that tells nothing they stay as they are `roughly`
     (n, k). What is `stride` away counts most: stick and slip answer shorter steps with noise, and longer ones are bent."""
     away = [(float(np.linalg.norm(x - theta)), x, left) for x, left in seen]
-    away = [a for a in away if a[0] > CLOSE]
+    away = [a for a in away if a[0] > NUMERICS.same]
     if not away:
         return roughly
     weight = np.array([min(far / stride, stride / far) / far for far, _, _ in away])[:, None]
     moved = np.array([x - theta for _, x, _ in away])
     missed = np.array([left - r for _, _, left in away]) - moved @ roughly.T
-    return roughly + np.asarray(np.linalg.lstsq(weight * moved, weight * missed, rcond=SINGULAR)[0].T, dtype=float)
+    return roughly + np.asarray(np.linalg.lstsq(weight * moved, weight * missed, rcond=NUMERICS.singular)[0].T, dtype=float)
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
+from workbench.identify.evidence.options import NUMERICS
+
 Array = NDArray[np.float64]
-CLOSE = 0.02
-"""Share to which the discrepancy's size is found: a hundred samples tell it to a twentieth."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,8 @@ class Likelihood:
     def _largest(self, value: Callable[[float], float]) -> tuple[float, float]:
         """The most that a function of the discrepancy comes to, and where."""
         ends = (float(np.log(self.between[0])), float(np.log(self.between[1])))
-        found = minimize_scalar(lambda x: -value(float(np.exp(x))), bounds=ends, method="bounded", options={"xatol": CLOSE})
+        found = minimize_scalar(lambda x: -value(float(np.exp(x))), bounds=ends, method="bounded",
+                                options={"xatol": NUMERICS.settled})
         return -float(found.fun), float(np.exp(found.x))
 
 

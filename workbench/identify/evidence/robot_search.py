@@ -10,17 +10,11 @@ import numpy as np
 from workbench.identify.evidence.fit import Fitted, judged
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.linearise import linearised
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import Found, Report, begun, gone_on, lockstep, search, searched, standing
 from workbench.identify.parameters import Candidate
-
-MOST = 3
-"""Effects of the whole robot, and rounds in which they are looked for beside what the joints were found to have."""
-FIRST = 0.5
-"""Share of what the best effects of all joints explain from which one of the whole robot goes first: which of both it is, is seen
-when each was searched to its end."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate
     by_joints = sum(max(0.0, moves[k][0].gain) if moves[k] else 0.0 for k in range(len(found)))
     added = whole.predicted(alone)
     fit = whole.fitted(added) if added is not None and added.log_posterior > alone.log_posterior else None
-    if fit is None or fit.log_posterior <= alone.log_posterior + FIRST * by_joints:
+    if fit is None or fit.log_posterior <= alone.log_posterior + NUMERICS.first * by_joints:
         return rollouts, tuple(found)
     return _beside(rollouts, [replace(f, fits={}) for f in found], fit)
 
@@ -82,12 +76,12 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
                 report: Report) -> RobotFound:
     """Joints searched, and effects of the whole robot added as long as they pay."""
     rollouts, found = searched(rollouts, found, step, options, report)
-    for _ in range(MOST):
+    for _ in range(NUMERICS.rounds):
         whole = Whole(rollouts, tuple(names), options)
         now = whole.fitted(whole.begun([f.best for f in found]))
         rollouts, found = _beside(rollouts, found, now)
         report("effects of the whole robot", None)
-        more = whole.predicted(now) if len(now.shared.effects) < MOST else None
+        more = whole.predicted(now) if len(now.shared.effects) < NUMERICS.rounds else None
         if more is None or more.log_posterior <= now.log_posterior:
             break
         more = whole.fitted(more)

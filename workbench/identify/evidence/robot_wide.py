@@ -18,16 +18,12 @@ from numpy.typing import NDArray
 from workbench.identify.evidence.fit import Fitted, judged
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.linearise import Probe, led_after, on_lines, points, ways
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
-SHARES = (1.0, 0.5, 0.25)
-"""Of a step that are tried."""
-CLOSE = 0.1
-"""Gain of a step [nats] below which a fit ends."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +111,12 @@ class Whole:
         for _ in range(self.options.iterations):
             (left,) = self.rollouts.everywhere([(at.shared, [f.hypothesis for f in at.fits])])
             at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], left)
-            tried = [self._step(at, share) for share in SHARES]
+            tried = [self._step(at, share) for share in NUMERICS.shares]
             answers = self.rollouts.everywhere(tried)
             now = self._objective(at, at.shared, [f.hypothesis for f in at.fits], left)
             values = [self._objective(at, shared, each, r) for (shared, each), r in zip(tried, answers)]
             best = int(np.argmax(values))
-            if values[best] < now + CLOSE:
+            if values[best] < now + NUMERICS.gain:
                 break
             at = self._rolled_out(at, *tried[best], answers[best])
         return at
