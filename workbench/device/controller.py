@@ -18,6 +18,7 @@ from workbench.device.link import (
     Message,
     StateMessage,
     frame,
+    log_bytes,
     message,
     upload_frames,
 )
@@ -34,6 +35,10 @@ REST = 1.0
 KEPT = 0.9
 """How much of that the joint log keeps [s]."""
 BYTE = 10 / 57_600
+FIRST_POSE = 0.004
+"""From where it says that it plays to the first pose's packet [s]: POSE_GUARD_MS of its program."""
+BUS_BYTE = 1e-5
+"""On the servos' bus [s]. A pose counts from its packet's end, as servos act then."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +103,7 @@ class Controller:
             raise BusError(f"the table is refused: {answer.result}")
 
     def play(self, seconds: float, stop: Callable[[], str], progress: Callable[[str, float | None], None]) -> tuple[float, str]:
-        """Plays for so long; the time of its first pose on its own clock [s], and why it ended early."""
+        """Plays for so long; the time at which it began on its own clock [s], and why it ended early."""
         self._wait(lambda m: False, REST)
         self._send(frame(FrameType.PLAY))
         began = self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.PLAY, ANSWER)
@@ -125,7 +130,7 @@ class Controller:
     def clock_offset(self) -> float:
         """The computer's clock less the controller's [s]: the soonest arrival of a round, less what its bytes take."""
         rounds = [(t, m) for t, m in self.heard if isinstance(m, LogMessage)]
-        return min(t - m.time - m.duration - (25 + 4 * len(m.goals)) * BYTE for t, m in rounds)
+        return min(t - m.time - m.duration - log_bytes(len(m.goals)) * BYTE for t, m in rounds)
 
     def _send(self, data: bytes) -> None:
         try:
@@ -165,7 +170,8 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
     controller.to_neutral()
     tell("uploading", None)
     controller.upload(table)
-    first, stopped = controller.play(seconds, stop, tell)
+    began, stopped = controller.play(seconds, stop, tell)
+    first = began + FIRST_POSE + (8 + 5 * len(table.table.joints)) * BUS_BYTE
     tell("back to neutral", None)
     controller.release()
     rounds = [m for _, m in controller.heard if isinstance(m, LogMessage) and first - KEPT <= m.time <= first + seconds]

@@ -202,6 +202,11 @@ def _answer(got: Frame) -> AnswerMessage:
     return AnswerMessage(kind, got.number, result, received, code == 0)
 
 
+def log_bytes(joints: int) -> int:
+    """Of a whole LOG frame."""
+    return len(frame(FrameType.LOG, bytes(_LOG.size + 4 * joints + 3 * _SLOW.size)))
+
+
 def _log(got: Frame) -> LogMessage:
     """The number of a log frame is that of its joints."""
     n = got.number

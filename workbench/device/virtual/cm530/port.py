@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 
 from dynamixel_sdk import PortHandler
@@ -18,7 +19,8 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     def __init__(self, board: Board, rate: int = 57_600) -> None:
         super().__init__("virtual CM-530")
         self.board = board
-        self._read = len(board.pc.received)
+        self._read = 0
+        self.clearPort()
         self.setupPort(rate)
 
     def setupPort(self, cflag_baud: int) -> bool:
@@ -38,7 +40,7 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
 
     def clearPort(self) -> None:
         """Forgets what came in."""
-        self._read = len(self.board.pc.received)
+        self._read += self.getBytesAvailable()
 
     def writePort(self, packet: Sequence[int]) -> int:
         """Sends; time goes on until it is out, as it would with a port that waits."""
@@ -50,13 +52,14 @@ class PcLinkPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
         """What is there; where nothing is, half a millisecond goes by."""
         if self.getBytesAvailable() == 0:
             self.board.run(self.board.clock.now + MILLISECOND // 2)
-        data = bytes(self.board.pc.received[self._read:self._read + max(length, 0)])
+        length = min(max(length, 0), self.getBytesAvailable())
+        data = bytes(self.board.pc.received[self._read:self._read + length])
         self._read += len(data)
         return data
 
     def getBytesAvailable(self) -> int:
-        """How many bytes wait."""
-        return len(self.board.pc.received) - self._read
+        """How many bytes wait: those whose stop bit is over."""
+        return bisect_right(self.board.pc.times, self.board.clock.now) - self._read
 
     def getCurrentTime(self) -> float:
         """Virtual milliseconds."""
