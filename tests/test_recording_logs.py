@@ -264,6 +264,20 @@ def test_a_count_shows_where_values_stay_though_rows_lie_between(tmp_path, model
     assert channel_names(SimpleNamespace(recorded=take, model=model)) == joints  # its base is nowhere told
 
 
+def test_joints_that_rest_at_few_places_tell_their_count_together(tmp_path, model):
+    """Of a motion of some poses, on a clock of its own: what lies between two counts is no finer sensor."""
+    count, rng = np.radians(300 / 1023), np.random.default_rng(2)
+    time = np.arange(0.0, 3.9, 0.02) + 0.007
+    channels = {}
+    for joint in model.joints[:6]:
+        read = np.repeat(rng.integers(-40, 40, 5), 40) * count
+        read[::40] -= 0.5 * np.diff(read, prepend=0.0)[::40] // count * count  # on the way
+        channels |= {f"goal.{joint}": 0 * time, f"position.{joint}": np.interp(time, np.arange(200) * 0.02, read)}
+    measurement = register(read_recording(write_joint_log(tmp_path / "log.csv", time - time[0], channels)), model, None)
+    for joint in model.joints[:6]:
+        assert measurement.noise[joint] > 0.99 * count / np.sqrt(12)
+
+
 def test_a_joint_that_never_moves_has_the_noise_of_its_kinds_count(tmp_path, model):
     """What its servo would have told: 0 would make a gap of any number."""
     count = 2 * np.pi / 4096

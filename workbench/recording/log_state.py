@@ -33,11 +33,16 @@ def resolution(values: Array) -> float:
     return float(steps.min()) if len(steps) else 0.0
 
 
+def staying(values: Array) -> Array:
+    """Those of values (N,) that the next row has, too: whole counts, whatever lies between them on a log's own clock."""
+    values = values[np.isfinite(values)]
+    return values[:-1][np.diff(values) == 0]
+
+
 def count_that_stays(values: Array) -> float:
     """One count of what measured values (N,), told by those that stay for two rows: a log on a clock of its own may hold, where
     values change, what lies between two counts. NaN where few stay."""
-    values = values[np.isfinite(values)]
-    steps = np.diff(np.unique(values[:-1][np.diff(values) == 0]))
+    steps = np.diff(np.unique(staying(values)))
     steps = steps[steps > _ROUNDED]
     return float(steps.min()) if len(steps) >= _FEW_STEPS else float("nan")
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.joint_names import named_by_model
-from workbench.recording.log_state import count_that_stays, first_command, resolution
+from workbench.recording.log_state import count_of, count_that_stays, first_command, resolution, staying
 from workbench.recording.mocap.angles import Angles, joint_angles
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.pivots import base_origin, find_pivots
@@ -69,10 +69,14 @@ def _register_log(recording: Recording, model: RobotModel, starts_at: float | No
     positions = {j: recording.channels[f"position.{j}"] for j in model.joints if f"position.{j}" in recording.channels}
     counts: dict[str, float] = {}  # servos of one kind count alike
     steps: dict[str, float] = {}  # for those that never move, and so tell no count of theirs
+    rests: dict[str, list[Array]] = {}  # for those that rest at few places
     for joint, position in positions.items():
         kind = model.servo(joint).model
         counts[kind] = float(np.fmin(counts.get(kind, np.nan), count_that_stays(position)))
         steps[kind] = min(steps.get(kind, np.inf), resolution(position) or np.inf)
+        rests.setdefault(kind, []).append(staying(position))
+    for kind, values in rests.items():
+        counts[kind] = float(np.fmax(counts[kind], count_of(np.concatenate(values))))
     noise = {}
     for joint, position in positions.items():
         still = noise_at_rest(position[:, None], np.zeros(len(position), dtype=bool))[0]
