@@ -81,13 +81,38 @@ def test_what_a_joint_passed_elsewhere_is_no_stop(quiet):
     assert read_off_candidates(quiet[0], evidence, residuals) == []
 
 
+def knee(said, seen, base="free"):
+    """A take of one joint: angles [deg] of the model and as they were seen."""
+    take, s = SimpleNamespace(spec=SimpleNamespace(base=base)), np.array([1e-3])
+    e = SimpleNamespace(joints=("knee",), recorded=np.deg2rad(seen)[:, None], sigma=s, zero=lambda joint: 0.0, take=take)
+    return e, (e.recorded - np.deg2rad(said)[:, None]) / s
+
+
+def knee_stops(*takes):
+    return stops(known_effects()["joint_stop"], "knee", [e for e, _ in takes], dict(enumerate(r for _, r in takes)))
+
+
 @pytest.mark.parametrize(("stop", "asked"), [(np.inf, 0), (34.0, 1)], ids=["it turns there", "it stands there"])
 def test_a_peak_of_few_frames_is_no_stop(stop, asked):
     peak = np.concatenate([np.arange(30, 40, 2.0), np.arange(40, 28, -2.0)])
-    said = np.deg2rad(np.concatenate([np.zeros(2000), peak, np.zeros(2000)]))[:, None]
-    seen = np.minimum(said, np.deg2rad(stop)) + np.deg2rad(0.05)
-    e = SimpleNamespace(joints=("knee",), recorded=seen, sigma=np.array([1e-3]), zero=lambda joint: 0.0)
-    assert len(stops(known_effects()["joint_stop"], "knee", [e], {0: (seen - said) / e.sigma})) == asked
+    said = np.concatenate([np.zeros(2000), peak, np.zeros(2000)])
+    assert len(knee_stops(knee(said, np.minimum(said, stop) + 0.05))) == asked
+
+
+SWING = 30.0 * np.sin(np.linspace(0.0, 40.0, 2000))
+
+
+@pytest.mark.parametrize(("base", "further", "asked"), [("free", 0.3, 1), ("free", 0.9, 0), ("fixed", 0.9, 1), ("fixed", 1.8, 0)])
+def test_a_stop_is_refuted_by_a_take_that_went_past_it_by_more_than_takes_differ_by(base, further, asked):
+    """Takes of another base may be zeroed otherwise."""
+    walk, other = knee(SWING, np.minimum(SWING, 20.0)), np.minimum(SWING, 20.0 + further)
+    assert len(knee_stops(walk, knee(other, other, base))) == asked
+
+
+def test_no_fit_moves_a_stop_to_where_recordings_went_past_it():
+    (found,) = knee_stops(knee(SWING, np.minimum(SWING, 20.0)))
+    lowest = min(found.values(x)[1] for x in found.bounds())
+    assert 20.0 - np.rad2deg(READ_OFF.at_stop) - 0.05 < lowest < 20.0
 
 
 @pytest.mark.parametrize("upper", [18.0, 1.0])

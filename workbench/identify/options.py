@@ -102,9 +102,8 @@ class ReadOffOptions:
     least_cut: float = math.radians(1.5)
     """A stop is a candidate where the model goes this much further than the recording ever does [rad]."""
     at_stop: float = math.radians(0.6)
-    """And where the recording stands this close to its end whenever the model is beyond it [rad]."""
-    furthest_stop: float = 2.0
-    """Times what was cut off, that a stop may have cut off: it was read off."""
+    """And where the recording stands this close to its end whenever the model is beyond it [rad]. What a take that is zeroed
+    alike passes by more is no stop: noise of five frames is a tenth of that, a stop of the second engine gave by 0.4 deg."""
     least_asset_turn: float = math.radians(0.3)
     """A marker frame is a candidate that is turned by more than this at rest [rad]."""
     most_dropped: float = 0.6

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,43 +32,70 @@ def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], res
     return out + [c for turned in estimated_by("turn of an asset at rest") for c in _frames(turned, model, evidence)]
 
 
+@dataclass(frozen=True)
+class _Travel:
+    """Where a take's joint ended on one side, counted as positive from its servo's centre [rad]. base: of the take; reach: how far
+    the model went while the joint stood there; None: it did not stand at an end."""
+
+    base: str
+    end: float
+    reach: float | None
+
+
+@dataclass(frozen=True)
+class _Stop:
+    """Counted likewise [rad]. end: where the recordings say it is; reach: how far the model went; passed: below this it cannot be,
+    as some take went further."""
+
+    end: float
+    reach: float
+    passed: float
+
+
 def stops(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
-    """A stop at either side where the recording stands at its end while the model goes on."""
-    ends: dict[int, list[tuple[float, float]]] = {1: [], -1: []}
-    went: dict[int, float] = {1: -np.inf, -1: -np.inf}
-    for i, e in enumerate(evidence):
-        if joint not in e.joints:
-            continue
-        column = e.joints.index(joint)
-        seen = e.recorded[:, column]
-        said = seen - residuals[i][:, column] * e.sigma[column]
-        rest = e.zero(joint)
-        for side in ends:
-            mean = smoothed(seen[:, None], 5)[:, 0] / np.sqrt(5) * side
-            good = np.isfinite(mean) & np.isfinite(said)
-            if good.sum() < 20:
-                continue
-            end = float(np.quantile(mean[good], 0.995))
-            went[side] = max(went[side], end + rest * side)
-            beyond = good & (said * side > end + READ_OFF.least_cut / 3)
-            if float(np.max(said[good] * side)) - end > READ_OFF.least_cut and beyond.sum() > 5 \
-                    and float(np.median(end - mean[beyond])) < READ_OFF.at_stop \
-                    and float(np.nanmax(((said - seen) * side)[beyond])) > READ_OFF.least_cut:
-                ends[side].append((end + rest * side, float(np.max(said[good] * side)) + rest * side))
-    found = {side: (min(e for e, _ in limits), max(m for _, m in limits)) for side, limits in ends.items() if limits}
-    # what it passed is no stop
-    found = {side: limits for side, limits in found.items() if went[side] - limits[0] < READ_OFF.least_cut}
+    """A stop at either side where the recording stands at its end while the model goes on, and that no take passed."""
+    travels = {side: [t for i, e in enumerate(evidence) if joint in e.joints
+                      for t in _travel(e, e.joints.index(joint), residuals[i], side)] for side in (1, -1)}
+    met = {side: _stop_met(of) for side, of in travels.items()}
+    found = {side: s for side, s in met.items() if s is not None}
     if not found:
         return []
     far = [stop.parameters[0].low, stop.parameters[1].high]
     neutral, typical, fixed = list(far), list(far), [True, True]
-    for side, (end, reach) in found.items():
+    for side, s in found.items():
         k = 1 if side > 0 else 0
-        neutral[k], typical[k], fixed[k] = float(np.rad2deg(reach)) * side, float(np.rad2deg(end)) * side, False
+        neutral[k], typical[k], fixed[k] = float(np.rad2deg(s.reach)) * side, float(np.rad2deg(s.end)) * side, False
     # its ends do not change sides
-    apart = sum(found[side][1] if side in found else went[side] for side in ends) / len(found)
-    furthest = min(apart - READ_OFF.least_cut, READ_OFF.furthest_stop * max(reach - end for end, reach in found.values()))
+    apart = sum(found[side].reach if side in found else max(t.end for t in travels[side]) for side in travels) / len(found)
+    furthest = min(apart - READ_OFF.least_cut, max(s.reach - s.passed for s in found.values()))
     return [replace(Candidate.of(stop, (joint,), neutral, typical, fixed), reach=float(np.rad2deg(furthest)))]
+
+
+def _travel(e: TakeEvidence, column: int, residual: Array, side: int) -> list[_Travel]:
+    """Of the joint in this column; none where it was hardly seen."""
+    seen = e.recorded[:, column]
+    said = seen - residual[:, column] * e.sigma[column]
+    mean = smoothed(seen[:, None], 5)[:, 0] / np.sqrt(5) * side
+    good = np.isfinite(mean) & np.isfinite(said)
+    if good.sum() < 20:
+        return []
+    rest = e.zero(e.joints[column]) * side
+    end, reach = float(np.quantile(mean[good], 0.995)), float(np.max(said[good] * side))
+    beyond = good & (said * side > end + READ_OFF.least_cut / 3)
+    stands = (reach - end > READ_OFF.least_cut and beyond.sum() > 5 and float(np.median(end - mean[beyond])) < READ_OFF.at_stop
+              and float(np.nanmax(((said - seen) * side)[beyond])) > READ_OFF.least_cut)
+    return [_Travel(e.take.spec.base, end + rest, reach + rest if stands else None)]
+
+
+def _stop_met(travels: Sequence[_Travel]) -> _Stop | None:
+    """Where some takes stood at an end that all others keep to. Takes of one base are zeroed alike, so that they differ by noise and
+    by how hard the stop was met; between bases the model's droop may be wrong, too."""
+    met = [t for t in travels if t.reach is not None]
+    if not met:
+        return None
+    end, alike = min(t.end for t in met), {t.base for t in met}
+    passed = max(t.end - (READ_OFF.at_stop if t.base in alike else READ_OFF.least_cut) for t in travels)
+    return None if passed > end else _Stop(end, max(t.reach for t in met if t.reach is not None), passed)
 
 
 def _mount(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
