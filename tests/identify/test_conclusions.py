@@ -67,6 +67,19 @@ def test_places_that_the_data_cannot_tell_apart_are_named_together_and_other_eff
     assert lost == {("zero_offset", ("knee",)), ("link_length", ("hip",))}
 
 
+def test_a_family_is_as_sure_as_those_of_its_members_together_that_could_act_there():
+    def candidate(name, *where):
+        return Candidate.of(known_effects()[name], where, known_effects()[name].neutral(SimpleNamespace()))
+
+    x = np.ones(1)
+    fit = Fit((candidate("coulomb_friction", "knee"),), x, np.eye(1), dict.fromkeys(("fit", "choose", "validate"), 0.0), FRAME)
+    others = (("load_friction", "knee", 0.3), ("backlash", "knee", 0.1), ("viscous_friction", "hip", 0.05))
+    rivals = [Rival(candidate(name, joint), x, 1.0, p, fit) for name, joint, p in others]
+    told = finding(SEEN, fit, 0, NamePosterior(0.5, tuple(rivals)), FRAME, FRAME)
+    assert told.family is not None
+    assert (told.family.name, told.family.confidence) == ("friction", pytest.approx(0.8))
+
+
 def test_a_name_that_is_less_likely_than_not_explains_nothing():
     def named(confidence, *ties):
         change = Change(1.0, 0.1, "deg")

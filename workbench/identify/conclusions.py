@@ -15,7 +15,16 @@ from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
 from workbench.identify.problem import TakeEvidence, joint_error, ratios
-from workbench.identify.results.findings import Alternative, Change, Estimate, Finding, Rejected, Unexplained, Verdict
+from workbench.identify.results.findings import (
+    Alternative,
+    Change,
+    Estimate,
+    FamilyBelief,
+    Finding,
+    Rejected,
+    Unexplained,
+    Verdict,
+)
 from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
 from workbench.identify.results.ties import Tie
 from workbench.identify.selection.candidate_fit import CandidateFit
@@ -62,10 +71,22 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NameP
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
     numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
+    confidence = posterior.probability + sum(r.probability for r in elsewhere)
+    others = [r for r in posterior.rivals if r not in elsewhere]
     return Finding(
-        effect=c.name, where=where, confidence=posterior.probability + sum(r.probability for r in elsewhere), parameters=numbers,
+        effect=c.name, where=where, confidence=confidence, parameters=numbers,
         alternatives=alternatives, fit=change(evidence, where, before, after, "fit"),
-        validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)))
+        validation=change(evidence, where, before, after, "validate"), evidence=c.effect.sentence(c.spec(x)),
+        family=_family(c, confidence, others))
+
+
+def _family(c: Candidate, confidence: float, others: Sequence[Rival]) -> FamilyBelief | None:
+    """An effect's family, if it has one, with what rivals of the same family at its place, or of the whole robot, add."""
+    family = c.effect.family
+    if family is None:
+        return None
+    alike = (r.probability for r in others if r.candidate.effect.family == family and r.candidate.where in (c.where, ()))
+    return FamilyBelief(family, confidence + sum(alike))
 
 
 def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:

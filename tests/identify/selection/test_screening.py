@@ -356,9 +356,11 @@ def test_what_begins_at_some_load_is_looked_at_between(name, walking, sizes):
 
 @pytest.mark.parametrize(("name", "walking", "no_fixed_base", "sizes"), [
     ("coulomb_friction", False, False, FIT.scanned), ("coulomb_friction", True, False, FIT.scanned[:1]),
-    ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground)])
-def test_where_walks_are_all_there_is_joints_are_looked_at_far_too(name, walking, no_fixed_base, sizes):
-    """Of a hip's friction six times the typical one nothing was predicted at once its size, and more of a wrong name."""
+    ("coulomb_friction", True, True, FIT.scanned), ("ground_friction", True, True, FIT.scanned_ground),
+    ("load_friction", True, False, FIT.scanned)])
+def test_where_walks_are_all_that_tells_joints_are_looked_at_far_too(name, walking, no_fixed_base, sizes):
+    """Of a hip's friction six times the typical one nothing was predicted at once its size, and more of a wrong name; a stand
+    bounds no friction that grows with load."""
     effect = known_effects()[name]
     where = ("one",) if effect.places == ("joint",) else ()
     assert scan_sizes(Candidate.of(effect, where, (0.6,)), walking, no_fixed_base) == sizes

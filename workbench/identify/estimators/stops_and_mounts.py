@@ -34,8 +34,8 @@ def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], res
 
 @dataclass(frozen=True)
 class _Travel:
-    """Where a take's joint ended on one side, counted as positive from its servo's centre [rad]. base: of the take; reach: how far
-    the model went while the joint stood there; None: it did not stand at an end."""
+    """Where a take's joint ended on one side, counted as positive from its servo's centre [rad]. base: of the take; reach: how
+    far the model went while the joint stood there; None: it did not stand at an end."""
 
     base: str
     end: float
@@ -44,8 +44,8 @@ class _Travel:
 
 @dataclass(frozen=True)
 class _Stop:
-    """Counted likewise [rad]. end: where the recordings say it is; reach: how far the model went; passed: below this it cannot be,
-    as some take went further."""
+    """Counted likewise [rad]. end: where the recordings say it is; reach: how far the model went; passed: below this it cannot
+    be, as some take went further."""
 
     end: float
     reach: float
@@ -88,8 +88,8 @@ def _travel(e: TakeEvidence, column: int, residual: Array, side: int) -> list[_T
 
 
 def _stop_met(travels: Sequence[_Travel]) -> _Stop | None:
-    """Where some takes stood at an end that all others keep to. Takes of one base are zeroed alike, so that they differ by noise and
-    by how hard the stop was met; between bases the model's droop may be wrong, too."""
+    """Where some takes stood at an end that all others keep to. Takes of one base are zeroed alike, so that they differ by noise
+    and by how hard the stop was met; between bases the model's droop may be wrong, too."""
     met = [t for t in travels if t.reach is not None]
     if not met:
         return None

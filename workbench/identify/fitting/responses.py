@@ -26,10 +26,11 @@ ResponseBank = dict[tuple[object, ...], Response]
 
 
 def scan_sizes(c: Candidate, walking: bool, no_fixed_base: bool) -> tuple[float, ...]:
-    """Of the above, for an effect. unheld: whether no take had a fixed base, where joints show what they lack, however much."""
+    """In typical ones, for an effect. no_fixed_base: whether no take had one, where joints show what they lack, however much;
+    what shows under load alone may be large on a walk even so."""
     if walking and c.effect.layer == "ground":
         return FIT.scanned_ground
-    return FIT.scanned[:1] if walking and not no_fixed_base else FIT.scanned
+    return FIT.scanned if not walking or no_fixed_base or c.effect.under_load else FIT.scanned[:1]
 
 
 def scan(c: Candidate, sizes: Sequence[float], walking: bool) -> list[Array]:
