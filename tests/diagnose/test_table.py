@@ -57,6 +57,8 @@ SLOW = {
     "a walk on a slippery floor": one("ground_friction", (), cycles=WALK, friction=0.2),
     "a walk on a tilted floor": one("ground_tilt", (), "tether_force", cycles=WALK, forward=3.0, left=0.0),
     "a stand and a walk with play": one("backlash", ("flm",), cycles={"stand": 1, "walk": 8}, gap=4.0),
+    "a stand and a walk with a hip that rubs under load": one("load_friction", ("blm",), cycles={"stand": 1, "walk": 8},
+                                                              coefficient=0.6),
 }
 
 

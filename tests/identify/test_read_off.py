@@ -8,11 +8,13 @@ import pytest
 
 from tests.gap_sessions import record_arm
 from tests.gap_worn import CONFIG
+from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
 from workbench.effects.registry import known_effects
 from workbench.effects.schedules import without_poses
+from workbench.identify.conclusions import estimates
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.estimators.dropped_commands import (
     DroppedCommands,
@@ -22,7 +24,7 @@ from workbench.identify.estimators.dropped_commands import (
     with_dropped_commands,
 )
 from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, played_without, suspects
-from workbench.identify.estimators.stops_and_mounts import read_off_candidates, stops
+from workbench.identify.estimators.stops_and_mounts import mounts, read_off_candidates, stops
 from workbench.identify.fitting.fits import Search
 from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate, with_effects
@@ -137,6 +139,33 @@ def test_a_loose_mount_is_read_off_with_its_axis(quiet):
     ]
     assert [c.where for c in found] == [("two",)]
     assert np.abs(found[0].values(np.ones(1))[1:]) == pytest.approx([1, 0, 0], abs=0.04)
+
+
+def rocking(nominal, *centres):
+    """The loose mount that is read off an arm that rocks by 6 deg across its joint two, in takes zeroed at such places [deg]."""
+    axis = nominal.kinematics.frames["two"].axis_of_parent
+    across = "xyz"[int(np.argmin(np.abs(axis)))]
+    channels = ("two", *(f"two{ACROSS}{a}" for a in "xyz" if abs(axis["xyz".index(a)]) < 0.5))
+    rng, takes, residuals = np.random.default_rng(0), [], {}
+    for i, centre in enumerate(centres):
+        angles = np.zeros((800, 3))
+        angles[:, channels.index(f"two{ACROSS}{across}")] = centre + np.clip(6 * np.sin(np.arange(800) / 30), -3, 3)
+        angles = np.deg2rad(angles + rng.normal(0, 0.17, angles.shape))
+        sigma = np.full(3, np.deg2rad(0.17))
+        takes.append(SimpleNamespace(channels=channels, recorded=angles, sigma=sigma))
+        residuals[i] = angles / sigma
+    ill = [dict.fromkeys(channels[1:], 5.0)] * len(centres)
+    return mounts(known_effects()["loose_mount"], "two", nominal, takes, residuals, ill)[0]
+
+
+@pytest.mark.parametrize("centres", [(0.0,), (-3.0, 3.0)], ids=["one take", "takes zeroed at either end"])
+def test_a_loose_mount_has_the_play_by_which_cameras_saw_it_rock(quiet, centres):
+    found = rocking(quiet[0], *centres)
+    assert found.size == 0
+    assert found.values(np.empty(0))[0] == pytest.approx(6.0, abs=0.25)
+    told = estimates(found, np.empty(0), np.empty((0, 0)))
+    assert told["play"].low < 6.0 < told["play"].high
+    assert told["axis"].low == (-np.inf,) * 3
 
 
 def test_missed_poses_are_read_off_and_what_was_missed_is_played_so(quiet):

@@ -113,6 +113,9 @@ def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
     else:
         unknown[[k for k, fixed in enumerate(c.fixed) if not fixed]] = np.isinf(half)
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    if c.spread:
+        low, high = values - CONCLUSIONS.z90 * np.array(c.spread), values + CONCLUSIONS.z90 * np.array(c.spread)
+        unknown = np.array(c.spread) == 0
     neutral = np.array([n if np.isfinite(n) and not p.shapes else 0.0 for n, p in zip(c.neutral, c.parameters)])
     least = CONCLUSIONS.z90 * np.maximum(
         CONCLUSIONS.least_relative * np.abs(values - neutral), [p.resolution for p in c.parameters]
@@ -232,6 +235,10 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     covariance = slopes @ inner @ slopes.T
     lost = np.any(slopes[:, ~known] != 0, axis=1) | ~np.any(slopes != 0, axis=1)
     covariance[lost] = covariance[:, lost] = np.inf
+    spread = np.concatenate([np.empty(0), *(c.spread or np.zeros(len(c.neutral)) for c in fit.effects)])
+    for k in np.flatnonzero(spread):
+        covariance[k] = covariance[:, k] = 0.0
+        covariance[k, k] = spread[k] ** 2
     for r in read_off:
         names += list(parameter_names([r.spec]))
         mean = np.append(mean, r.mean)

@@ -221,7 +221,10 @@ def _left_by(
 ) -> tuple[Residuals, Residuals]:
     """Residuals and numerical floors of the fitted model on whole takes, those too that the search did not look at."""
     if not any(np.isfinite(e.until) for e in looked_at):
-        return explained.fit.residuals, explained.floors
+        if all(e.rough is seen.rough for e, seen in zip(evaluator.evidence, explained.search.evaluator.evidence)):
+            return explained.fit.residuals, explained.floors
+        # what the search left to chance is left, nevertheless
+        return evaluator.residuals([RolloutRequest(fitted, tuple(range(len(looked_at))), PROBLEM.fine)])[0], explained.floors
     progress("rolling out whole takes", None)
     after = evaluator.residuals([RolloutRequest(fitted, tuple(range(len(evaluator.evidence))))])[0]
     return after, floors_everywhere(looked_at, explained.floors)

@@ -104,6 +104,10 @@ class ReadOffOptions:
     at_stop: float = math.radians(0.6)
     """And where the recording stands this close to its end whenever the model is beyond it [rad]. What a take that is zeroed
     alike passes by more is no stop: noise of five frames is a tenth of that, a stop of the second engine gave by 0.4 deg."""
+    rare: float = 0.02
+    rocking_noise: float = 2.0
+    """Share of frames at either end that how far a link rocks is told without; and standard deviations of noise that are then
+    taken off: in seven sessions of the second engine that is its play, to 3 % and to 1.2 standard deviations of noise."""
     least_asset_turn: float = math.radians(0.3)
     """A marker frame is a candidate that is turned by more than this at rest [rad]."""
     most_dropped: float = 0.6

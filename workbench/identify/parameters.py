@@ -24,8 +24,9 @@ class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
-    that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there; numbers
-    of others are none of its numbers."""
+    that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
+    numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the contract's
+    units, by number; empty: they are not told."""
 
     effect: Effect
     where: tuple[str, ...]
@@ -34,6 +35,7 @@ class Candidate:
     fixed: tuple[bool, ...]
     reach: float = math.inf
     options: tuple[str, ...] = ()
+    spread: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, effect: Effect, where: tuple[str, ...], neutral: Sequence[float], typical: Sequence[float] | None = None,

@@ -28,7 +28,7 @@ def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], res
         for stop in estimated_by("end of travel"):
             out += stops(stop, joint, evidence, residuals)
         for mount in estimated_by("play across the axis"):
-            out += _mount(mount, joint, model, evidence, residuals, ill)
+            out += mounts(mount, joint, model, evidence, residuals, ill)
     return out + [c for turned in estimated_by("turn of an asset at rest") for c in _frames(turned, model, evidence)]
 
 
@@ -98,10 +98,10 @@ def _stop_met(travels: Sequence[_Travel]) -> _Stop | None:
     return None if passed > end else _Stop(end, max(t.reach for t in met if t.reach is not None), passed)
 
 
-def _mount(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
+def mounts(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array],
            ill: Sequence[Mapping[str, float]]) -> list[Candidate]:
-    """A loose mount where the link turns across its servo's axis: about the link's axis along which it does so most, as far as
-    that."""
+    """A loose mount where the link turns across its servo's axis: about the link's axis along which it does so most, by as
+    far as cameras see it rock in a take: when it does is chance, so that a fit would tell too little."""
     rows, sigma = [], 1.0
     tree = model.kinematics
     neutral, frame = tree.forward(np.zeros((1, len(tree.joints)))), tree.frames[joint]
@@ -120,11 +120,13 @@ def _mount(mount: Effect, joint: str, model: RobotModel, evidence: Sequence[Take
         return []
     off = np.vstack(rows)
     axis = np.linalg.svd(off - off.mean(axis=0), full_matrices=False)[2][0]
-    along = (off - off.mean(axis=0)) @ axis
-    play = float(np.rad2deg(max(np.ptp(np.quantile(along, [0.05, 0.95])) - 2 * sigma, 0.5 * sigma)))
+    # each take by itself: one may have been zeroed at the one end, another at the other
+    rocks = max(float(np.ptp(np.quantile(take @ axis, [READ_OFF.rare, 1 - READ_OFF.rare]))) for take in rows)
+    play = max(rocks - READ_OFF.rocking_noise * sigma, 0.5 * sigma)
     in_link = neutral[frame.child][1][0].T @ axis
     in_link = in_link * np.sign(in_link[np.argmax(np.abs(in_link))])
-    return [Candidate.of(mount, (joint,), (0.0, *in_link), (play, *in_link), (False, True, True, True))]
+    found = Candidate.of(mount, (joint,), (0.0, *in_link), (float(np.rad2deg(play)), *in_link), (True,) * 4)
+    return [replace(found, spread=(float(np.rad2deg(sigma)), 0.0, 0.0, 0.0))]
 
 
 def _frames(turned: Effect, model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Candidate]:

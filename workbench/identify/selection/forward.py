@@ -24,6 +24,7 @@ from workbench.identify.selection.backward import without_idle, without_part_ans
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.fixed_base_check import checked_on_fixed_base
+from workbench.identify.selection.left_to_chance import left_to_chance
 from workbench.identify.selection.options import ACCEPTANCE, FORWARD, SCHEDULING, SUBSETS
 from workbench.identify.selection.pair_move import with_pair
 from workbench.identify.selection.record import SelectionResult, SelectionStep, before_rough
@@ -128,7 +129,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         rounds += taken_in
         if after is current:
             break
-        current = after
+        search, current = left_to_chance(search, after, current.sizes_by_key())
         if search.evaluator.any_floating(takes):
             search, current = checked_on_fixed_base(search, current, [t.candidate for t in accepted])
         else:
