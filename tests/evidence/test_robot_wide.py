@@ -110,3 +110,17 @@ def test_evidence_of_all_together_is_that_of_one_region_with_all_numbers():
         H += (J.T * precision) @ J
     prior = [1.0] * (JOINTS * k) + [2.0 / (1 + (fit.shared.theta[0] / OPTIONS.width) ** 2) / OPTIONS.width**2]
     assert np.linalg.inv(H + np.diag(prior))[-1, -1] == pytest.approx(fit.covariance[0, 0], rel=1e-6)
+
+
+def test_an_effect_of_all_that_does_the_same_as_a_joints_own_is_told_beside_it():
+    """As a tilted stand and the first joint's zero: what the others feel of it is within noise."""
+    r = robot({(0, "backlash"): 2.0}, {})
+    none = {(j, "supply_sag"): 0.0 * r.does[j, "supply_sag"] for j in (1, 2)}
+    f = found(replace(r, does={**r.does, **none, (0, "supply_sag"): r.does[0, "backlash"]}))
+    if f.together.shared.effects:  # the one or the other, as likely
+        assert named(f)[0] == set()
+        assert f.sure < 0.7
+    else:
+        instead, nats = f.rivals["backlash", ("j",)]
+        assert instead.name == "supply_sag"
+        assert abs(nats) < 1.0

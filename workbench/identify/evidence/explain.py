@@ -79,12 +79,17 @@ class Explanation:
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
             for (c, x), s in zip(h.sizes(), h.slices()):
                 family, rival = c.effect.family, p.rival((c.name, c.where))
-                others = () if rival is None or rival[1] < WORTH_SAYING else (Alternative(*rival[0], rival[1]),)
+                others = [] if rival is None else [Alternative(*rival[0], rival[1])]
+                share = 1.0
+                if (of_all := self.robot.rivals.get(c.key)) is not None:
+                    share = 1.0 / (1.0 + math.exp(min(of_all[1], 700.0)))
+                    others.append(Alternative(of_all[0].name, of_all[0].where, 1.0 - share))
+                others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
                 fit, validation = (change(evidence, c.where, before, after, use) for use in ("fit", "validate"))
                 out.append(Finding(
-                    c.name, c.where, p.named[c.name, c.where], estimates(c, x, covariance[s, s]), fit, validation, others,
-                    c.effect.sentence(c.spec(x)),
-                    family=None if family is None else FamilyBelief(family, p.families[family])))
+                    c.name, c.where, share * p.named[c.name, c.where], estimates(c, x, covariance[s, s]), fit, validation,
+                    tuple(others[:1]), c.effect.sentence(c.spec(x)),
+                    family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
     def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,18 +14,20 @@ from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import Found, Report, begun, gone_on, lockstep, search, searched, standing
-from workbench.identify.parameters import Candidate
+from workbench.identify.parameters import Candidate, Key
 
 
 @dataclass(frozen=True)
 class RobotFound:
     """What stands: rollouts with it, what was found by region, and all of it together. instead: the likeliest other model [nats]
-    by the effect of the whole robot that it puts in the place of ours; None: the joints alone."""
+    by the effect of the whole robot that it puts in the place of ours; None: the joints alone. rivals: by a joint's effect, the
+    best one of the whole robot in its place, and by how much that is likelier [nats]."""
 
     rollouts: Rollouts
     found: tuple[Found, ...]
     together: Together
     instead: tuple[tuple[Candidate | None, float], ...] = ()
+    rivals: Mapping[Key, tuple[Candidate, float]] = field(default_factory=dict)
 
     @property
     def sure(self) -> float:
@@ -77,24 +79,38 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
     """Joints searched, and effects of the whole robot added as long as they pay."""
     rollouts, found = searched(rollouts, found, step, options, report)
     for _ in range(NUMERICS.rounds):
+        report("effects of the whole robot", None)
         whole = Whole(rollouts, tuple(names), options)
         now = whole.fitted(whole.begun([f.best for f in found]))
         rollouts, found = _beside(rollouts, found, now)
-        report("effects of the whole robot", None)
-        more = whole.predicted(now) if len(now.shared.effects) < NUMERICS.rounds else None
-        if more is None or more.log_posterior <= now.log_posterior:
-            break
-        more = whole.fitted(more)
-        if more.log_posterior <= now.log_posterior:
-            break
-        rollouts, found = gone_on(*_beside(rollouts, found, more), options, report)
+        more = whole.predicted(now)
+        added = [whole.fitted(more)] if more is not None and more.log_posterior > now.log_posterior else []
+        swaps = _swaps(whole, found, now)
+        best = max([now, *added, *(t for _, t in swaps)], key=lambda t: t.log_posterior)
+        if best is now or len(best.shared.effects) > NUMERICS.rounds:
+            rivals = {c.key: (t.shared.effects[-1], t.log_posterior - now.log_posterior) for c, t in swaps}
+            return RobotFound(rollouts, tuple(found), now, rivals=rivals)
+        rollouts, found = gone_on(*_beside(rollouts, found, best), options, report)
     whole = Whole(rollouts, tuple(names), options)
     return RobotFound(rollouts, tuple(found), whole.fitted(whole.begun([f.best for f in found])))
 
 
+def _swaps(whole: Whole, found: Sequence[Found], now: Together) -> list[tuple[Candidate, Together]]:
+    """Each joint's effect with what stands where the best one of the whole robot is in its place: a tilted stand turns an arm's
+    first joint as a horn does that is set on wrongly."""
+    out = []
+    for k, f in enumerate(found):
+        for c in f.best.hypothesis.effects:
+            bare = f.fits.get(f.best.hypothesis.without(lambda other, c=c: other is c).key)
+            more = None if bare is None else whole.predicted(whole.begun([*now.fits[:k], bare, *now.fits[k + 1:]]))
+            out += [] if more is None else [(c, whole.fitted(more))]
+    return out
+
+
 def _beside(rollouts: Rollouts, found: Sequence[Found], at: Together) -> tuple[Rollouts, tuple[Found, ...]]:
     """With shared effects, and the fits beside them, standing."""
-    states = tuple(replace(f, fits={**f.fits, fit.hypothesis.key: fit}) for f, fit in zip(found, at.fits))
+    states = tuple(replace(f, fits={**(f.fits if f.fits and fit.hypothesis.key == f.best.hypothesis.key else {}),
+                                    fit.hypothesis.key: fit}) for f, fit in zip(found, at.fits))
     return standing(replace(rollouts, shared=at.shared), states), states
 
 
@@ -120,5 +136,11 @@ def _weighed(at: RobotFound, alone: RobotFound, names: Sequence[Candidate], opti
             instead = whole.fitted(instead)
             others.append((instead.shared.effects[-1], instead.log_posterior + ours.log_posterior - at.together.log_posterior))
     if theirs.log_posterior > ours.log_posterior:
-        return alone
+        rival = (ours.shared.effects[-1], ours.log_posterior - theirs.log_posterior)
+        return replace(alone, rivals=dict.fromkeys(_own(alone) - _own(at), rival))
     return replace(at, together=ours, instead=tuple(others))
+
+
+def _own(of: RobotFound) -> set[Key]:
+    """The joints' effects."""
+    return {c.key for f in of.together.fits for c in f.hypothesis.effects}
