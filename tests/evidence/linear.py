@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from workbench.effects.registry import effect_named
-from workbench.identify.evidence.hypothesis import Hypothesis, start
+from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.likelihood import Likelihood
-from workbench.identify.evidence.nuisance import Uncertain
 from workbench.identify.evidence.region import Part, Region
 from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.parameters import Candidate

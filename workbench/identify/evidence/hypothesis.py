@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.nuisance import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.robot import EffectSpec
@@ -22,6 +21,19 @@ Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
 """Which number: an effect's name, where it acts, the parameter and its component; of the nominal law "" and the joint."""
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
+    make it nominal · exp(sd z), and a zero of sd z."""
+
+    joint: str
+    name: str
+    sd: float
+
+    def __str__(self) -> str:
+        return f"{self.name}({self.joint})"
 
 
 def term_of(c: Candidate) -> Term:

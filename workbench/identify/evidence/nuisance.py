@@ -4,29 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from workbench.effects.registry import estimated_by
+from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)
 """Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
 it by eye."""
-
-
-@dataclass(frozen=True)
-class Uncertain:
-    """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
-    make it nominal · exp(sd z), and a zero of sd z."""
-
-    joint: str
-    name: str
-    sd: float
-
-    def __str__(self) -> str:
-        return f"{self.name}({self.joint})"
-
 
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
          "reflected_inertia": "kg m^2", ZERO: "rad"}

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.likelihood import Likelihood, correlation_time
-from workbench.identify.evidence.nuisance import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.hypothesis import Hypothesis, start
-from workbench.identify.evidence.nuisance import Uncertain, as_mapping, recalibrated
+from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
+from workbench.identify.evidence.nuisance import as_mapping, recalibrated
 from workbench.identify.evidence.region import Region
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
