@@ -27,11 +27,11 @@ HIDDEN = {
     "slippery_foot": (EffectSpec("foot_friction", ("brb",), {"friction": 0.15}),),
     "payload": (EffectSpec("payload", ("body_link",), {"mass": 0.25, "position": (-0.02, 0.03, 0.05)}),),
     "late_firmware": (EffectSpec("timing_drift", (), {"per_pose": 0.006}),),
-    "sagging_supply": (EffectSpec("supply_voltage", (), {"voltage": 9.2}),),
+    "sagging_supply": (EffectSpec("supply_voltage", (), {"voltage": 9.8}),),
     "stiff_gearbox": (EffectSpec("coulomb_friction", ("frm",), {"torque": 0.18}),),
     "two_at_once": (EffectSpec("servo_gain", ("brb",), {"ratio": 0.45}), EffectSpec("ground_friction", (), {"friction": 0.3})),
 }
-"""Those of the practice sessions; a supply that a preflight lets pass."""
+"""Those of the practice sessions; a supply that preflight and program let pass."""
 
 
 def stand(model, seed=1, poses=16):
