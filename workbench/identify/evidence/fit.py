@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,10 @@ from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
-from workbench.identify.evidence.region import Region
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
+
+if TYPE_CHECKING:
+    from workbench.identify.evidence.region import Region
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

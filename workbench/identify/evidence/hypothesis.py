@@ -6,13 +6,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.evidence.options import EvidenceOptions
-from workbench.identify.parameters import Candidate
 from workbench.robot import EffectSpec
+
+if TYPE_CHECKING:
+    from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
 FAR = 2.0

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.likelihood import Likelihood, correlation_time
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
+
+if TYPE_CHECKING:
+    from workbench.identify.evidence.hypothesis import Uncertain
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.linearise import linearised
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
-from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.evidence.search import Found, Report, begun, gone_on, lockstep, search, searched, standing
 from workbench.identify.parameters import Candidate, Key
+
+if TYPE_CHECKING:
+    from workbench.identify.evidence.rollouts import Rollouts
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,10 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.linearise import Probe, led_after, on_lines, points, ways
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.parameters import Candidate
+
+if TYPE_CHECKING:
+    from workbench.identify.evidence.rollouts import Rollouts
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,12 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
 from workbench.identify.evidence.linearise import Move, best_of_each, in_pairs, linearised, to_be_fitted
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
-from workbench.identify.evidence.rollouts import Rollouts
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
+
+if TYPE_CHECKING:
+    from workbench.identify.evidence.rollouts import Rollouts
 
 Array = NDArray[np.float64]
 Key = frozenset[Term]
