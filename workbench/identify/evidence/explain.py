@@ -15,6 +15,7 @@ from workbench.identify.conclusions import Residuals, change, estimates, value_s
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.hypothesis import start
+from workbench.identify.evidence.nested import told_from_nothing
 from workbench.identify.evidence.nuisance import (
     UNITS,
     ZERO,
@@ -186,6 +187,9 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     rollouts, found, rejected = robot.rollouts, robot.found, [*refuted, *rejected]
     for _ in range(NUMERICS.rounds):
         said = [at_their_end(f.best.hypothesis, felt) for f in found]
+        if not any(said):
+            unlikely = lockstep(rollouts, {k: told_from_nothing(f.region, options, f.best) for k, f in enumerate(found)})
+            said = [unlikely[k] for k in range(len(found))]
         if not any(said):
             progress("takes kept back", None)
             said = _kept_back(rollouts, evidence, found, options)

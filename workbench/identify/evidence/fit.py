@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
-from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
+from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
 
 if TYPE_CHECKING:
@@ -63,14 +63,14 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
             J: Array | None = None) -> Asks[Fitted]:
     """Fits a hypothesis from where it stands, at a discrepancy s. r, J: what it leaves there and how that answers to theta, where
     known; else they are asked."""
-    prior, seen = Prior.of(start, options), dict[bytes, tuple[Array, Array]]()
+    prior, seen = Prior.of(start, options), dict[bytes, Array]()
     low, high = start.bounds()
     start = start.at(np.clip(start.theta, low, high))
     if r is None:
         (r,) = yield [start]
 
     def rows(h: Hypothesis, left: Array) -> Array:
-        seen[h.theta.tobytes()] = h.theta, left
+        seen[h.theta.tobytes()] = left
         return np.concatenate([region.likelihood.rows(left, s), prior.rows(h.theta)])
 
     first = rows(start, r)
@@ -86,45 +86,9 @@ def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: floa
     except StopIteration as end:
         (solved,) = end.value
     there = start.at(solved.x)
-    _, left = seen[there.theta.tobytes()]
-    J = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if J is None else J
-    J = _slopes(there.theta, left, list(seen.values()), J, options.stride)
-    for _ in range(NUMERICS.last):  # least squares settle by shares of what is left, evidence by nats
-        further = there.at(np.clip(there.theta + gauss_newton(region, options, there, left, J, s), low, high))
-        predicted = left + J @ (further.theta - there.theta)
-        if _log(region, options, further, predicted, s) < _log(region, options, there, left, s) + NUMERICS.gain:
-            break
-        (r,) = yield [further]
-        seen[further.theta.tobytes()] = further.theta, r
-        if _log(region, options, further, r, s) > _log(region, options, there, left, s):
-            there, left = further, r
-        J = _slopes(there.theta, left, list(seen.values()), J, options.stride)
-    return judged(region, options, there, left, J)
-
-
-def gauss_newton(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, s: float) -> Array:
-    """The step (k,) of all of a hypothesis' numbers from where it leaves r, with slopes J."""
-    prior, precision = Prior.of(h, options), region.likelihood.precision(r, s)
-    P = prior.precision(h.theta)
-    return np.asarray(-np.linalg.solve((J.T * precision) @ J + np.diag(P), J.T @ (precision * r) + P * (h.theta - prior.center)))
-
-
-def _log(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, s: float) -> float:
-    """Log likelihood and prior [nats]."""
-    return region.likelihood.log(r, s) + Prior.of(h, options).log(h.theta)
-
-
-def _slopes(theta: Array, r: Array, seen: Sequence[tuple[Array, Array]], roughly: Array, stride: float) -> Array:
-    """Slopes of r (n,) by theta (k,) from what was seen about there; where that tells nothing they stay as they are `roughly`
-    (n, k). What is `stride` away counts most: stick and slip answer shorter steps with noise, and longer ones are bent."""
-    away = [(float(np.linalg.norm(x - theta)), x, left) for x, left in seen]
-    away = [a for a in away if a[0] > NUMERICS.same]
-    if not away:
-        return roughly
-    weight = np.array([min(far / stride, stride / far) / far for far, _, _ in away])[:, None]
-    moved = np.array([x - theta for _, x, _ in away])
-    missed = np.array([left - r for _, _, left in away]) - moved @ roughly.T
-    return roughly + np.asarray(np.linalg.lstsq(weight * moved, weight * missed, rcond=NUMERICS.singular)[0].T, dtype=float)
+    left = seen[there.theta.tobytes()]
+    J_there = solved.J[:len(left)] / region.likelihood.slope(left, s)[:, None] if len(solved.x) else np.zeros((len(left), 0))
+    return judged(region, options, there, left, J_there)
 
 
 def polished(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitted]:

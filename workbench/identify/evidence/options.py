@@ -58,23 +58,18 @@ class EvidenceOptions:
 class EvidenceNumerics:
     """How far the search's arithmetic is driven, which costs time and decides no name.
 
-    fine: step of the last fits, in steps of the search. rounds: most times that effects are taken out by what is plausible or by
-    takes kept back, and that effects of the whole robot are looked for beside what the joints have. settled: share to which a
-    discrepancy's size is found; a hundred samples tell it to a twentieth. gain [nats]: of a fit's step below which it ends; last:
-    such steps after least squares have settled, at most; shares: of a step that are tried. same: distance of two points that are
-    one, in standard deviations of the prior or typical sizes; singular: ways in which points lie by less than this share of their
-    widest tell no slope. first: share of what the best effects of all joints explain from which one of the whole robot goes
-    first; which of both it is, is seen when each was searched to its end.
+    fine: step of the last fits, in steps of the search. rounds: most times that effects are taken out by what is plausible, by
+    what they are known to or by takes kept back, and that effects of the whole robot are looked for beside what the joints have.
+    settled: share to which a discrepancy's size is found; a hundred samples tell it to a twentieth. gain [nats]: of a step of a
+    fit of all joints below which it ends; shares: of a step that are tried. first: share of what the best effects of all joints
+    explain from which one of the whole robot goes first; which of both it is, is seen when each was searched to its end.
     """
 
     fine: float = 0.5
-    rounds: int = 3
+    rounds: int = 4
     settled: float = 0.02
     gain: float = 0.1
-    last: int = 2
     shares: tuple[float, ...] = (1.0, 0.5, 0.25)
-    same: float = 1e-6
-    singular: float = 1e-3
     first: float = 0.5
 
 

@@ -58,8 +58,9 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
         alone, alone_found = searched(start, found, rollouts.step, options, report)
     else:
         alone, alone_found = gone_on(replace(at.rollouts, shared=start.shared), at.found, options, report)
-    return _weighed(at, RobotFound(alone, alone_found, Whole(alone, (), options).begun([f.best for f in alone_found])),
-                    names, options)
+    of_alone = Whole(alone, (), options)
+    together = of_alone.fitted(of_alone.begun([f.best for f in alone_found]))
+    return _weighed(at, RobotFound(alone, alone_found, together), names, options)
 
 
 def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Report

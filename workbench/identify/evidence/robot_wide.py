@@ -110,7 +110,8 @@ class Whole:
         return self.judged(shared, fits, slopes)
 
     def fitted(self, at: Together) -> Together:
-        """All numbers fitted at once, by differences of the shared ones and the slopes that the regions' own have."""
+        """All numbers fitted at once, with slopes by differences, those of the regions' own numbers measured once."""
+        at = self._sloped(at)
         for _ in range(self.options.iterations):
             (left,) = self.rollouts.everywhere([(at.shared, [f.hypothesis for f in at.fits])])
             at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], left)
@@ -123,6 +124,19 @@ class Whole:
                 break
             at = self._rolled_out(at, *tried[best], answers[best])
         return at
+
+    def _sloped(self, at: Together) -> Together:
+        """With the slopes of the regions' own numbers measured where it stands: one number of each region at a time."""
+        each, stride = [f.hypothesis for f in at.fits], self.options.stride
+        steps = [np.where(h.theta + stride <= h.bounds()[1], stride, -stride) for h in each]
+        most = max(len(h.theta) for h in each)
+        moved = [[h.at(h.theta + step * (np.arange(len(step)) == i)) for h, step in zip(each, steps)] for i in range(most)]
+        there, *left = self.rollouts.everywhere([(at.shared, hypotheses) for hypotheses in (each, *moved)])
+        slopes = [np.reshape([(left[i][k] - r) / step[i] for i in range(len(step))], (len(step), len(r))).T
+                  for k, (r, step) in enumerate(zip(there, steps))]
+        fits = [judged(region, self.options, f.hypothesis, r, J)
+                for region, f, r, J in zip(self.regions, at.fits, there, slopes)]
+        return self.judged(at.shared, fits, at.slopes)
 
     def _rolled_out(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> Together:
         """Where it stands by rollouts, with slopes by the shared numbers measured there."""
