@@ -204,3 +204,12 @@ def test_unknown_endings_are_refused(tmp_path: Path, takes: tuple[Take, Take]) -
     figure = figures.phase_portrait("flm", *takes)
     with pytest.raises(InputError, match=r"\.svg, \.png or \.pdf"):
         figures.save_figure(figure, tmp_path / "figure.jpg")
+
+
+def test_a_robot_left_far_behind_is_told_and_does_not_shrink_the_other(model: RobotModel) -> None:
+    ahead = swing(model)
+    assert ahead.p_WB is not None
+    behind = replace(ahead, name="behind", p_WB=ahead.p_WB - np.outer(3.0 * (ahead.time > ahead.time.mean()), [1.0, 0.0, 0.0]))
+    alone, both = (figures.film_strip(model, ahead, other).axes[-1] for other in (None, behind))
+    assert np.ptp(both.get_xlim()) <= 2.5 * np.ptp(alone.get_xlim())
+    assert [t.get_text() for t in both.texts] == ["\u2190 300 cm"]

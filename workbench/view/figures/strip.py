@@ -15,6 +15,8 @@ from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, name
 from workbench.view.shapes import robot_shapes
 
 Array = NDArray[np.float64]
+WIDEST = 2.5
+"""Most that a picture reaches, by how far the simulated robot itself does."""
 
 
 @styled
@@ -23,7 +25,7 @@ def film_strip(
     span: tuple[float, float] | None = None,
 ) -> Figure:
     """Side view from the right at `instants` even times over `span` [s since the first command]; the recorded robot is laid
-    over the simulated one where both stood. Far legs are thinner."""
+    over the simulated one where both stood; where it is out of the picture, how far. Far legs are thinner."""
     takes = [simulated] if recorded is None else [simulated, recorded]
     first, last = span or common_span(takes, lead=0.0)
     time = np.concatenate([[first - 0.1], np.linspace(first, last, instants)])  # the first stands for the rest
@@ -33,7 +35,8 @@ def film_strip(
     if recorded is not None:
         films.insert(0, (play(recorded, model, time, like=(simulated, played)), RECORDED, names[1], 0.75))
     shapes, left = robot_shapes(model), _left(model)
-    reach = max(80 * shapes.height, 2 + 100 * max(_farthest(film, shapes.feet, played) for film, *_ in films))
+    own, *others = (_farthest(film, shapes.feet, played) for film, *_ in reversed(films))
+    reach = max(80 * shapes.height, 2 + 100 * min(max(own, *others, 0.0), WIDEST * own))
     figure = new_figure(12, 2.9)
     grid = figure.subplots(1, instants, sharey=True)
     for k, axes in enumerate(np.atleast_1d(grid), start=1):
@@ -42,6 +45,7 @@ def film_strip(
         for film, colour, label, alpha in films:
             _draw_sticks(axes, model, film, k, shapes.feet, left, colour, alpha)
             axes.plot([], [], color=colour, label=label)
+            _say_how_far(axes, 100 * (film.base_p[k, 0] - middle), reach, colour)
         axes.set_xlim(100 * middle - reach, 100 * middle + reach)
         axes.set_ylim(-3, 120 * shapes.height + 100 * STAND_CLEARANCE)
         axes.set_aspect("equal", adjustable="box")
@@ -51,6 +55,13 @@ def film_strip(
     handles, labels = np.atleast_1d(grid)[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=2)
     return figure
+
+
+def _say_how_far(axes: Axes, off: float, reach: float, colour: str) -> None:
+    """Of a robot `off` [cm] the middle of a picture that reaches so far [cm], where it is beyond that."""
+    if abs(off) > reach:
+        x, align, said = (0.02, "left", f"\u2190 {-off:.0f} cm") if off < 0 else (0.98, "right", f"{off:.0f} cm \u2192")
+        axes.text(x, 0.5, said, transform=axes.transAxes, ha=align, va="center", color=colour, fontsize=10)
 
 
 def _farthest(film: Playback, feet: dict[str, tuple[str, Array]], played: Playback) -> float:
