@@ -119,7 +119,7 @@ def _write_session(folder: Path, model: RobotModel, walk: MotionRows, seed: int,
 
 def write_recordings(folder: Path, model: RobotModel, hidden: RobotModel, plans: Sequence[TakePlan], camera: Camera,
                      rng: np.random.Generator) -> list[tuple[TakePlan, Rollout, Capture, Capture]]:
-    """Writes a session of a model, with recordings of the robot `hidden`, and the recordings that are to be foretold under
+    """Writes a session of a model, with recordings of the robot `hidden`, and the recordings that are to be predicted under
     answer/. Returns each plan with what `record` made of it."""
     for sub in ("motions", "takes", "predict", "answer"):
         (folder / sub).mkdir(parents=True)

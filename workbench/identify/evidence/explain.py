@@ -207,8 +207,8 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
     fine = standing(fine, found)
-    last_fits = [f.best for f in found]
-    together = Whole(fine, (), options).fitted(Whole(fine, (), options).begun(last_fits))
+    everywhere = Whole(fine, (), options)
+    together = everywhere.fitted(everywhere.begun([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
     whole.rollouts += evaluator.rollouts
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)

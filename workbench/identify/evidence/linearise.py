@@ -202,7 +202,7 @@ def _at(f: Fitted, c: Candidate, k: int, x: Array, r: Array) -> tuple[Hypothesis
 
 
 def led_after(region: Region, options: EvidenceOptions, f: Fitted, h: Hypothesis, r: Array, J: Array, led: NDArray[np.bool_]
-         ) -> tuple[Hypothesis, Array, Array]:
+              ) -> tuple[Hypothesis, Array, Array]:
     """A hypothesis with the numbers that the fit had led after it on lines, what that leaves, and slopes."""
     prior = Prior.of(h, options)
     precision = region.likelihood.precision(r, f.discrepancy)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,17 @@ class Together:
     log_posterior: float
 
 
+class _Blocks(NamedTuple):
+    """Of the information that one region brings. own (k, k): of its numbers, with their prior; mixed (k, m): of these and the
+    shared ones; shared (m, m): of the shared ones, less what its own numbers take (Schur complement); precision (n,): of each
+    frame [1/rad^2]."""
+
+    own: Array
+    mixed: Array
+    shared: Array
+    precision: Array
+
+
 @dataclass(frozen=True)
 class Whole:
     """Judges regions together. names: effects of the whole robot that could be there."""
@@ -64,8 +75,7 @@ class Whole:
         prior = Prior.of(shared, self.options)
         S = np.diag(prior.precision(shared.theta))
         for region, f, G in zip(self.regions, fits, slopes):
-            H, C, precision = self._blocks(region, f, G)
-            S = S + (G.T * precision) @ G - C.T @ np.linalg.solve(H, C)
+            S = S + self._blocks(region, f, G).shared
         names = len(self.names) + max(len(r.candidates) for r in self.regions)
         price = len(shared.effects) * log_odds(names, self.options.expected)
         laplace = 0.5 * len(S) * float(np.log(2 * np.pi)) - 0.5 * float(np.linalg.slogdet(S)[1])
@@ -112,12 +122,11 @@ class Whole:
     def fitted(self, at: Together) -> Together:
         """All numbers fitted at once, with slopes by differences, those of the regions' own numbers measured once."""
         at = self._sloped(at)
+        at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], [f.r for f in at.fits])
         for _ in range(self.options.iterations):
-            (left,) = self.rollouts.everywhere([(at.shared, [f.hypothesis for f in at.fits])])
-            at = self._rolled_out(at, at.shared, [f.hypothesis for f in at.fits], left)
             tried = [self._step(at, share) for share in NUMERICS.shares]
             answers = self.rollouts.everywhere(tried)
-            now = self._objective(at, at.shared, [f.hypothesis for f in at.fits], left)
+            now = self._objective(at, at.shared, [f.hypothesis for f in at.fits], [f.r for f in at.fits])
             values = [self._objective(at, shared, each, r) for (shared, each), r in zip(tried, answers)]
             best = int(np.argmax(values))
             if values[best] < now + NUMERICS.gain:
@@ -153,10 +162,10 @@ class Whole:
         P = prior.precision(at.shared.theta)
         S, b, parts = np.diag(P), P * (at.shared.theta - prior.center), []
         for region, f, G in zip(self.regions, at.fits, at.slopes):
-            H, C, precision = self._blocks(region, f, G)
+            H, C, schur, precision = self._blocks(region, f, G)
             own = Prior.of(f.hypothesis, self.options)
             gradient = f.J.T @ (precision * f.r) + own.precision(f.hypothesis.theta) * (f.hypothesis.theta - own.center)
-            S = S + (G.T * precision) @ G - C.T @ np.linalg.solve(H, C)
+            S = S + schur
             b = b + G.T @ (precision * f.r) - C.T @ np.linalg.solve(H, gradient)
             parts.append((H, C, gradient))
         by = np.asarray(-np.linalg.solve(S, b), dtype=float)
@@ -164,11 +173,11 @@ class Whole:
                 for f, (H, C, gradient) in zip(at.fits, parts)]
         return _within(at.shared, share * by), each
 
-    def _blocks(self, region: Region, f: Fitted, G: Array) -> tuple[Array, Array, Array]:
-        """Of the information: H of a region's own numbers, C of these and the shared ones; and each frame's precision."""
+    def _blocks(self, region: Region, f: Fitted, G: Array) -> _Blocks:
         precision = region.likelihood.precision(f.r, f.discrepancy)
         prior = Prior.of(f.hypothesis, self.options).precision(f.hypothesis.theta)
-        return (f.J.T * precision) @ f.J + np.diag(prior), (f.J.T * precision) @ G, precision
+        H, C = (f.J.T * precision) @ f.J + np.diag(prior), (f.J.T * precision) @ G
+        return _Blocks(H, C, (G.T * precision) @ G - C.T @ np.linalg.solve(H, C), precision)
 
     def _objective(self, at: Together, shared: Hypothesis, each: Sequence[Hypothesis], left: Sequence[Array]) -> float:
         """Log likelihood and prior [nats] at the discrepancies of `at`."""
