@@ -9,6 +9,7 @@ from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli.main import main
 from workbench.cli.memory import rollout_memory
 from workbench.compare.session import load_session
+from workbench.effects.registry import known_effects
 from workbench.identify.diagnosis import diagnose_session
 from workbench.robot import InputError, load_model
 
@@ -39,6 +40,17 @@ def test_a_take_too_short_to_conclude_from_says_so(tmp_path):
     path.write_text("".join(lines[:7 + 150]))  # about a second after the first command
     with pytest.raises(InputError, match="nothing can be concluded"):
         diagnose_session(load_session(tmp_path / "session.yaml"), n_jobs=1)
+
+
+def test_what_is_known_not_to_be_there_is_not_looked_for(tmp_path):
+    record_arm(tmp_path, friction=0.14)
+    session = load_session(tmp_path / "session.yaml")
+    told = diagnose_session(session, n_jobs=1, without=sorted(set(known_effects()) - {"viscous_friction", "dropped_command"}))
+    assert {f.effect for f in told.diagnosis.findings} <= {"viscous_friction"}
+    assert told.diagnosis.verdict != "explained"
+    assert "coulomb_friction" in told.diagnosis.to_json()["provenance"]["without"]
+    with pytest.raises(InputError, match="'rust' is not known"):
+        diagnose_session(session, without=["rust"])
 
 
 def killed(out, session):

@@ -56,12 +56,14 @@ class DiagnoseOptions:
     """How a session is diagnosed.
 
     jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
-    folder that keeps every rollout, so that a run that was killed goes on where it was; None: nothing is kept.
+    folder that keeps every rollout, so that a run that was killed goes on where it was; None: nothing is kept. without: names of
+    effects that are known not to be there, and are not looked for.
     """
 
     jobs: int = 2
     thorough: bool = False
     resume: Path | None = None
+    without: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
@@ -124,7 +126,7 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
     """
     options = options or DiagnoseOptions()
     session = _loaded(session)
-    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough)
+    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without)
     diagnosis, motion = with_next_experiment(found, options.jobs, progress)
     return DiagnosisResult(diagnosis, session, found.takes, motion)
 

@@ -34,6 +34,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "(default: beside --out, until this one ends)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
+    parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
+                        help="an effect that is known not to be there and not looked for, by its name in docs/effects.md; may be "
+                        "said again for others")
     parser.set_defaults(run=run)
 
 
@@ -49,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     check_session("diagnose", session, args.yes)
     with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
           rollout_memory(args.out, session, args.memory) as memory):
-        result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory), progress=progress)
+        result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory, tuple(args.without)), progress=progress)
         paths = result.save(folder, progress, args.jobs)
     diagnosis = result.diagnosis
     for name, reason in diagnosis.left_out:

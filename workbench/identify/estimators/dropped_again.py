@@ -6,20 +6,34 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.registry import estimated_by
 from workbench.identify.estimators.dropped_commands import DroppedCommands, with_dropped_commands
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.robot import RobotModel
 
 
 @dataclass(frozen=True)
 class TakesAsPlayed:
-    """sent: takes with all poses that went out; missed: what was taken for missed, and left out of what is played."""
+    """sent: takes with all poses that went out; missed: what was taken for missed, and left out of what is played; without:
+    effects that are not looked for."""
 
     sent: RolloutEvaluator
     missed: tuple[DroppedCommands, ...] = ()
+    without: frozenset[str] = frozenset()
+
+    def without_missed(self, model: RobotModel, residuals: Mapping[int, NDArray[np.float64]]
+                       ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
+        """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: the model's."""
+        if self.without.intersection(e.name for e in estimated_by("missed poses")):
+            return self.sent, ()
+        return with_dropped_commands(self.sent, model, residuals)
 
 
 def reestimated(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Search, TakesAsPlayed]:
@@ -27,7 +41,7 @@ def reestimated(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Se
     search where they are those that were known."""
     model, sent = with_effects(search.nominal, current.sizes()), played.sent
     residuals = sent.residuals([RolloutRequest(model, tuple(range(len(sent.evidence))))])[0]
-    evaluator, missed = with_dropped_commands(sent, model, residuals)
+    evaluator, missed = played.without_missed(model, residuals)
     if _poses(missed) != _poses(played.missed):
         search = search.on(search.evaluator.on(with_commands_of(search.evaluator.evidence, evaluator.evidence)))
     return search, replace(played, missed=missed)

@@ -1,0 +1,136 @@
+"""Is a wrong explanation ever called one? Each effect that a session holds is taken out of the vocabulary, and the rest asked.
+
+    python -m studies.effect_left_out [SESSION ...] [--out runs/studies/effect_left_out] [--jobs 1]
+
+Diagnoses each session whole, then once more without each effect that was found, and compares what both models leave on stretches
+that no fit saw: chi squared in blocks of half a second, their difference's mean over its standard error. "explained" is wrong
+where that is beyond three. Sessions: data/tutorial_arm unless others are named. Writes numbers.json, kept up as it goes on:
+started again, it does not ask again what is there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from studies.common import ROOT
+from workbench.cli.progress import Progress
+from workbench.compare.session import Session, load_session
+from workbench.identify.diagnosis import DiagnosisResult, diagnose_session
+from workbench.identify.results.take_report import TakeReport
+from workbench.robot import InputError
+
+BLOCK = 0.5
+"""Length of the stretches whose sums of squares count as one draw [s]: longer than what a servo remembers, a third of a step."""
+BEYOND = 3.0
+"""Standard errors by which one model is better than another."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One session without one effect. named: effect, place, confidence; rms: of unseen residuals over noise, nominal, without,
+    with; better: by how many standard errors the whole vocabulary tells unseen stretches better; seconds: of processor."""
+
+    session: str
+    without: str
+    verdict: str
+    named: tuple[tuple[str, str, float], ...]
+    rms: tuple[float, float, float]
+    better: float
+    seconds: float
+
+    @property
+    def wrongly_explained(self) -> bool:
+        """Called explained, though the effect that is missing would tell it better by more than noise."""
+        return self.verdict == "explained" and self.better > BEYOND
+
+    def line(self) -> str:
+        """Of the table."""
+        named = "; ".join(f"{e} of {w} ({c:.2f})" for e, w, c in self.named) or "nothing"
+        return (f"| {self.session} | {self.without} | {self.verdict}{' (WRONG)' if self.wrongly_explained else ''} | {named} | "
+                f"{self.rms[0]:.2f}, {self.rms[1]:.2f}, {self.rms[2]:.2f} | {self.better:.1f} | {self.seconds:.0f} |")
+
+
+def unseen_squares(take: TakeReport) -> list[float]:
+    """Sums of squared residuals over noise of each block that is at least half unseen."""
+    use = take.unseen if take.unseen.any() else np.ones(len(take.unseen), dtype=bool)
+    block = np.floor((take.time - take.time[0]) / BLOCK).astype(int)
+    squares = np.nansum(np.square(take.after), axis=1)
+    return [float(squares[here & use].sum()) for here in (block == b for b in np.unique(block)) if use[here].mean() > 0.5]
+
+
+def better_by(whole: DiagnosisResult, less: DiagnosisResult) -> float:
+    """Mean over blocks of what the smaller vocabulary leaves more, over its standard error."""
+    more = np.concatenate([np.subtract(unseen_squares(b), unseen_squares(a)) for a, b in zip(whole.takes, less.takes)])
+    spread = float(np.std(more, ddof=1))
+    return float(np.mean(more) * np.sqrt(len(more)) / spread) if spread > 0.0 else 0.0
+
+
+def _rms(result: DiagnosisResult, nominal: bool) -> float:
+    parts = []
+    for t in result.takes:
+        use = t.unseen if t.unseen.any() else np.ones(len(t.unseen), dtype=bool)
+        parts.append((t.before if nominal else t.after)[use].ravel())
+    return float(np.sqrt(np.nanmean(np.square(np.concatenate(parts)))))
+
+
+def ask(name: str, session: Session, known: Sequence[Asked], jobs: int, progress: Progress) -> list[Asked]:
+    """All rows of a session, those that are known as they are."""
+    whole = diagnose_session(session, lambda what, share: progress(f"{name}: {what}", share), jobs)
+    out = []
+    for effect in dict.fromkeys(f.effect for f in whole.diagnosis.findings):
+        row = next((k for k in known if (k.session, k.without) == (name, effect)), None)
+        if row is None:
+            began = time.process_time()
+            less = diagnose_session(session, lambda what, share, e=effect: progress(  # type: ignore[misc]
+                f"{name} without {e}: {what}", share), jobs, without=(effect,))
+            row = Asked(name, effect, less.diagnosis.verdict,
+                        tuple((f.effect, "/".join(f.where), round(f.confidence, 3)) for f in less.diagnosis.findings),
+                        (_rms(whole, True), _rms(less, False), _rms(whole, False)), better_by(whole, less),
+                        time.process_time() - began)
+        out.append(row)
+    return out
+
+
+def _known(file: Path) -> list[Asked]:
+    if not file.exists():
+        return []
+    return [Asked(**{**row, "named": tuple(tuple(n) for n in row["named"]), "rms": tuple(row["rms"])})
+            for row in json.loads(file.read_text())["asked"]]
+
+
+def main(argv: list[str] | None = None) -> int:
+    """0; 1 where something was wrongly explained; 2 for bad input."""
+    parser = argparse.ArgumentParser(prog="python -m studies.effect_left_out", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("sessions", nargs="*", type=Path, default=[ROOT / "data/tutorial_arm"], metavar="SESSION")
+    parser.add_argument("--out", type=Path, default=ROOT / "runs/studies/effect_left_out", metavar="DIR")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N")
+    arguments = parser.parse_args(argv)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    file = arguments.out / "numbers.json"
+    rows = _known(file)
+    try:
+        with Progress("study effect_left_out") as progress:
+            for path in arguments.sessions:
+                session = load_session(path)
+                name = session.path.parent.name
+                rows = [r for r in rows if r.session != name] + ask(name, session, rows, arguments.jobs, progress)
+                file.write_text(json.dumps({"asked": [asdict(r) for r in rows]}, indent=1) + "\n")
+    except InputError as e:
+        print(f"studies.effect_left_out: {e}", file=sys.stderr)
+        return 2
+    print("| session | without | verdict | named instead | rms over noise: nominal, without, with | better with | CPU [s] |")
+    print("|---|---|---|---|---|---|---|")
+    print("\n".join(r.line() for r in rows))
+    return int(any(r.wrongly_explained for r in rows))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
