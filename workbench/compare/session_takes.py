@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +55,10 @@ class ReadTake:
         """What the joints did at the first command, where a rollout cannot begin at rest in neutral: of a log of a held robot, as
         its servos told it. None for captured takes, for a robot on the ground, and for a log that begins at rest in neutral to
         within its resolution."""
+        return self._start
+
+    @cached_property
+    def _start(self) -> Start | None:
         if self.recording.sensing == "mocap" or self.spec.base != "fixed":
             return None
         state = state_at(self.recording, self.model.joints, first_command(self.recording, self.spec.starts_at))

@@ -123,7 +123,11 @@ class RobotModel:
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
         """The same robot with these effects in place of its own; what is known of its description is not read again."""
-        other = replace(self, effects=tuple(effects))
+        return self.with_physics(self.servos, effects)
+
+    def with_physics(self, servos: Mapping[str, ServoConstants], effects: Sequence[EffectSpec]) -> RobotModel:
+        """As `with_effects`, with these servos, too."""
+        other = replace(self, servos=servos, effects=tuple(effects))
         vars(other).update({k: v for k, v in vars(self).items() if k in ("source", "kinematics", "foot_links")})
         return other
 
@@ -137,7 +141,9 @@ class RobotModel:
 
     def with_servos(self, changes: Mapping[str, Any]) -> RobotModel:
         """The same robot with constants replaced in every servo (a take's `servos`)."""
-        return replace(self, servos={j: self.servo(j).updated(dict(changes)) for j in self.joints}) if changes else self
+        if not changes:
+            return self
+        return self.with_physics({j: self.servo(j).updated(dict(changes)) for j in self.joints}, self.effects)
 
     @cached_property
     def sha256(self) -> str:

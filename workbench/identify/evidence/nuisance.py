@@ -42,7 +42,7 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
             zeros += [turned_horn(number.joint, number.sd * by)] if by else []
         else:
             servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
-    return replace(model, servos=servos, effects=(*model.effects, *zeros))
+    return model.with_physics(servos, (*model.effects, *zeros))
 
 
 def turned_horn(joint: str, angle: float) -> EffectSpec:

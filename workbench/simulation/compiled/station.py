@@ -171,10 +171,9 @@ class CompiledJob:
     def _put(self, start: Start, state: State) -> None:
         """As `Simulation` starts from a given state."""
         servos = np.asarray(start.q, dtype=float)
-        structure = self._structure()
         if start.logged:
             servos = servos + self.physics.zero
-        elif structure is not None:
+        elif (structure := self._structure()) is not None:
             servos = structure.servo_angles(servos, state.q[[self.tables.joints.index(j) for j in structure.joints]])
         joint = self.machine.servos.joint
         state.q[joint], state.v[(6 if self.free else 0) + joint] = servos, start.v
