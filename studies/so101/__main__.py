@@ -26,6 +26,7 @@ from studies.so101.evaluate import degrees, errors, simulate, together
 from studies.so101.figures import draw_current, draw_errors, draw_loops, draw_overlay
 from studies.so101.measured import Measured, measure
 from studies.so101.programmes import TRAINING, VALIDATION, jaw_range, load_programmes
+from studies.so101.published import PUBLISHED
 from studies.so101.read_off import read_off
 from studies.so101.session import write_session
 from workbench.cli.memory import rollout_memory
@@ -41,6 +42,7 @@ Say = Callable[[str, float | None], None]
 BESIDE = ROOT.parent / "shared/data/so101"
 SLOW = "friction_gravity"
 SHOWN, SPAN = "fast_transitions", (5.0, 20.0)
+SHOWN_MODELS = ("nominal", "read off", "diagnosed")
 
 
 def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jobs: int, progress: Say) -> str:
@@ -64,15 +66,18 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
     baseline = fit_baseline(training)
     paths = {name: simulate(held, model, progress, f"simulating, {name}", n_jobs) for name, model in models.items()}
     paths["delay and gain"] = {p.name: baseline.position(p) for p in validation}
-    order = [n for n in ("nominal", "delay and gain", "read off", "diagnosed") if n in paths]
+    paths |= {p.name: simulate(held, p.robot(nominal, m.jaw_range), progress, f"simulating, {p.name}", n_jobs) for p in PUBLISHED}
+    order = [n for n in ("nominal", *(p.name for p in PUBLISHED), "delay and gain", "read off", "diagnosed") if n in paths]
     each = {n: errors(validation, paths[n], unit) for n in order}
+    for p in PUBLISHED:  # of joints that nobody published there is nothing to be judged
+        each[p.name][:, [j not in p.joints for j in JOINTS]] = np.nan
     joint = {n: together(each[n], validation) for n in order}
     shown = next(p for p in validation if p.name == SHOWN)
     ramp = next(p for p in training if p.name == SLOW)
     figures = {
         "loops": draw_loops(ramp, simulate(slow, nominal, progress, "slow programme", n_jobs)[SLOW], unit),
         "current": draw_current(m.training, m.currents), "errors": draw_errors(joint),
-        "overlay": draw_overlay(shown, {n: paths[n][SHOWN] for n in order if n != "delay and gain"}, unit, SPAN)}
+        "overlay": draw_overlay(shown, {n: paths[n][SHOWN] for n in SHOWN_MODELS if n in paths}, unit, SPAN)}
     report = Report("SO-101", _headline(joint), page.WHAT, provenance=Provenance.of(nominal, seconds=time.monotonic() - began))
     report.add(Section("Clock", [page.clock_text(m.clock, len(programmes))]))
     report.add(Section("While a joint moves", [page.response_table(list(m.moving.values())), Picture(
@@ -105,22 +110,26 @@ def _diagnosed(session: Session, out: Path, n_jobs: int, progress: Say) -> Robot
 
 
 def _headline(joint: Mapping[str, Array]) -> str:
-    said = ", ".join(f"{name} {np.sqrt(np.mean(np.square(v))):.2f}°" for name, v in joint.items())
+    said = ", ".join(f"{name} {np.sqrt(np.mean(np.square(v))):.2f}°" for name, v in joint.items() if np.isfinite(v).all())
     return f"RMS over the joints on programmes that nothing was fitted to: {said}"
 
 
 def _numbers(m: Measured, joint: Mapping[str, Array], each: Mapping[str, Array],
              models: Mapping[str, RobotModel]) -> dict[str, object]:
-    by_programme = {n: dict(zip(VALIDATION, np.sqrt(np.mean(np.square(e), axis=1)).tolist())) for n, e in each.items()}
+    by_programme = {n: dict(zip(VALIDATION, map(_known, np.sqrt(np.mean(np.square(e), axis=1))))) for n, e in each.items()}
     return {
         "clock": asdict(m.clock), "jaw_range": m.jaw_range, "joints": JOINTS,
         "moving": {j: asdict(r) for j, r in m.moving.items()},
         "resting": {j: None if s is None else asdict(s) for j, s in m.resting.items()},
         "zeros": {j: asdict(z) for j, z in m.zeros.items()}, "current": [asdict(c) for c in m.currents],
         "speeds": [asdict(f) for f in m.speeds],
-        "validation": {n: dict(zip(JOINTS, v.tolist())) for n, v in joint.items()},
+        "validation": {n: dict(zip(JOINTS, map(_known, v))) for n, v in joint.items()},
         "validation_programmes": by_programme,
         "models": {n: model.as_dict()["effects"] for n, model in models.items()}}
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def main(argv: list[str] | None = None) -> int:

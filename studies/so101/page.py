@@ -77,14 +77,19 @@ def speed_table(speeds: Sequence[Fastest], laws: Sequence[Current]) -> Table:
 
 def validation_table(by_model: Mapping[str, Array]) -> Table:
     """RMS by joint and model."""
-    rows = [[name, *(f"{v:.2f}" for v in [*values, np.sqrt(np.mean(np.square(values)))])] for name, values in by_model.items()]
-    return Table(("model", *JOINTS, "all"), rows, "RMS error on the fourteen validation programmes, deg.")
+    rows = [[name, *map(_number, [*values, np.sqrt(np.mean(np.square(values)))])] for name, values in by_model.items()]
+    return Table(("model", *JOINTS, "all"), rows, "RMS error on the fourteen validation programmes, deg; – where nobody "
+                 "published a joint's numbers.")
 
 
 def programme_table(validation: Sequence[Programme], by_model: Mapping[str, Array]) -> Table:
     """RMS over joints, by programme and model."""
-    rows = [[p.name, *(f"{np.sqrt(np.mean(np.square(e[k]))):.2f}" for e in by_model.values())] for k, p in enumerate(validation)]
+    rows = [[p.name, *(_number(np.sqrt(np.mean(np.square(e[k])))) for e in by_model.values())] for k, p in enumerate(validation)]
     return Table(("programme", *by_model), rows, "RMS over the six joints, deg.")
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if np.isfinite(value) else "–"
 
 
 def effects_table(model: RobotModel) -> Table:
