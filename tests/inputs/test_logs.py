@@ -9,10 +9,11 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from tests.inputs.corpus import bam_log, joint_log, lerobot, ros_csv, sage, swing
+from tests.inputs.corpus import bam_log, corpus, joint_log, lerobot, ros_csv, sage, swing
 from workbench.recording import Recording, read_recording
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.read import recording_of_take
+from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.plausibility import beyond_range
 from workbench.robot import InputError
 
@@ -273,3 +274,15 @@ def test_archives(tmp_path: Path, damage: str) -> None:
         return
     with pytest.raises(InputError, match=r"x\.npz"):
         read_recording(path)
+
+
+@pytest.mark.parametrize(("name", "first"), [("log.csv", b"\n0,"), ("bam.json", b'"timestamp": 0.0'),
+                                             ("ros.csv", b"\n1700000000000000000,"), ("rollout.csv", b"\n0.0,")])
+@pytest.mark.parametrize("instead", [b"-1e308", b"-1e25"])
+def test_a_time_beside_which_all_others_are_alike_is_refused(tmp_path: Path, name: str, first: bytes, instead: bytes) -> None:
+    content = corpus(tmp_path)[name]
+    number = first.strip(b'\n,"timesap: ')
+    assert content.count(first) >= 1
+    (tmp_path / name).write_bytes(content.replace(first, first.replace(number, instead), 1))
+    with pytest.raises(InputError, match="increasing"):
+        (load_rollout if name == "rollout.csv" else read_recording)(tmp_path / name)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
@@ -37,9 +37,9 @@ def read_bam_log(path: str | Path) -> Recording:
         raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)
-    bad = np.flatnonzero(~(np.diff(time) > 0))
+    bad = np.flatnonzero(out_of_order(time))
     if len(bad):
-        raise InputError(source, f"entries[{bad[0] + 1}].timestamp: expected increasing times")
+        raise InputError(source, f"entries[{bad[0]}].timestamp: expected increasing times")
     joint = str(content.get("motor", "servo"))[:40]
     channels = {f"{channel}.{joint}": _column(source, entries, key, key in _REQUIRED) for key, channel in _CHANNELS.items()
                 if key in _REQUIRED or key in entries[0]}

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
@@ -50,8 +50,7 @@ def read_joint_log(path: str | Path) -> Recording:
     text = {i for i, name in enumerate(names) if name.startswith("enabled.")}
     table = read_columns(source, content, len(content) if end < 0 else end + 1, 1, len(names), text)
     time = column(table, names.index("time"))
-    bad = ~np.isfinite(time)
-    bad[1:] |= ~(np.diff(time) > 0)
+    bad = out_of_order(time)
     if bad.any():
         n = int(np.argmax(bad))
         raise InputError(source, f"line {n + 2}: time {time[n]:g} does not follow; expected increasing times")

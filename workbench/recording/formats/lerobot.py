@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.log_state import count_of
@@ -51,7 +51,7 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
     goals, positions = _vectors(source, table, _ACTION), _vectors(source, table, _STATE)
     if goals.shape != positions.shape:
         raise InputError(source, f"action has {goals.shape[1]} joints, observation.state {positions.shape[1]}; expected the same")
-    if len(time) < 2 or not np.all(np.diff(time) > 0):
+    if len(time) < 2 or out_of_order(time).any():
         raise InputError(source, f"episode {chosen}: expected increasing timestamps")
     joints = _names(path, goals.shape[1])
     scales, problems = _scales(joints, positions)

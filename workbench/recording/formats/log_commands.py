@@ -10,6 +10,16 @@ from workbench.motion.commands import Commands
 Array = NDArray[np.float64]
 
 
+def out_of_order(time: Array) -> NDArray[np.bool_]:
+    """Which of times (N,) [any unit] are no number, or do not follow the one before; nor do they where it shows only in what is
+    counted from the first row: beside -1e308 all others are alike."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        since = time - time[:1]
+        bad = ~np.isfinite(since)
+        bad[1:] |= ~(np.diff(since) > 0)
+    return np.asarray(bad)
+
+
 def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_],
                      initial: Array | None = None, speeds: Array | None = None) -> Commands:
     """Rows of goals (N, n) [rad] at times (N,) [s] as commands, zero at the first row, only where something changes.

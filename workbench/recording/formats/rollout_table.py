@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.recording.formats.log_commands import out_of_order
 from workbench.recording.formats.numbers import number_columns
 from workbench.recording.take import Take
 from workbench.robot import InputError
@@ -79,7 +80,7 @@ def load_rollout(path: str | Path) -> Take:
     time = columns.get("time")
     if time is None or not joints:
         raise InputError(path, "line 4: expected the columns 'time' and 'position.JOINT'")
-    if not len(time) or not np.isfinite(time).all() or np.any(np.diff(time) <= 0):
+    if not len(time) or out_of_order(time).any():
         raise InputError(path, "column 'time': expected increasing numbers")
 
     def stacked(names: list[str], unit: float = 1.0) -> Array | None:

@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
@@ -91,9 +91,9 @@ def read_ros_csv(path: Path) -> Recording:
         time = time - time[0] + 1e-9 * column(table, nano_at)
     whole = np.isfinite(time) & np.isfinite(goals).all(axis=1) & np.isfinite(positions).all(axis=1)
     time, goals, positions = time[whole], goals[whole], positions[whole]
-    if len(time) < 2 or not np.all(np.diff(time) > 0):
+    scale = next((of for least, of in _EPOCHS if len(time) and time[0] > least), 1.0)
+    if len(time) < 2 or out_of_order(time).any() or out_of_order((time - time[0]) * scale).any():
         raise InputError(source, f"column '{cells[time_at]}': expected increasing times in two rows or more")
-    scale = next((of for least, of in _EPOCHS if time[0] > least), 1.0)
     time = (time - time[0]) * scale
     joints = tuple(_name(table, names, k) for k in keys)
     channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}

@@ -14,7 +14,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
-from workbench.recording.formats.log_commands import commands_of_rows
+from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import map_file, rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.joint_names import SO101_JOINTS as JOINTS
@@ -149,7 +149,7 @@ def _recording(source: str, name: str, joints: tuple[str, ...], t_cmd: Array, go
     for what, t in (("command", t_cmd), ("measurement", time)):
         if len(t) == 0:
             raise InputError(source, f"{of}expected {what} times, found none")
-        bad = ~np.isfinite(t) | (np.diff(t, prepend=-np.inf) <= 0) | (np.diff(t - t[0], prepend=-np.inf) <= 0)
+        bad = out_of_order(t)
         if bad.any():
             n = int(np.argmax(bad))
             raise InputError(source, f"{of}{what} {n + 1} of {len(t)}: time {t[n]:.10g} s does not follow; expected increasing "
