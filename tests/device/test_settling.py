@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.device.servos import arm, robot
-from tests.device.test_play import played
+from tests.device.test_play import OPTIONS, played
 from workbench.device.virtual import seconds
 
 
@@ -24,4 +24,5 @@ def test_a_joint_that_hangs_is_brought_to_neutral_itself_and_let_down_from_there
     assert down[0] - above[0] == pytest.approx(0.3, abs=0.02)
     log = np.genfromtxt(tmp_path / "wave.csv", delimiter=",", names=True, deletechars="")
     first = log["time"][np.abs(log["goal.one"]) > 1e-6][0]
-    assert first == pytest.approx(result.started - down[0], abs=0.02), "the log begins when all were told neutral for good"
+    assert first == pytest.approx(OPTIONS.rest, abs=0.02), "the log begins when all have come to rest"
+    assert result.started - down[0] == pytest.approx(OPTIONS.seat_seconds + OPTIONS.rest, abs=0.03)

@@ -29,11 +29,11 @@ class _Content:
     read: dict[str, list[Sequence[float]]] = field(default_factory=dict)
     torque: list[tuple[float, dict[str, bool]]] = field(default_factory=list)
     rests: list[float] = field(default_factory=list)
-    """When the goal was sent in which it then rested."""
+    """When it had come to rest in neutral."""
 
 
 def finish_log(journal: str | Path, log: str | Path) -> Path:
-    """Writes the joint log (docs/formats.md, section 3), whole or not at all. Time zero is the first goal of the rest in neutral.
+    """Writes the joint log (docs/formats.md, section 3), whole or not at all. Time zero is when it has come to rest in neutral.
 
     A row every 20 ms and at each pose; goals and moving speeds as they were sent; positions, between two readings of a servo, on
     the line between them; duty where the servo's output is what it reports. InputError where nothing was read.
@@ -83,12 +83,12 @@ def _take(content: _Content, entry: Mapping[str, Any]) -> None:
         content.read.setdefault(entry["joint"], []).append(row)
     elif "torque" in entry:
         content.torque.append((entry["t"], entry["torque"]))
-    elif "rest" in entry and content.sent:
-        content.rests.append(content.sent[-1][0])
+    elif "rest" in entry:
+        content.rests.append(entry["t"])
 
 
 def _rest_begins(content: _Content) -> float:
-    """When the last goal before the rest in neutral was sent; where it never came to that, the first goal of all."""
+    """When the rest in neutral begins; where it never came to that, when the first goal of all was sent."""
     return content.rests[0] if content.rests else content.sent[0][0]
 
 

@@ -23,12 +23,12 @@ Progress = Callable[[str, float | None], None]
 class PlayOptions:
     """How a motion is played.
 
-    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of a
-    ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within: how
-    long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there itself
-    before it is let down onto its droop [rad]; seat_seconds: how long it gets for that [s]. rest: how long the robot stands in
-    neutral before the first pose and after the last [s]; a recording needs half a second of it. watchdog: silence after which
-    servos that can stop by themselves do [s]. hold: torque stays on at the end.
+    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of
+    a ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within:
+    how long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there
+    itself before it is let down onto its droop [rad]; seat_seconds: how long it gets for that, and then to come to rest [s].
+    rest: how long the robot stands in neutral before the first pose and after the last [s]; a recording needs half a second of
+    it. watchdog: silence after which servos that can stop by themselves do [s]. hold: torque stays on at the end.
     """
 
     ramp_speed: float = 0.6
@@ -194,6 +194,7 @@ class _Performance:
         if self.goals != dict(target):
             self.goals = dict(target)
             self.rig.send(self.goals, speeds)
+            self._read_until(self.rig.bus.now() + self.options.seat_seconds)
 
     def _rest(self) -> None:
         self.progress("resting in neutral", None)
