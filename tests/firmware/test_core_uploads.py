@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import struct
 import zlib
+from collections.abc import Sequence
 
 import pytest
 
@@ -37,12 +39,33 @@ def test_an_upload_is_forgotten_after_two_seconds_of_silence() -> None:
         assert [m.result for m in sim.messages() if isinstance(m, AnswerMessage)] == [result]
 
 
+def of_one_pose(ids: Sequence[int], dwell: int = 140, goal: int = 512, speed: int = 5) -> bytes:
+    """A whole table of joints with these bus IDs; their speed may be as high as a servo's register."""
+    body = struct.pack("<4sBBHHHI", b"WBTB", 1, len(ids), 1, 0, 0, 24 + 16 * len(ids))
+    body += b"".join(struct.pack("<BBHHHHH", bus_id, 0, 12, 0, 1023, 1023, 512) for bus_id in ids)
+    body += struct.pack("<I", dwell) + struct.pack("<HH", goal, speed) * len(ids)
+    return body + struct.pack("<I", zlib.crc32(body))
+
+
+@pytest.mark.parametrize(("joints", "accepted"), [(0, False), (1, True), (26, True), (27, False)])
+def test_a_table_has_one_to_26_joints(joints: int, accepted: bool) -> None:
+    data = of_one_pose(range(joints))
+    assert (core().table_check(data, len(data)) == 0) == accepted
+
+
+@pytest.mark.parametrize("speed", [0, 440, 441, 1023])
+def test_no_joint_is_thought_faster_than_one_that_goes_at_once(speed: int) -> None:
+    """999 counts a second, 139 in 140 ms; a tenth and 8 counts more are granted."""
+    reach = core().table_reachable
+    reach.restype = ctypes.c_bool
+    for away, reached in ((139 + 13 + 8, True), (139 + 13 + 9, False)):
+        assert reach(of_one_pose([1], goal=300 + away, speed=speed), (ctypes.c_uint16 * 26)(300)) == reached
+
+
 @pytest.mark.parametrize(("dwell", "bus_id", "accepted"), [
     (10, 253, True), (9, 253, False), (600_000, 0, True), (600_001, 0, False), (100, 254, False)])
 def test_the_table_at_its_bounds(dwell: int, bus_id: int, accepted: bool) -> None:
-    body = struct.pack("<4sBBHHHI", b"WBTB", 1, 1, 1, 0, 0, 40) + struct.pack("<BBHHHHH", bus_id, 0, 12, 512, 512, 5, 512)
-    body += struct.pack("<IHH", dwell, 512, 5)
-    data = body + struct.pack("<I", zlib.crc32(body))
+    data = of_one_pose([bus_id], dwell)
     assert (core().table_check(data, len(data)) == 0) == accepted
     if accepted:
         decode_table(data)
