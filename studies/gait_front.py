@@ -110,8 +110,11 @@ def _drawn(rows: list[dict[str, Any]], walk: tuple[float, float]) -> Figure:
     axes.plot([r["RMS torque N m"] for r in front], [r["speed m/s"] for r in front], color=ACCENT, lw=1.5, label="front")
     for r in rows:
         axes.plot([r["RMS torque N m"]] * 2, [r["speed, 5th percentile"], r["speed m/s"]], color=SIMULATED, lw=1, alpha=0.6)
-    axes.plot([r["RMS torque N m"] for r in rows], [r["speed m/s"] for r in rows], "o", color=SIMULATED,
-              label="certified; line down to the 5th percentile of 64 robots")
+    certified = "certified; line down to the 5th percentile of the draws"
+    for kept, face, label in ((True, SIMULATED, certified), (False, "white", "refused")):
+        here = [r for r in rows if r["kept"] == kept]
+        axes.plot([r["RMS torque N m"] for r in here], [r["speed m/s"] for r in here], "o", color=SIMULATED, markerfacecolor=face,
+                  label=label if here else None)
     axes.plot(walk[1], walk[0], "s", color=OTHERS[0], label="ROBOTIS walk")
     axes.axvline(RULE, color=OTHERS[3], ls=":", lw=1, label="a fifth of stall")
     axes.set_xlabel("largest RMS torque of a servo [N m]")
