@@ -5,7 +5,8 @@
 Diagnoses each session whole, then once more without each effect that was found, and compares what both models leave on stretches
 that no fit saw: chi squared in blocks of half a second, by Wilcoxon's signed-rank test, as few blocks hold most of it.
 "explained" is wrong where the whole vocabulary leaves less, at one in a thousand. Sessions: data/tutorial_arm unless others are
-named. Writes numbers.json, kept up as it goes on: started again, it does not ask again what is there.
+named. Writes numbers.json after each of them: started again, it diagnoses each session whole again, and without an effect only
+where that is not there.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -25,8 +26,9 @@ from studies.common import ROOT
 from workbench.cli.progress import Progress
 from workbench.compare.session import Session, load_session
 from workbench.identify.diagnosis import DiagnosisResult, diagnose_session
-from workbench.identify.results.take_report import TakeReport
+from workbench.identify.results.take_report import TakeReport, rms
 from workbench.robot import InputError
+from workbench.robot.files import write_whole
 
 BLOCK = 0.5
 """Length of the stretches whose sums of squares count as one draw [s]: longer than what a servo remembers, a third of a step."""
@@ -61,8 +63,7 @@ class Asked:
 
 def unseen_squares(take: TakeReport) -> list[float]:
     """Sums of squared residuals over noise of each block that is at least half unseen."""
-    use = take.unseen if take.unseen.any() else np.ones(len(take.unseen), dtype=bool)
-    block = np.floor((take.time - take.time[0]) / BLOCK).astype(int)
+    use, block = take.judged, np.floor((take.time - take.time[0]) / BLOCK).astype(int)
     squares = np.nansum(np.square(take.after), axis=1)
     return [float(squares[here & use].sum()) for here in (block == b for b in np.unique(block)) if use[here].mean() > 0.5]
 
@@ -74,17 +75,12 @@ def by_accident(whole: DiagnosisResult, less: DiagnosisResult) -> float:
 
 
 def _rms(result: DiagnosisResult, nominal: bool) -> float:
-    parts = []
-    for t in result.takes:
-        use = t.unseen if t.unseen.any() else np.ones(len(t.unseen), dtype=bool)
-        parts.append((t.before if nominal else t.after)[use].ravel())
-    return float(np.sqrt(np.nanmean(np.square(np.concatenate(parts)))))
+    return rms(np.concatenate([(t.before if nominal else t.after)[t.judged].ravel() for t in result.takes]))
 
 
-def ask(name: str, session: Session, known: Sequence[Asked], jobs: int, progress: Progress) -> list[Asked]:
-    """All rows of a session, those that are known as they are."""
+def ask(name: str, session: Session, known: Sequence[Asked], jobs: int, progress: Progress) -> Iterator[Asked]:
+    """Each row of a session, those that are known as they are."""
     whole = diagnose_session(session, lambda what, share: progress(f"{name}: {what}", share), jobs)
-    out = []
     for effect in dict.fromkeys(f.effect for f in whole.diagnosis.findings):
         row = next((k for k in known if (k.session, k.without) == (name, effect)), None)
         if row is None:
@@ -95,8 +91,7 @@ def ask(name: str, session: Session, known: Sequence[Asked], jobs: int, progress
                         tuple((f.effect, "/".join(f.where), round(f.confidence, 3)) for f in less.diagnosis.findings),
                         (_rms(whole, True), _rms(less, False), _rms(whole, False)), by_accident(whole, less),
                         time.process_time() - began)
-        out.append(row)
-    return out
+        yield row
 
 
 def _known(file: Path) -> list[Asked]:
@@ -113,17 +108,18 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "runs/studies/effect_left_out", metavar="DIR")
     parser.add_argument("--jobs", type=int, default=1, metavar="N")
     arguments = parser.parse_args(argv)
-    arguments.out.mkdir(parents=True, exist_ok=True)
     file = arguments.out / "numbers.json"
     rows = _known(file)
     try:
+        arguments.out.mkdir(parents=True, exist_ok=True)
         with Progress("study effect_left_out") as progress:
             for path in arguments.sessions:
                 session = load_session(path)
                 name = session.path.parent.name
-                rows = [r for r in rows if r.session != name] + ask(name, session, rows, arguments.jobs, progress)
-                file.write_text(json.dumps({"asked": [asdict(r) for r in rows]}, indent=1) + "\n")
-    except InputError as e:
+                for row in ask(name, session, tuple(rows), arguments.jobs, progress):
+                    rows = [r for r in rows if (r.session, r.without) != (name, row.without)] + [row]
+                    write_whole(file, json.dumps({"asked": [asdict(r) for r in rows]}, indent=1) + "\n")
+    except (InputError, OSError) as e:
         print(f"studies.effect_left_out: {e}", file=sys.stderr)
         return 2
     print("| session | without | verdict | named instead | rms over noise: nominal, without, with | by accident | CPU [s] |")

@@ -12,29 +12,25 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from studies.common import publish, run_study
+from workbench.device.limits import RECOMMENDED
 from workbench.gait.certificate import NAME, PUPPY_CLAIM
 from workbench.gait.engines import other_engine
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import measure
-from workbench.gait.optimize import MEMORY, optimize, options_of, write_gait
+from workbench.gait.optimize import MEMORY, optimize, options_of, robotis_walk, write_gait
 from workbench.gait.request import Request
-from workbench.motion import load_motion
-from workbench.robot import data_file, puppy_model
-from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.robot import ServoConstants, puppy_model
 from workbench.view.figures.style import ACCENT, OTHERS, SIMULATED, new_figure, styled
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 
 SPEEDS = (0.05, 0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40)
 """To keep on the nominal robot [m/s]."""
 EFFORT = 2
-RULE = 0.28
-"""A fifth of the AX-12A's stall torque at 11.1 V [N m]: what ROBOTIS advises for a servo that works on."""
-WALK_SECONDS = 6.0
+RULE = RECOMMENDED * ServoConstants().torque_at_full_duty
+"""What ROBOTIS advises for an AX-12A that works on [N m]."""
 
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
@@ -47,26 +43,29 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         progress(f"gentlest at {speed:g} m/s", k / len(speeds))
         if not (folder / NAME).exists():
             folder.mkdir(parents=True, exist_ok=True)
-            _sought(folder, speed, 1 if quick else EFFORT)
+            _sought(folder, speed, 1 if quick else EFFORT, lambda what, share=None, v=speed, k=k: progress(  # type: ignore[misc]
+                f"gentlest at {v:g} m/s: {what}", k / len(speeds)))
         if (folder / NAME).exists():
             rows.append(_row(speed, json.loads((folder / NAME).read_text())))
-    walk = _walk()
+    m = robotis_walk(model)
+    walk = float(m.speed), float(max(m.rms))
+    figure = _drawn(rows, walk)
     said = "; ".join(f"{r['RMS torque N m']:.2f} N m at {r['speed m/s']:.2f} m/s" for r in _front(rows))
     report = Report("Speed against torque", f"On the model, the front: {said or 'nothing found'}.",
                     f"{__doc__}\n\n{PUPPY_CLAIM}", [], Provenance.of(model))
     header = ["asked [m/s]", "goes [m/s]", "5th percentile [m/s]", "fell of draws", "largest RMS torque [N m]", "of",
               "95th percentile [N m]", "heading [deg/m RMS]", "certificate"]
     report.add(Section("Certified gaits", [
-        Picture(_drawn(rows, walk), f"The ROBOTIS walk: {walk[0]:.2f} m/s at {walk[1]:.2f} N m."),
+        Picture(figure, f"The ROBOTIS walk: {walk[0]:.2f} m/s at {walk[1]:.2f} N m."),
         Table(header, [list(map(str, _cells(r))) for r in rows]),
         Text("A gait is on the front where no other goes at least as fast with less torque.")]))
-    return publish(out, model, report, {"gaits": rows, "ROBOTIS walk": walk}, {"front": _drawn(rows, walk)})
+    return publish(out, model, report, {"gaits": rows, "ROBOTIS walk": walk}, {"front": figure})
 
 
-def _sought(folder: Path, speed: float, effort: int) -> None:
+def _sought(folder: Path, speed: float, effort: int, progress: Callable[[str, float | None], None]) -> None:
     request = Request(speed=speed, aim="gentleness")
     result = optimize(GaitMachine(puppy_model()), request, load_ensemble(), options_of(effort, 0, 2),
-                      lambda what, share=None: None, folder / MEMORY, other_engine())
+                      progress, folder / MEMORY, other_engine())
     if result.table is not None and result.certified is not None:
         write_gait(folder, result.table, result.certified)
 
@@ -90,16 +89,6 @@ def _front(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     kept = [r for r in rows if r["kept"]]
     return [r for r in kept if not any(o is not r and o["speed m/s"] >= r["speed m/s"] and
                                        o["RMS torque N m"] < r["RMS torque N m"] for o in kept)]
-
-
-def _walk() -> tuple[float, float]:
-    """Speed and largest RMS torque of the ROBOTIS walk on the nominal robot."""
-    model = puppy_model()
-    motion = load_motion(data_file("robotis_walk.csv"), model)
-    cycles = int(np.ceil(WALK_SECONDS / motion.duration))
-    (take,) = simulate_batch([Job(model, SimulationConfig(), motion.commands(cycles), cycles * motion.duration, 0.3)])
-    m = measure(take, model, motion.duration, motion.duration)
-    return float(m.speed), float(max(m.rms))
 
 
 @styled

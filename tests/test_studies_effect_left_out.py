@@ -11,7 +11,7 @@ def told(scale, seed=0):
     """A result of one take: 20 s at 50 Hz, two channels, the second half unseen."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 20.0, 0.02)
-    take = SimpleNamespace(time=time, unseen=time >= 10.0, after=scale * rng.normal(size=(len(time), 2)))
+    take = SimpleNamespace(time=time, judged=time >= 10.0, after=scale * rng.normal(size=(len(time), 2)))
     return SimpleNamespace(takes=(take,))
 
 

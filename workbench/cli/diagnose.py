@@ -35,8 +35,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
-                        help="an effect that is known not to be there and not looked for, by its name in docs/effects.md; may be "
-                        "said again for others")
+                        help="do not look for this effect (a name of docs/effects.md), because you know that it is not there; "
+                        "may be given several times")
     parser.set_defaults(run=run)
 
 

@@ -20,7 +20,7 @@ from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.finalists import finely
 from workbench.gait.limits import Margin, binding
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import measure
+from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.planned import planned_seeds
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, search
@@ -163,15 +163,20 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
 
 def walk_speed(model: RobotModel) -> float:
     """Speed of the ROBOTIS walk on this robot [m/s], in its servos. InputError for a robot that cannot play it forwards."""
+    speed = robotis_walk(model).speed
+    if speed <= 0:
+        raise InputError(None, "the ROBOTIS walk does not go forwards on this robot; expected a speed (--speed V)")
+    return speed
+
+
+def robotis_walk(model: RobotModel) -> GaitMeasure:
+    """What the ROBOTIS walk does on this robot in six seconds. InputError for a robot that has not its joints."""
     try:
         motion = load_motion(data_file(WALK), model)
     except InputError:
         raise InputError(None, "the ROBOTIS walk is not for this robot; expected a speed (--speed V)") from None
     take = simulate_batch([Job(model, SimulationConfig(), motion.commands(13), 6.0)])[0]
-    speed = measure(take, model, motion.duration, motion.duration).speed
-    if speed <= 0:
-        raise InputError(None, "the ROBOTIS walk does not go forwards on this robot; expected a speed (--speed V)")
-    return speed
+    return measure(take, model, motion.duration, motion.duration)
 
 
 def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:

@@ -79,7 +79,7 @@ class _Explained:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Settings:
     """How a session is diagnosed. began: time.monotonic of the start; the rest as in `diagnose_session`."""
 
     progress: Progress
@@ -89,12 +89,12 @@ class _Asked:
     without: frozenset[str]
     began: float
 
-    def may(self, effect: str) -> bool:
-        """Whether an effect of that name may be found."""
+    def searches(self, effect: str) -> bool:
+        """Whether an effect of that name is looked for."""
         return effect not in self.without
 
-    def said(self) -> dict[str, object]:
-        """For the provenance."""
+    def provenance(self) -> dict[str, object]:
+        """What the results say of them."""
         return {"without": sorted(self.without)} if self.without else {}
 
 
@@ -105,24 +105,25 @@ def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs:
     effects that are known not to be there, and are not looked for; InputError where one is no effect. Rollouts are the compiled
     station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
-    asked = _Asked(progress, n_jobs, memory, thorough, frozenset(effect_named(name).name for name in without), time.monotonic())
+    absent = frozenset(effect_named(name).name for name in without)
+    settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic())
     try:
-        return _diagnosed(session, config, asked, {"rollouts by": "the compiled station"})
+        return _diagnosed(session, config, settings, {"rollouts by": "the compiled station"})
     except EnginesPartError as why:
         progress(f"{why}: again by Drake", None)
         by_drake = {"rollouts by": "Drake", "because": str(why)}
-        return _diagnosed(session, replace(config, engine="drake"), asked, by_drake)
+        return _diagnosed(session, replace(config, engine="drake"), settings, by_drake)
 
 
-def _diagnosed(session: Session, config: SimulationConfig, asked: _Asked, engine: Mapping[str, str]) -> DiagnosisResult:
+def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, engine: Mapping[str, str]) -> DiagnosisResult:
     """By one engine; EnginesPartError where that is not Drake and Drake says otherwise."""
-    progress = asked.progress
+    progress = settings.progress
     # 1. What the recordings show, channel by channel, over what noise and numerics alone make of each
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
-    seen = prepared(session, takes, config, asked.n_jobs, progress)
+    seen = prepared(session, takes, config, settings.n_jobs, progress)
     check_duration(session, seen.evidence)
-    evaluator = RolloutEvaluator(seen.evidence, config, asked.n_jobs, asked.memory)
+    evaluator = RolloutEvaluator(seen.evidence, config, settings.n_jobs, settings.memory)
     nominal = Search(evaluator, session.model).evaluated([])
     progress("judging the engine", None)
     apart = {BESIDE_DRAKE.format("nominal"): judged(evaluator, session.model, "nominal")}
@@ -133,23 +134,25 @@ def _diagnosed(session: Session, config: SimulationConfig, asked: _Asked, engine
     # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames
     measured = geometry_of(session.model, evaluator.evidence, nominal.residuals) if gap else Geometry()
     build = _believed(measured, evaluator, session.model, nominal)
-    build = replace(build, measured=tuple(m for m in (*build.measured, *read_off_registers(session)) if asked.may(m.effect)))
+    read_off = (*build.measured, *read_off_registers(session))
+    build = replace(build, measured=tuple(m for m in read_off if settings.searches(m.effect)))
     known = session.with_model(build.added_to(session.model))
     sent = _again(evaluator, known, takes, progress) if build.measured else evaluator
     evidence = sent.evidence
     begun = Search(sent, known.model).evaluated([])
-    played = TakesAsPlayed(sent, without=asked.without)
+    played = TakesAsPlayed(sent, without=settings.without)
     evaluator, missed = played.without_missed(known.model, begun.residuals)
     pool = build.asked(candidates(known.model, evidence)) + read_off_candidates(known.model, evidence, begun.residuals)
-    pool = [c for c in pool if asked.may(c.effect.name)]
+    pool = [c for c in pool if settings.searches(c.effect.name)]
 
     if gap and is_by_logs(evidence):
-        return _by_evidence(session, known.model, seen, evaluator, pool, nominal, build, missed, gap, unreadable, asked,
+        return _by_evidence(session, known.model, seen, evaluator, pool, nominal, build, missed, gap, unreadable, settings,
                             {**engine, **apart})
 
     # 4. Which effects explain it: searched for on a part of long sessions, compared with their rivals, numbers refined
     looked_at = data_subset(rebalanced(evaluator.evidence, begun.residuals), begun.residuals)
-    chosen = select(Search(evaluator.on(looked_at), known.model), pool, progress, asked.thorough, replace(played, missed=missed))
+    chosen = select(Search(evaluator.on(looked_at), known.model), pool, progress, settings.thorough,
+                    replace(played, missed=missed))
     explained = _compared(chosen, progress)
     search, fit = explained.search, explained.fit
 
@@ -171,7 +174,7 @@ def _diagnosed(session: Session, config: SimulationConfig, asked: _Asked, engine
         model=fitted.with_effects((*fitted.effects, *(m.spec for m in chosen.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=rejected(looked_at, fit, chosen.rounds, explained.posteriors, nominal.residuals),
         unexplained=left, posterior=posterior(fit, (*build.measured, *chosen.missed)),
-        provenance=provenance(session.model, config, time.monotonic() - asked.began) | asked.said()
+        provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": search.evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(looked_at),
         stopped=chosen.stopped, left_out=unreadable + seen.left_out)
@@ -181,9 +184,9 @@ def _diagnosed(session: Session, config: SimulationConfig, asked: _Asked, engine
 
 def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator: RolloutEvaluator, pool: Sequence[Candidate],
                  nominal: Fit, build: Geometry, missed: Sequence[DroppedCommands], gap: tuple[GapEntry, ...],
-                 unreadable: LeftOut, asked: _Asked, engine: Mapping[str, str | float]) -> DiagnosisResult:
+                 unreadable: LeftOut, settings: _Settings, engine: Mapping[str, str | float]) -> DiagnosisResult:
     """Steps 4 to 6 of servo logs, by evidence. engine: whose rollouts these are, and how far it is from Drake."""
-    progress = asked.progress
+    progress = settings.progress
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
     explained = explain(evaluator, known, pool, progress)
     fitted = explained.model
@@ -202,7 +205,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
         model=fitted.with_effects((*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
         findings=findings, rejected=explained.losers(), unexplained=left,
         posterior=Posterior() if missed else explained.posterior(),
-        provenance=provenance(session.model, evaluator.config, time.monotonic() - asked.began) | asked.said()
+        provenance=provenance(session.model, evaluator.config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **final}},
         left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)

@@ -49,10 +49,14 @@ class TakeReport:
         """Since the first command (N,) [s]."""
         return self.recorded.since_start
 
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Frames (N,) that a model is judged on: the unseen ones, or all where there are none."""
+        return self.unseen if self.unseen.any() else np.ones(len(self.unseen), dtype=bool)
+
     def ratios(self, residual: Array) -> dict[str, float]:
-        """RMS of `before` or `after` on unseen frames (on all where there are none), by channel; NaN where never seen."""
-        use = self.unseen if self.unseen.any() else np.ones(len(self.unseen), dtype=bool)
-        return {c: rms(residual[use, i]) for i, c in enumerate(self.channels)}
+        """RMS of `before` or `after` on the frames `judged`, by channel; NaN where never seen."""
+        return {c: rms(residual[self.judged, i]) for i, c in enumerate(self.channels)}
 
     def sigma(self, joint: str) -> float:
         """What noise and numerics make of a joint's residual (standard deviation) [rad]; NaN where it was never seen."""
