@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 
 
 def out_of_order(time: Array) -> NDArray[np.bool_]:
-    """Which of times (N,) [any unit] are no number, or do not follow the one before; nor do they where it shows only in what is
-    counted from the first row: beside -1e308 all others are alike."""
+    """Which of times (N,) [any unit] are not finite, or not later than the one before. Times are compared after the first is
+    subtracted, as readers do that: a first time of -1e308 makes all the others equal."""
     with np.errstate(over="ignore", invalid="ignore"):
         since = time - time[:1]
         bad = ~np.isfinite(since)
