@@ -159,7 +159,7 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
     later = [s | {"code": "later"} for s in whole["sessions"][2:]]
     changed = section(whole | {"sessions": [*whole["sessions"][:2], *later]}).replace("\n", " ")
     assert "**The workbench changed during the trial**: 2 sessions by" in changed
-    assert "3 sessions by later, which named" in changed
+    assert "3 sessions by the code with digest later, which identified" in changed
     (tmp_path / "elsewhere.md").write_text("nothing")
     with pytest.raises(ValueError, match="expected the lines"):
         keep(whole, tmp_path / "trial.json", tmp_path / "elsewhere.md")

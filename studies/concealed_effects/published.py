@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from studies.concealed_effects.score import Score
-from studies.concealed_effects.summary import bounds
+from studies.concealed_effects.summary import bounds, by_effect
 from workbench.robot.files import read_text, write_whole
 
 RESULTS = Path(__file__).parent / "results" / "trial.json"
 PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
+SUREST = 0.9
+"""Confidence from which a finding counts among the surest."""
 BEGIN, END = "<!-- trial: written by `python -m studies.concealed_effects --keep` -->", "<!-- /trial -->"
 
 
@@ -56,6 +59,9 @@ def section(result: Mapping[str, Any] | None) -> str:
     rows = ["| | asked | got | met |", "|---|---|---|---|"]
     words = {True: "yes", False: "**no**", None: "–"}
     rows += [f"| {c['what']} | {c['asked']} | {c['got']} | {words[c['met']]} |" for c in result["criteria"]]
+    others = result["diagnosed"] - result["quiet"]
+    rows.append(f"| false findings in the {others} other sessions | – | {result['false_alarms_elsewhere']} | – |")
+    scores = [Score.from_json(s) for s in result["sessions"]]
     n, planned = result["diagnosed"], result["planned"]
     partial = "" if n == planned else f"**Partial: {n} of {planned} sessions.** "
     seconds = result["seconds"]
@@ -67,10 +73,27 @@ def section(result: Mapping[str, Any] | None) -> str:
                  f"most {result['memory']['most'] / 1e9:.1f} GB. ")
     if result["gap_closed"] is not None:
         said += f"The models close {100 * result['gap_closed']:.0f} % of the gap on unseen takes (median). "
-    said += _by_version([Score.from_json(s) for s in result["sessions"]])
+    said += _surest(scores) + _by_version(scores)
     drawn = "the operating system" if result["seed_drawn_by"] == "os.urandom" else "hand: this is no trial"
     said += f"Seed drawn by {drawn}; seal {result['sha256_of_all'][:16]}. Every session: concealed_effects/results/trial.json."
-    return "\n".join([*rows, "", *_wrapped(said)]) + "\n"
+    return "\n".join([*rows, "", *_wrapped(said), "", *_effects(scores)]) + "\n"
+
+
+def _effects(scores: Sequence[Score]) -> list[str]:
+    """A row for each effect that was hidden."""
+    rows = ["| hidden effect | sessions | identified | in a tie of two | at the right place | error of the size, median |",
+            "|---|---|---|---|---|---|"]
+    for e in by_effect(scores):
+        placed = "–" if e.placed is None else f"{100 * e.placed:.0f} %"
+        error = f"{100 * median(e.errors):.1f} %" if e.errors else "–"
+        rows.append(f"| `{e.effect}` | {e.hidden} | {e.exact} | {e.tied} | {placed} | {error} |")
+    return rows
+
+
+def _surest(scores: Sequence[Score]) -> str:
+    """How many of the surest findings are true."""
+    surest = [true for s in scores for confidence, true in s.calibration if confidence >= SUREST]
+    return f"Of {len(surest)} findings with a confidence of {SUREST} and more, {sum(surest)} are true. " if surest else ""
 
 
 def _by_version(scores: Sequence[Score]) -> str:
@@ -84,7 +107,7 @@ def _by_version(scores: Sequence[Score]) -> str:
         effects = [e for s in own for e in s.effects]
         hits = sum(e.named for e in effects)
         low, high = bounds(hits, len(effects))
-        said.append(f"{len(own)} sessions by {code}, which named {hits} of {len(effects)} effects "
+        said.append(f"{len(own)} sessions by the code with digest {code}, which identified {hits} of {len(effects)} effects "
                     f"(95 % interval {100 * low:.0f} to {100 * high:.0f} %)")
     return f"**The workbench changed during the trial**: {'; '.join(said)}. "
 

@@ -1,4 +1,4 @@
-"""`workbench demo`: the whole loop on bundled data."""
+"""`workbench demo`: what the workbench does, on bundled data."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "demo",
-        help="the whole loop on bundled data, with a report to open at the end",
+        help="simulate, compare, diagnose and find a gait on bundled data, with a report to open at the end",
         description="Plays the ROBOTIS walk with the servo law and with ideal joints, in point and in hydroelastic contact, "
-        "prints the thesis's table with our rows under it, compares the walk with a bundled synthetic recording, and writes "
-        "the firmware tables and a report.",
+        "compares it with a bundled synthetic recording, finds the physics that is missing from the model of an arm, writes the "
+        "walk as firmware tables, searches for a new gait, and puts all of it into one report. A few minutes.",
     )
     add_out(parser, default="runs/demo")
     parser.set_defaults(run=run)
@@ -30,5 +30,6 @@ def run(args: argparse.Namespace) -> int:
         demo = run_demo(folder, progress)
     print(demo.table)
     print(f"\nagainst the bundled synthetic recording: {demo.finding}")
+    print(f"diagnosis of the bundled arm: {demo.diagnosed}")
     print(f"\nwrote {args.out}: open {args.out / demo.page.name}")
     return 0

@@ -1,4 +1,4 @@
-"""The whole loop on bundled data: the ROBOTIS walk simulated four ways beside the thesis, compared with a recording, exported."""
+"""The demo on bundled data: a walk simulated four ways and compared, a diagnosis, firmware tables, a new gait."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.simulation import SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
+from workbench.view.demo_diagnosis import diagnosis_section
 from workbench.view.demo_gait import gait_section
 from workbench.view.figures import body_attitude, body_path, by_joint, film_strip, footfalls, joint_grid, joint_torques, stance_of
 from workbench.view.report.comparison import headline, take_section
@@ -44,7 +45,8 @@ THESIS: tuple[Row, ...] = (
 _HEADER = ["six seconds of the ROBOTIS walk", "x [cm]", "y, up [cm]", "z, right [cm]"]
 _SUMMARY = (
     "The ROBOTIS walk, played by the servo law from the firmware's own table and followed exactly by ideal joints, in point "
-    "and in hydroelastic contact; then against a bundled recording, and turned into the robot's firmware tables; and a new gait.")
+    "and in hydroelastic contact, and compared with a bundled recording; a diagnosis of missing physics; the walk as the robot's "
+    "firmware tables; a new gait.")
 _SYNTHETIC = (
     "The recording is **synthetic**: the same robot in another engine (MuJoCo), filmed as a motion capture system would. Nothing "
     "is hidden in it, so what differs is the engine, the capture's noise, and what walking makes of both.")
@@ -52,11 +54,12 @@ _SYNTHETIC = (
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo found and wrote. table: the thesis's with our rows under it, as text. finding: of the comparison. page: the
-    report."""
+    """What the demo found and wrote. table: the thesis's with our rows under it, as text. finding: of the comparison.
+    diagnosed: of the diagnosis. page: the report."""
 
     table: str
     finding: str
+    diagnosed: str
     page: Path
     comparison: Comparison
 
@@ -69,6 +72,7 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     takes = _walks(model, motion, progress)
     session = load_session(data_file("synthetic_walk/session.yaml"))
     comparison = compare_session(session, progress=progress)
+    diagnosed = diagnosis_section(folder / "diagnosis", progress)
     progress("writing firmware tables", None)
     violations = export(motion, model, folder / "firmware", next(iter(takes.values()))).violations
     progress("drawing", None)
@@ -78,17 +82,19 @@ def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Dem
     rows = [*THESIS, *((label, *_end(take)) for label, take in takes.items())]
     lengths = [_end(take)[0] for take in takes.values()]
     report = Report(
-        "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and contact.",
+        "workbench demo", f"Six seconds of the ROBOTIS walk: {min(lengths):.0f} to {max(lengths):.0f} cm, by drive and "
+        f"contact. Of an arm: {diagnosed.said}",
         _SUMMARY, [(label, f"{_end(t)[0]:.1f} cm", f"heading {_heading(t):+.1f}°") for label, t in takes.items()],
         Provenance.of(model, seconds=time.monotonic() - began))
     report.add(_walk_section(rows, takes, model, folder))
     report.add(Section("Against a recording", [Text(_SYNTHETIC), Text(headline(comparison))]))
     for compared in comparison.takes:
         report.add(take_section(compared, session.model, folder / f"replay-{compared.name}-recorded.html"))
+    report.add(diagnosed.section)
     report.add(_firmware_section(motion, folder / "firmware", violations))
     report.add(gait_section(folder / "gait", model, progress))
     progress("drawing the report", None)
-    return Demo(_as_text(rows), headline(comparison), report.write(folder / "report.html"), comparison)
+    return Demo(_as_text(rows), headline(comparison), diagnosed.said, report.write(folder / "report.html"), comparison)
 
 
 def _walks(model: RobotModel, motion: Motion, progress: Callable[[str, float | None], None]) -> dict[str, Take]:

@@ -1,11 +1,11 @@
-"""docs/method.md names files that are there, and for each question of its table a file that answers it."""
+"""docs/reading-the-code.md names files that are there, and for each question of its table a file that answers it."""
 
 import re
 from pathlib import Path
 
 import pytest
 
-PAGE = (Path(__file__).parents[2] / "docs/method.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/reading-the-code.md").read_text(encoding="utf-8")
 ROOM = Path(__file__).parents[2] / "workbench"
 FILES = sorted(set(re.findall(r"`([\w/]+\.py)`", PAGE)))
 FOLDERS = sorted(set(re.findall(r"`([\w/]+/)`", PAGE)) - {"workbench/"})
