@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -13,10 +14,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.firmware.native import FIRMWARE, core, walk
-from workbench.device import read_table_file
-from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
-from workbench.motion import PoseTable, load_motion
-from workbench.robot import BUS_IDS, InputError, data_file
+from workbench.device import export, read_table_file
+from workbench.device.table_file import (
+    MOST_BYTES,
+    JointBounds,
+    TableFile,
+    decode_table,
+    encode_table,
+    most_poses,
+    table_bytes,
+    unplayable,
+)
+from workbench.motion import Motion, PoseTable, load_motion
+from workbench.robot import BUS_IDS, InputError, data_file, puppy_model
 
 WALK = load_motion(data_file("robotis_walk.csv")).as_table()
 
@@ -122,3 +132,25 @@ def test_what_the_controller_would_not_play_is_not_written() -> None:
     high = PoseTable(("blb",), np.array([[900]]), np.array([[5]]), np.array([50]))
     with pytest.raises(InputError, match="goal 900 is outside 100 to 800"):
         encode_table(TableFile(high, (JointBounds(15, low=100, high=800),)))
+
+
+@pytest.mark.parametrize(("joints", "poses"), [(15, 60), (1, 508), (26, 34)])
+def test_one_limit_for_the_workbench_and_the_controllers_program(joints: int, poses: int) -> None:
+    (limit,) = re.findall(r"#define TABLE_BYTES (\d+)u", (FIRMWARE / "core" / "limits.h").read_text())
+    assert int(limit) == MOST_BYTES
+    assert most_poses(joints) == poses
+    for count in (poses, poses + 1):
+        goals = np.full((count, joints), 512)
+        names = tuple(f"j{k}" for k in range(joints))
+        table = PoseTable(names, goals, np.full_like(goals, 5), np.full(count, 50))
+        data = encode_table(TableFile(table, tuple(JointBounds(k + 1) for k in range(joints))))
+        assert len(data) == table_bytes(joints, count)
+        assert (len(data) > MOST_BYTES) == bool(unplayable(table))
+
+
+def test_a_table_that_is_too_long_for_the_controller_is_exported_without_its_binary_and_said(tmp_path: Path) -> None:
+    times = np.arange(62) * 0.2
+    motion = Motion("long", times, WALK.joints, np.zeros((62, 15)))
+    exported = export(motion, puppy_model(), tmp_path)
+    assert "motion.table" not in [f.name for f in exported.files]
+    assert exported.no_binary == "61 poses of 15 joints make a table of 4104 bytes; the CM-530's program takes 4096 (60 poses)"

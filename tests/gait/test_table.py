@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from workbench.api.robots import load_model
 from workbench.device.firmware_tables import read_tables, write_tables
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.evaluate import table_sha256
@@ -88,6 +89,18 @@ def test_each_limit_of_the_table_is_told_by_name(machine):
     assert high[1].use > 1
     bent = binding(table_margins(machine, gait_table(machine, replace(TROT, crouch=0.09, lead=0.0)), limits))
     assert (bent.name, bent.use > 1) == ("range", True)
+
+
+def test_the_controllers_memory_is_a_limit_where_its_program_plays_the_servos(machine):
+    """A table of 4096 bytes: 60 poses of the puppy's 15 joints. The fox has another family's servos, which it cannot play."""
+    table = gait_table(machine, replace(TROT, poses=59, frequency=0.5, lead=0.0))
+    (poses,) = [m for m in table_margins(machine, table, GaitLimits()) if m.name == "poses"]
+    assert len(table.start) == 61
+    assert (poses.value, poses.limit, poses.use > 1) == (61, 60, True)
+    short = gait_table(machine, replace(TROT, poses=58, frequency=0.5, lead=0.0))
+    assert [m.use for m in table_margins(machine, short, GaitLimits()) if m.name == "poses"] == [1.0]
+    fox = GaitMachine(load_model("fox"))
+    assert "poses" not in [m.name for m in table_margins(fox, gait_table(fox, replace(TROT, poses=59, lead=0.0)), GaitLimits())]
 
 
 def test_links_that_come_near_each_other_are_named(machine):

@@ -44,7 +44,7 @@ def export(
 
     simulated: the motion as it ran in simulation; without it torque goes unchecked. InputError, and nothing written,
     where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
-    motion.table is for the CM-530's program, and left out where the servos are none that it speaks to.
+    motion.table is for the CM-530's program, and left out where that cannot play it (other servos, or too many poses).
     """
     table = motion.as_table()
     violations = refuse_broken_limits(table, model, force, simulated, "not exported")

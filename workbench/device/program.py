@@ -9,14 +9,12 @@ from pathlib import Path
 
 from workbench.device.limits import Violation, refuse_broken_limits
 from workbench.device.loader import LoaderProfile, check_image
-from workbench.device.table_file import TableFile, bounds_of, encode_table, read_table_file
+from workbench.device.table_file import TableFile, bounds_of, encode_table, read_table_file, too_long
 from workbench.motion import load_motion
 from workbench.robot import InputError, RobotModel
 from workbench.robot.resources import resource_dir
 
 COMPILER = "arm-none-eabi-gcc"
-MOST_BYTES = 4096
-"""Longest table that the controller takes over a link (firmware/core/limits.h); the same holds for the built-in one."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +44,9 @@ def build_program(motion: str | Path, model: RobotModel, profile: LoaderProfile,
     """Conversion, compilation and a look at the result; all in `folder`. InputError names what is in the way."""
     table, violations = table_of(motion, model, cycles, force)
     data = encode_table(table)
-    if len(data) > MOST_BYTES:
-        raise InputError(motion, f"{len(table.table)} poses make a table of {len(data)} bytes; the controller takes {MOST_BYTES}")
+    long = too_long(len(table.joints), len(table.table))
+    if long:
+        raise InputError(motion, long)
     if shutil.which(COMPILER) is None or shutil.which("make") is None:
         raise InputError(COMPILER, "not found; Debian: apt-get install --no-install-recommends gcc-arm-none-eabi make")
     folder.mkdir(parents=True, exist_ok=True)

@@ -23,6 +23,8 @@ AX12A_NUMBER = 12
 CENTRE, LARGEST = AX12A.centre, AX12A.highest
 MOST_JOINTS = 26
 """A Sync Write of goal and speed stays below the AX-12A's receive buffer of 143 bytes."""
+MOST_BYTES = 4096
+"""Longest table that the controller's program has room for, over a link or built in (firmware/core/limits.h)."""
 SHORTEST_MS, LONGEST_MS = 10, 600_000
 """Dwells: a Sync Write, its verification and a repair have to fit in; longer than ten minutes is a mistake [ms]."""
 
@@ -57,8 +59,8 @@ class TableFile:
 def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | None = None) -> tuple[JointBounds, ...]:
     """Bounds of a model's joints in counts, no narrower than what the table itself asks (`export` has checked it, or was forced).
 
-    numbers: model number of each joint's servo (default: the AX-12A's). InputError for a servo of another family, which the
-    controller's program does not speak to.
+    numbers: model number of each joint's servo (default: the AX-12A's). InputError for a table that the controller's program
+    cannot play.
     """
     other = unplayable(table)
     if other:
@@ -78,12 +80,36 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
 
 
 def unplayable(table: PoseTable) -> str:
-    """Why the controller's program cannot play a table, "" where it can: it speaks to servos of the AX-12A's family alone."""
+    """Why the controller's program cannot play a table, "" where it can: another servo family, or more poses than fit."""
+    return other_family(table) or too_long(len(table.joints), len(table))
+
+
+def other_family(table: PoseTable) -> str:
+    """Which servo the controller's program does not speak to, "" where all are of the AX-12A's family, as it needs them."""
     others = [(j, u.family) for j, u in zip(table.joints, table.units) if u != AX12A]
     if not others:
         return ""
     joint, family = others[0]
     return f"joint {joint} has a servo of the family {family}; the CM-530's program plays the AX-12A's alone"
+
+
+def too_long(joints: int, poses: int) -> str:
+    """Why so many poses of so many joints do not fit into the controller, "" where they do."""
+    size = table_bytes(joints, poses)
+    if size <= MOST_BYTES:
+        return ""
+    return (f"{poses} poses of {joints} joints make a table of {size} bytes; the CM-530's program takes {MOST_BYTES} "
+            f"({most_poses(joints)} poses)")
+
+
+def table_bytes(joints: int, poses: int) -> int:
+    """Size of a binary table [bytes]."""
+    return _HEAD.size + _JOINT.size * joints + (4 + 4 * joints) * poses + 4
+
+
+def most_poses(joints: int) -> int:
+    """How many poses of so many joints the controller's program takes in one table."""
+    return max(MOST_BYTES - table_bytes(joints, 0), 0) // (table_bytes(joints, 1) - table_bytes(joints, 0))
 
 
 def encode_table(file: TableFile) -> bytes:
@@ -94,7 +120,7 @@ def encode_table(file: TableFile) -> bytes:
         raise InputError(table.source, f"bounds of {len(file.joints)} joints for {len(table.joints)} columns")
     if len(table) > 0xFFFF or not 0 <= file.cycles <= 0xFFFF:
         raise InputError(table.source, f"{len(table)} poses, {file.cycles} cycles: expected at most 65535 of each")
-    size = _size(len(file.joints), len(table))
+    size = table_bytes(len(file.joints), len(table))
     parts = [_HEAD.pack(MAGIC, VERSION, len(file.joints) & 0xFF, len(table), flags, file.cycles, size)]
     try:
         parts += [_JOINT.pack(j.bus_id, 0, j.model_number, j.low, j.high, j.fastest, j.neutral) for j in file.joints]
@@ -124,8 +150,9 @@ def decode_table(data: bytes, names: Mapping[int, str] | None = None, source: st
         raise InputError(source, f"{poses} poses of {n} joints; expected at least one pose of 1 to {MOST_JOINTS} joints")
     if flags & ~STOPS or (flags & STOPS and not cycles):
         raise InputError(source, f"flags {flags:#x} with {cycles} cycles mean nothing")
-    if size != len(data) or size != _size(n, poses):
-        raise InputError(source, f"{len(data)} bytes, its head says {size}; {poses} poses of {n} joints take {_size(n, poses)}")
+    if size != len(data) or size != table_bytes(n, poses):
+        takes = table_bytes(n, poses)
+        raise InputError(source, f"{len(data)} bytes, its head says {size}; {poses} poses of {n} joints take {takes}")
     joints = _joints(data, n, source)
     if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
         raise InputError(source, "its CRC-32 does not fit its content")
@@ -140,10 +167,6 @@ def read_table_file(path: str | Path, names: Mapping[int, str] | None = None) ->
     except OSError as e:
         raise InputError(path, f"cannot be read ({e.strerror})") from None
     return decode_table(data, names, str(path))
-
-
-def _size(n: int, poses: int) -> int:
-    return _HEAD.size + _JOINT.size * n + (4 + 4 * n) * poses + 4
 
 
 def _joints(data: bytes, n: int, source: str) -> tuple[JointBounds, ...]:

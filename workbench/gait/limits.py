@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from workbench.device.table_file import most_poses, other_family
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.table import GaitTable
@@ -24,8 +25,7 @@ class GaitLimits:
     fuse: supply current [A] (CM-530: 10 A). reach: feet off the path asked for [m]: a millimetre is within play and rounding.
     clearance: between links [m]: 2 mm for cables and screw heads. lift: that each foot comes off the ground in each cycle [m]: 3
     mm, twice what a degree of play in a knee lets it hang; feet that drag go as the floor lets them.
-    capacity: poses in the controller's table: 512 poses of 15 servos take 32 kB, half of a CM-530's memory. bus: bit rate of the
-    servo bus [1/s].
+    bus: bit rate of the servo bus [1/s].
     tilt: of the base [rad], 30 deg, where the feet's track no longer holds the centre of mass over them. drift: change of heading
     by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. What a robot turns of its
     own zero offsets and latency is seen on its first metre, and a table of another `turn` straightens it: 0.06 rad a stance took
@@ -38,7 +38,6 @@ class GaitLimits:
     reach: float = 1e-3
     clearance: float = 2e-3
     lift: float = 3e-3
-    capacity: int = 512
     bus: float = 1e6
     tilt: float = float(np.radians(30))
     drift: float = float(np.radians(3))
@@ -75,7 +74,7 @@ def allowed_rms(machine: GaitMachine, limits: GaitLimits) -> np.ndarray:
 
 
 def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> list[Margin]:
-    """What can be told without a simulation: ranges, moving speeds, reach, self-contact, bus time, capacity."""
+    """What can be told without a simulation: ranges, moving speeds, reach, self-contact, bus time, the controller's memory."""
     model, out = machine.model, []
     for part in (table.cycle, table.start, table.stop):
         angles = part.angles()
@@ -90,7 +89,9 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
         out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))
     for i, leg in enumerate(machine.legs):
         out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))
-    out.append(_of("poses", "table", len(table.cycle) + len(table.start) + len(table.stop), limits.capacity, "poses"))
+    if not other_family(table.cycle):  # only the CM-530's program, which plays no other family, holds a table in its memory
+        poses = max(len(table.cycle), len(table.start), len(table.stop))  # each is a table of its own there
+        out.append(_of("poses", "table", poses, most_poses(len(model.joints)), "poses"))
     packet = 10 * (5 * len(model.joints) + 8) / limits.bus  # a Sync Write of goal and speed: ID and four bytes a servo
     out.append(_of("bus time", "robot", 1000 * packet, float(table.cycle.dwells_ms.min()), "ms of the shortest dwell"))
     return _worst(out)
