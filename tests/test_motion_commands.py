@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from workbench.motion import Commands
+from workbench.robot import InputError
 
 
 def test_reference_ramps_from_where_it_is() -> None:
@@ -29,7 +30,7 @@ def test_log_keeps_only_what_changes() -> None:
 
 
 def test_log_must_begin_with_a_goal() -> None:
-    with pytest.raises(ValueError, match="first sample"):
+    with pytest.raises(InputError, match="first sample"):
         Commands.from_log(np.arange(2.0), ("a",), np.array([[np.nan], [1.0]]))
-    with pytest.raises(ValueError, match="first sample"):
+    with pytest.raises(InputError, match="first sample"):
         Commands.from_log(np.zeros(0), ("a",), np.zeros((0, 1)))

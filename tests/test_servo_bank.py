@@ -158,10 +158,10 @@ def test_refuses_what_it_cannot_do(tmp_path):
 
 
 def test_servo_constants_refuse_two_laws_and_nonsense():
-    with pytest.raises(ValueError, match="excludes"):
+    with pytest.raises(InputError, match="excludes"):
         ServoConstants(proportional_gain=3.0)
-    with pytest.raises(ValueError, match="expected"):
+    with pytest.raises(InputError, match="expected"):
         replace(ServoConstants(), compliance_slope=None)
-    with pytest.raises(ValueError, match="supply_voltage"):
+    with pytest.raises(InputError, match="supply_voltage"):
         ServoConstants(supply_voltage=-1.0)
     assert ServoConstants().updated({"proportional_gain": 3.0}).compliance_slope is None

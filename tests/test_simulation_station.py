@@ -194,7 +194,7 @@ def test_refuses_what_it_cannot_do(puppy):
         Simulation(puppy_model(base="trunk"))
     with pytest.raises(InputError, match="cannot float"):
         Simulation(puppy_model(base="tail_link"))
-    with pytest.raises(ValueError, match="contact: expected one of point, hydroelastic"):
+    with pytest.raises(InputError, match="contact: expected one of point, hydroelastic"):
         SimulationConfig(contact="magic")
 
 

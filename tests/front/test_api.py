@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,10 @@ import pytest
 import workbench
 from models.build_fox import SHANK
 from tests.gap_sessions import record_arm, write_session
+from workbench.gait.examine import CertifyOptions
+from workbench.gait.limits import GaitLimits
+from workbench.gait.search import Budget
+from workbench.robot.model import Ground
 from workbench.view.scene.live import link_poses, open_meshcat, pose_by_sliders, show_session
 
 
@@ -68,9 +74,32 @@ def test_a_comparison_saves_and_shows_itself(session: workbench.Session, tmp_pat
     assert shown.count("<tr>") == 4
 
 
-def test_options_say_what_is_wrong() -> None:
-    with pytest.raises(workbench.InputError, match="jobs: expected 1 or more"):
-        workbench.DiagnoseOptions(jobs=0)
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: workbench.DiagnoseOptions(jobs=0), "jobs: expected 1 or more"),
+    (lambda: workbench.SimulationConfig(base="fly"), "base: expected one of free, fixed, path, got 'fly'"),
+    (lambda: workbench.SimulationConfig(time_step=-1.0), "time_step: expected a non-negative number"),
+    (lambda: workbench.SimulationConfig(time_step=0.0, drive="fast_servo"), "drive: fast_servo needs a discrete plant"),
+    (lambda: workbench.Request(way="up"), "way: expected one of forward, backward, sideways, turn, arc, got 'up'"),
+    (lambda: workbench.Request(speed=0.1, aim="beauty"), "aim: expected one of speed, gentleness, energy, smoothness"),
+    (lambda: workbench.OptimizeOptions(n_jobs=0), "n_jobs: expected a whole number of at least 1, got 0"),
+    (lambda: Budget(population=1), "population: expected a whole number of at least 2, got 1"),
+    (lambda: Budget(width=math.nan), "width: expected a positive number, got nan"),
+    (lambda: CertifyOptions(seconds=0.0), "seconds: expected a positive number, got 0.0"),
+    (lambda: CertifyOptions(variants=("3 ms",)), "variants: expected one of 2 ms, 1 ms, .*, got '3 ms'"),
+    (lambda: GaitLimits(rms=-0.1), "rms: expected a positive number, got -0.1"),
+    (lambda: Ground(friction=-1.0), "friction: expected a non-negative number"),
+])
+def test_options_say_what_is_wrong(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(workbench.InputError, match=said):
+        make()
+
+
+def test_a_run_says_what_it_lacks() -> None:
+    still = workbench.Simulation(workbench.load_model("puppy"), workbench.SimulationConfig(time_step=2e-3, base="path"))
+    with pytest.raises(workbench.InputError, match="expected commands, a trajectory or a duration"):
+        still.run()
+    with pytest.raises(workbench.InputError, match="base 'path' needs a take to follow"):
+        still.run(duration=0.1)
 
 
 def test_live_meshcat_shows_a_robot_and_moves_it_by_sliders() -> None:

@@ -19,6 +19,7 @@ from workbench.gait.table import GaitTable
 from workbench.motion import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.robot.option_checks import check_choice, check_positive, check_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 Array = NDArray[np.float64]
@@ -53,6 +54,12 @@ class CertifyOptions:
     floor_seconds: float = 2.0
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
+
+    def __post_init__(self) -> None:
+        check_whole(self, draws=0, checked=0, n_jobs=1)
+        check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds")
+        for name in self.variants:
+            check_choice("variants", name, VARIANTS)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from workbench.device.table_file import most_poses, other_family
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.table import GaitTable
+from workbench.robot.option_checks import check_positive
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,9 @@ class GaitLimits:
     drift: float = float(np.radians(3))
     spread: float = float(np.radians(45))
     aside: float = 0.1
+
+    def __post_init__(self) -> None:
+        check_positive(self, *(f.name for f in fields(self) if getattr(self, f.name) is not None))
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from workbench.motion import Motion, load_motion
 from workbench.motion.files import motion_text
 from workbench.robot import InputError, RobotModel, data_file
 from workbench.robot.files import write_together
+from workbench.robot.option_checks import check_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 WALK = "robotis_walk.csv"
@@ -62,6 +63,9 @@ class OptimizeOptions:
     n_jobs: int = 2
     given: tuple[GaitShape, ...] = ()
     planned: bool = True
+
+    def __post_init__(self) -> None:
+        check_whole(self, seed=0, n_jobs=1)
 
 
 @dataclass(frozen=True)

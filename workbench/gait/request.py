@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from workbench.gait.limits import GaitLimits, Margin
 from workbench.gait.measure import GaitMeasure
 from workbench.robot import EffectSpec, InputError, RobotModel
+from workbench.robot.option_checks import check_choice
 
 Way = Literal["forward", "backward", "sideways", "turn", "arc"]
 Aim = Literal["speed", "gentleness", "energy", "smoothness"]
@@ -41,6 +42,8 @@ class Request:
     limits: GaitLimits = field(default_factory=GaitLimits)
 
     def __post_init__(self) -> None:
+        check_choice("way", self.way, get_args(Way))
+        check_choice("aim", self.aim, get_args(Aim))
         if self.speed is not None and not 0 < self.speed < math.inf:
             raise InputError(None, f"speed: expected a positive number, got {self.speed:g}")
         if (self.way == "arc") != (self.radius is not None):

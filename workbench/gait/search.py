@@ -14,6 +14,7 @@ from workbench.gait.limits import Margin, binding
 from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
+from workbench.robot.option_checks import check_positive, check_whole
 
 STRAYING = ("drift", "curvature off the arc")
 """Limits that steering can keep."""
@@ -52,6 +53,10 @@ class Budget:
     enough: int = 3
     hopeless: float = 0.6
     finalists: int = 12
+
+    def __post_init__(self) -> None:
+        check_whole(self, seeds=1, starts=1, population=2, generations=0, robust=0, draws=0, pool=1, enough=1, finalists=1)
+        check_positive(self, "width")
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.robot import InputError
+
 Array = NDArray[np.float64]
 
 
@@ -30,9 +32,9 @@ class Commands:
     def __post_init__(self) -> None:
         shape = (len(self.times), len(self.joints))
         if self.goals.shape != shape or self.speeds.shape != shape or self.enabled.shape != shape:
-            raise ValueError(f"expected goals, speeds and enabled of shape {shape}")
+            raise InputError(None, f"commands: expected goals, speeds and enabled of shape {shape}")
         if np.any(np.diff(self.times) <= 0):
-            raise ValueError("command times must increase")
+            raise InputError(None, "commands: times must increase")
 
     @staticmethod
     def from_log(time: Array, joints: tuple[str, ...], goals: Array,
@@ -40,13 +42,13 @@ class Commands:
         """Commands of a log of goals. time: (N,) [s], increasing. goals: (N, n) [rad]. enabled: (N, n), default all.
 
         Moving speed 0 (at once); samples that change nothing are left out; a goal that is NaN keeps the one before.
-        Time zero is the log's first sample. ValueError where a joint's first goal is missing.
+        Time zero is the log's first sample. InputError where a joint's first goal is missing.
         """
         goals = np.asarray(goals, dtype=float)
         on = np.ones(goals.shape, dtype=bool) if enabled is None else np.asarray(enabled, dtype=bool)
         known = np.maximum.accumulate(np.where(np.isnan(goals), -1, np.arange(len(goals))[:, None]), axis=0)
         if len(goals) == 0 or (known[0] < 0).any():
-            raise ValueError("the first sample must hold a goal for each joint")
+            raise InputError(None, "commands: the first sample must hold a goal for each joint")
         goals = np.take_along_axis(goals, known, axis=0)
         new = np.ones(len(goals), dtype=bool)
         new[1:] = ((np.diff(goals, axis=0) != 0) | (on[1:] != on[:-1])).any(axis=1)

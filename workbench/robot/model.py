@@ -40,7 +40,7 @@ class Ground:
         for key in ("friction", "stiffness", "dissipation"):
             v = getattr(self, key)
             if v is not None and (isinstance(v, bool) or not isinstance(v, (int, float)) or not v >= 0):
-                raise ValueError(f"{key}: expected a non-negative number, got {v!r}")
+                raise InputError(None, f"{key}: expected a non-negative number, got {v!r}")
 
 
 @dataclass(frozen=True)

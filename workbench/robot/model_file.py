@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.robot.errors import InputError
 from workbench.robot.files import write_whole
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.robot_section import read_model, read_servos
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Posterior:
-    """What is known of the effects' parameters, in the contract's units (section 7).
+    """What is known of the effects' parameters, in the units of docs/formats.md, section 7.
 
     names: (n) such as "backlash(flm).gap", "payload(body_link).position.x". mean: (n,). covariance: (n, n), infinite where
     the data say nothing.
@@ -38,7 +39,7 @@ class Posterior:
         n = len(self.names)
         if np.shape(self.mean) != (n,) or np.shape(self.covariance) != (n, n):
             got = f"{np.shape(self.mean)}, {np.shape(self.covariance)}"
-            raise ValueError(f"expected mean ({n},) and covariance ({n}, {n}), got {got}")
+            raise InputError(None, f"posterior: expected mean ({n},) and covariance ({n}, {n}), got {got}")
 
 
 @dataclass(frozen=True)

@@ -43,26 +43,27 @@ class ServoConstants:
         compliance = (self.compliance_slope, self.compliance_margin, self.punch)
         if self.proportional_gain is None:
             if any(v is None for v in compliance):
-                raise ValueError("expected compliance_slope, compliance_margin and punch, or proportional_gain")
+                raise InputError(None, "expected compliance_slope, compliance_margin and punch, or proportional_gain")
         elif any(v is not None for v in compliance):
-            raise ValueError("proportional_gain excludes compliance_slope, compliance_margin and punch")
+            raise InputError(None, "proportional_gain excludes compliance_slope, compliance_margin and punch")
         for f in fields(self):
             v = getattr(self, f.name)
             if f.name == "sd":
                 continue
             if f.name == "model":
                 if not isinstance(v, str):
-                    raise ValueError("model: expected the servo's name as text")
+                    raise InputError(None, "model: expected the servo's name as text")
                 continue
             if v is None and f.name in _LAW:
                 continue
             if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v):
-                raise ValueError(f"{f.name}: expected a number, got {v!r}")
+                raise InputError(None, f"{f.name}: expected a number, got {v!r}")
             most, unit = _BOUNDS.get(f.name, (math.inf, ""))
             if v > most:
-                raise ValueError(f"{f.name}: expected at most {most:g} {unit}, got {v:g}")
+                raise InputError(None, f"{f.name}: expected at most {most:g} {unit}, got {v:g}")
             if v < 0 or (v == 0 and f.name in _POSITIVE):
-                raise ValueError(f"{f.name}: expected a {'positive' if f.name in _POSITIVE else 'non-negative'} number, got {v}")
+                sign = "positive" if f.name in _POSITIVE else "non-negative"
+                raise InputError(None, f"{f.name}: expected a {sign} number, got {v}")
 
     @property
     def margin(self) -> float:
@@ -118,7 +119,7 @@ class ServoConstants:
             changes.setdefault("proportional_gain", None)
         unknown = sorted(set(changes) - set(_KEYS))
         if unknown:
-            raise ValueError(f"unknown key '{unknown[0]}'; known: {', '.join(_KEYS)}")
+            raise InputError(None, f"unknown key '{unknown[0]}'; known: {', '.join(_KEYS)}")
         return replace(self, **changes)
 
 

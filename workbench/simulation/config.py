@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass, fields
 
+from workbench.robot import InputError
+from workbench.robot.option_checks import check_choice
+
 BASES = ("free", "fixed", "path")
 DRIVES = ("servo", "fast_servo", "ideal", "playback")
 CONTACTS = ("point", "hydroelastic")
@@ -44,17 +47,16 @@ class SimulationConfig:
         self.check()
 
     def check(self) -> None:
-        """ValueError names a field out of range; called again when a station is made, as loaders and callers may set fields."""
+        """InputError names a field out of range; called again when a station is made, as loaders and callers may set fields."""
         for name, allowed in (("base", BASES), ("drive", DRIVES), ("contact", CONTACTS), ("approximation", APPROXIMATIONS),
                               ("engine", ENGINES)):
-            if getattr(self, name) not in allowed:
-                raise ValueError(f"{name}: expected one of {', '.join(allowed)}, got {getattr(self, name)!r}")
+            check_choice(name, getattr(self, name), allowed)
         for f in fields(self):
             value = getattr(self, f.name)
             if isinstance(value, float) and not 0 <= value < float("inf"):
-                raise ValueError(f"{f.name}: expected a non-negative number, got {value}")
+                raise InputError(None, f"{f.name}: expected a non-negative number, got {value}")
         if self.time_step == 0 and self.drive == "fast_servo":
-            raise ValueError("drive: fast_servo needs a discrete plant (time_step > 0)")
+            raise InputError(None, "drive: fast_servo needs a discrete plant (time_step > 0)")
 
     @property
     def uses_cenic(self) -> bool:

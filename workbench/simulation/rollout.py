@@ -121,7 +121,7 @@ class Simulation:
             elif commands is not None:
                 duration = commands.end
             else:
-                raise ValueError("expected commands, a trajectory or a duration")
+                raise InputError(None, "expected commands, a trajectory or a duration")
         lead = 0.0 if start is not None else self._whole_steps(lead)
         base_path = self._base_path_to_follow(path, lead, duration)
         self._rest_in_neutral(None if base_path is None else base_path[1][0])
@@ -230,7 +230,7 @@ class Simulation:
         if self.config.base != "path":
             return None
         if path is None:
-            raise ValueError("base 'path' needs a take to follow")
+            raise InputError(None, "base 'path' needs a take to follow")
         times = path.since_start + lead
         rows = gantry_coordinates(*bridged_base(path))
         start = np.array([np.interp(0.0, times, c) for c in rows.T])
