@@ -16,6 +16,7 @@ from workbench.effects.apply import physics_of
 from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel
 from workbench.robot.model_source import model_problems, prepared
 from workbench.simulation import MakeStation
+from workbench.simulation.compiled import kernel
 from workbench.view.report.inspection import inspect_file
 
 
@@ -203,6 +204,13 @@ def test_the_puppy_is_read_as_it_stands() -> None:
     model = RobotModel("package://puppy/puppy.sdf")
     assert (model.path, model.source.notes, model.problems) == (model.source.source, (), ())
     assert model_problems(model.path, model.path) == ()
+
+
+def test_one_folder_of_the_users_cache_keeps_models_and_compiled_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    found = RobotModel(str(_robot(tmp_path))).path
+    assert found.parent == tmp_path / "cache" / "drake-workbench" / "models"
+    assert kernel.cache_folder.__wrapped__().parent == tmp_path / "cache" / "drake-workbench"
 
 
 def test_what_a_held_base_weighs_is_no_matter(tmp_path: Path) -> None:

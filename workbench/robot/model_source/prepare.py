@@ -20,6 +20,8 @@ from workbench.robot.model_source.structure import check_structure
 from workbench.robot.model_source.urdf import sdf_of_urdf
 from workbench.robot.model_source.xml_file import check_includes, check_numbers, read_xml
 
+NAME = "drake-workbench"
+"""Folder of the user's cache, one for all that the workbench keeps."""
 _NAMES: dict[str, str] = {}
 """The user's file by the one that was made of it, for errors to name."""
 
@@ -106,15 +108,15 @@ def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache
 
 
 def cache_folder() -> Path:
-    """Where what was made of users' files lies: in XDG_CACHE_HOME or ~/.cache, or where that cannot be written, the temporary
-    folder."""
+    """Where what was made of users' files is kept, beside the compiled rollouts: drake-workbench in XDG_CACHE_HOME or ~/.cache,
+    or where that cannot be written, in the temporary folder."""
     for root in (os.environ.get("XDG_CACHE_HOME"), os.path.expanduser("~/.cache")):
         if root and os.path.isabs(root):
-            folder = Path(root) / "workbench"
+            folder = Path(root) / NAME
             try:
                 folder.mkdir(parents=True, exist_ok=True)
             except OSError:
                 continue
             if os.access(folder, os.W_OK):
                 return folder
-    return Path(tempfile.gettempdir()) / f"workbench-{os.getuid()}"
+    return Path(tempfile.gettempdir()) / f"{NAME}-{os.getuid()}"
