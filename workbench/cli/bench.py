@@ -1,4 +1,4 @@
-"""`workbench bench`: the figures of the README, measured side by side."""
+"""`workbench bench`: the speeds that the documentation states, measured side by side."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "bench",
-        help="measure the speeds stated in the README",
+        help="measure the speeds stated in the documentation",
         description="Prints as JSON, measured in turns in one run, with what is required of each: the station with the full "
         "servo law against a bare Drake plant with PD at the same step, and against MuJoCo at the same joint error; the fast "
         "servo and larger steps; the Motive reader against pandas; 64 rollouts on two processes against one; a fit against "
