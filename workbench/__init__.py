@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         ComparisonResult,
         DiagnoseOptions,
         DiagnosisResult,
+        PredictionResult,
         compare_session,
         diagnose,
         predict,
@@ -37,6 +38,7 @@ _HOME = {
     "DiagnoseOptions": "workbench.api.sessions", "DiagnosisResult": "workbench.api.sessions", "EffectSpec": "workbench.robot",
     "GaitResult": "workbench.api.gaits", "InputError": "workbench.robot", "MakeStation": "workbench.simulation",
     "Motion": "workbench.motion", "OptimizeOptions": "workbench.gait.optimize", "Request": "workbench.gait.request",
+    "PredictionResult": "workbench.api.sessions",
     "RobotModel": "workbench.robot", "Session": "workbench.compare.session", "Simulation": "workbench.simulation",
     "SimulationConfig": "workbench.simulation", "Take": "workbench.recording", "compare_session": "workbench.api.sessions",
     "diagnose": "workbench.api.sessions", "load_model": "workbench.api.robots", "load_motion": "workbench.motion",
@@ -47,9 +49,9 @@ _HOME = {
 
 __all__ = [
     "AddServos", "ComparisonResult", "ConfigureParser", "DiagnoseOptions", "DiagnosisResult", "EffectSpec", "GaitResult",
-    "InputError", "MakeStation", "Motion", "OptimizeOptions", "Request", "RobotModel", "Session", "Simulation",
-    "SimulationConfig", "Take", "compare_session", "diagnose", "load_model", "load_motion", "load_session", "optimize", "predict",
-    "save_model", "show",
+    "InputError", "MakeStation", "Motion", "OptimizeOptions", "PredictionResult", "Request", "RobotModel", "Session",
+    "Simulation", "SimulationConfig", "Take", "compare_session", "diagnose", "load_model", "load_motion", "load_session",
+    "optimize", "predict", "save_model", "show",
 ]
 
 try:

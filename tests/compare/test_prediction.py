@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import workbench
 from tests.command import refused, succeeds
 from tests.gap_sessions import STARTS_AT, record_arm, session_content, write_session
 from workbench.compare.prediction import predict_session
@@ -16,6 +18,7 @@ from workbench.recording import write_motive
 from workbench.recording.formats.read import read_recording
 from workbench.robot import EffectSpec, InputError, save_model
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.view.report.notebook import prediction_html
 
 
 @pytest.fixture
@@ -64,6 +67,22 @@ def test_fitted_and_nominal_come_from_one_call(arm: Path) -> None:
     assert [p.name for p in done.paths] == ["again.csv", "again.nominal.csv"]
     assert done.left_out == ()
     assert _miss(*done.paths)[0] > 0.5
+
+
+def test_a_prediction_holds_its_takes_and_shows_itself(arm: Path) -> None:
+    found = workbench.predict(arm / "session.yaml", arm / "new", config=SimulationConfig(contact_period=0), jobs=1)
+    (take,), (path,) = found.takes, found.paths
+    (asked,) = load_session(arm / "session.yaml").predict
+    written = read_recording(path)
+    assert (take.name, found.left_out) == ("again", ())
+    assert take.since_start[-1] == pytest.approx(written.time[-1] - asked.starts_at, abs=2e-3)
+    assert np.nanmax(np.abs(take.q)) > 0.1
+    shown = found._repr_html_()
+    for cell in ("again", f"{take.since_start[-1]:.2f} s", "–", str(path)):
+        assert f"<td>{cell}</td>" in shown
+    walked = replace(take, base="free", p_WB=np.column_stack([take.time, -take.time, take.time]) * (take.time > 0)[:, None])
+    assert f"<td>{np.sqrt(2) * take.time[-1]:.3f} m</td>" in prediction_html((walked,), (path,), (("wave", "no frames"),))
+    assert "Left out: wave: no frames" in prediction_html((walked,), (path,), (("wave", "no frames"),))
 
 
 def test_units_and_frame_numbers_are_the_start_files(arm: Path) -> None:

@@ -8,21 +8,22 @@ from os import PathLike
 from pathlib import Path
 
 from workbench.compare import compare_session as comparing
-from workbench.compare.prediction import Predicted, predict_session
+from workbench.compare.prediction import predict_session
 from workbench.compare.results import Comparison
 from workbench.compare.session import Session, load_session
-from workbench.compare.session_takes import no_progress
+from workbench.compare.session_takes import LeftOut, no_progress
 from workbench.experiment.next_experiment import with_next_experiment
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.motion import Motion, save_motion
+from workbench.recording import Take
 from workbench.robot import InputError, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison
 from workbench.view.report.diagnosis import write_diagnosis
-from workbench.view.report.notebook import comparison_html, diagnosis_html
+from workbench.view.report.notebook import comparison_html, diagnosis_html, prediction_html
 
 Progress = Callable[[str, float | None], None]
 """Called with what is being done and the share done (0 to 1; None where it is not known)."""
@@ -105,6 +106,22 @@ class DiagnosisResult:
         return diagnosis_html(self.diagnosis)
 
 
+@dataclass(frozen=True)
+class PredictionResult:
+    """What a model predicts of takes that it was not fitted to; the files are written already.
+
+    takes: the simulated takes, in SI units and radians, time zero at the first command. paths: the file of each take, in the same
+    order. left_out: name of each damaged take of the session, and why it was left out (the others tell the capture's yaw).
+    """
+
+    takes: tuple[Take, ...]
+    paths: tuple[Path, ...]
+    left_out: LeftOut = ()
+
+    def _repr_html_(self) -> str:
+        return prediction_html(self.takes, self.paths, self.left_out)
+
+
 def compare_session(session: Session | str | PathLike[str], config: SimulationConfig | None = None,
                     model: RobotModel | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> ComparisonResult:
     """Simulates, registers and compares every take of a session (or of a session.yaml).
@@ -132,13 +149,18 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
 
 
 def predict(session: Session | str | PathLike[str], folder: str | PathLike[str], model: RobotModel | None = None,
-            config: SimulationConfig | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> Predicted:
-    """Plays what a session asks to foretell on `model` (None: the session's own) and writes FOLDER/NAME.csv, as the cameras or
-    the servos' log would show it; returns the files' paths and what was left out. config: of the rollouts. progress: called with
-    the stage and the share done. jobs: processes that simulate. InputError for bad input, or nothing to foretell."""
+            config: SimulationConfig | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> PredictionResult:
+    """Simulates the entries of a session's `predict` and writes FOLDER/NAME.csv for each, as the cameras or the servos' log would
+    show it (docs/formats.md, section 5).
+
+    model: robot that is simulated; None: the session's own. config: of the rollouts, their base as each entry says. progress:
+    called with the stage and the share done. jobs: processes that simulate. InputError for bad input, or a session without
+    `predict`.
+    """
     session = _loaded(session)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    return predict_session(session, model or session.model, Path(folder), progress, config=config, n_jobs=jobs)
+    found = predict_session(session, model or session.model, Path(folder), progress, config=config, n_jobs=jobs)
+    return PredictionResult(found.takes, found.paths, found.left_out)
 
 
 def _loaded(session: Session | str | PathLike[str]) -> Session:

@@ -1,4 +1,4 @@
-"""A model foretells takes that nobody has shown it (docs/formats.md, sections 1, 3 and 5)."""
+"""A model predicts takes that it was not fitted to (docs/formats.md, sections 1, 3 and 5)."""
 
 from __future__ import annotations
 
@@ -33,9 +33,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Predicted:
-    """What was written (paths), and the session's takes that were left out as damaged (left_out): name and reason."""
+    """What was predicted. paths: files, as a recording would look. takes: the simulated take (SI, radians) behind each file, in
+    the same order. left_out: name of each damaged take of the session, and why it was left out."""
 
     paths: tuple[Path, ...]
+    takes: tuple[Take, ...]
     left_out: LeftOut = ()
 
 
@@ -66,14 +68,16 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
         if yaw is None:
             raise InputError(session.path, "takes: expected a captured one, from which the yaw of the capture can be found")
     jobs = [(c, ending, c.job(s, config)) for c in captured for ending, s in versions.items()]
-    rollouts = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
+    rollouts = list(simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of)))
     paths = [c.write(take, job.model, yaw or 0.0, out_dir / f"{c.spec.name}{ending}.csv")
              for (c, ending, job), take in zip(jobs, rollouts)]
     for spec in session.predict:
         if spec.commands is not None:
             progress(f"simulating {spec.name}", None)
-            paths += [predict_log(s, spec, out_dir / f"{spec.name}{ending}.csv", config) for ending, s in versions.items()]
-    return Predicted(tuple(paths), left_out)
+            for ending, s in versions.items():
+                paths.append(out_dir / f"{spec.name}{ending}.csv")
+                rollouts.append(predict_log(s, spec, paths[-1], config))
+    return Predicted(tuple(paths), tuple(rollouts), left_out)
 
 
 def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
@@ -129,10 +133,10 @@ class _Captured:
                             take_name=self.spec.name, first_frame=int(start.frames[0]), metadata=start.metadata)
 
 
-def predict_log(session: Session, spec: PredictSpec, path: Path, config: SimulationConfig) -> Path:
+def predict_log(session: Session, spec: PredictSpec, path: Path, config: SimulationConfig) -> Take:
     """Plays the goals of a log on the session's model and writes the log that the servos would keep: the same times, goals and
     torque enables, and their positions. Joints start at the angles and speeds of the first row; without those, at rest in
-    neutral."""
+    neutral. Returns the simulated take, as the servos' sensors see it."""
     assert spec.commands is not None
     model = session.model_of(spec)
     log = read_recording(spec.commands)
@@ -147,8 +151,10 @@ def predict_log(session: Session, spec: PredictSpec, path: Path, config: Simulat
     start = Start(np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"]), logged=True) if known else None
     since = log.time - log.time[0]
     simulation = Simulation(model, replace(config, base=spec.base))
-    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, COMPARE.lead, start=start).as_logged()
+    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, COMPARE.lead, start=start,
+                          name=spec.name).as_logged()
     commanded = [j for j in model.joints if f"goal.{j}" in log.channels]
     channels = {name: values for name, values in log.channels.items() if name.startswith(("goal.", "enabled."))}
     channels |= {f"position.{j}": np.interp(since, take.time, take.q[:, take.column(j)]) for j in commanded}
-    return write_joint_log(path, log.time, channels)
+    write_joint_log(path, log.time, channels)
+    return take

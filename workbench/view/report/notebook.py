@@ -5,10 +5,15 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
+import numpy as np
+
+from workbench.compare.metrics import travelled
 from workbench.compare.results import Comparison
 from workbench.gait.optimize import Optimized
 from workbench.identify.results.findings import Diagnosis
+from workbench.recording import Take
 from workbench.view.report.comparison import headline
 
 SHOWN = 5
@@ -35,6 +40,20 @@ def gait_html(result: Optimized) -> str:
     """The certificate's summary, or why there is none."""
     said = [] if result.certified is None else result.certified.certificate.summary().splitlines()
     return "".join(_paragraph(line) for line in (*([result.problem] if result.problem else []), *said))
+
+
+def prediction_html(takes: Sequence[Take], paths: Sequence[Path], left_out: Sequence[tuple[str, str]]) -> str:
+    """A row for each predicted take, and what was left out. takes and paths: alike in number and order."""
+    rows = [(take.name, f"{take.since_start[-1]:.2f} s", _distance(take), str(path)) for take, path in zip(takes, paths)]
+    said = "".join(_paragraph(f"Left out: {name}: {reason}") for name, reason in left_out)
+    return _table(("take", "length", "distance", "file"), rows) + said
+
+
+def _distance(take: Take) -> str:
+    """How far the base went, straight and in the plane, from its rest before the first command."""
+    if take.base != "free" or take.p_WB is None:
+        return "–"
+    return f"{np.hypot(*travelled(take.p_WB, take.since_start)[:2]):.3f} m"
 
 
 def _degrees(radians: float) -> str:
