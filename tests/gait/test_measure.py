@@ -8,7 +8,8 @@ import pytest
 from workbench.gait.limits import GaitLimits, binding, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import fallen, measure
-from workbench.gait.request import Request, worse_half
+from workbench.gait.request import Request
+from workbench.gait.requirements import direction_margins, speed_margins, worse_half
 from workbench.recording.take import Take
 from workbench.robot import InputError, puppy_model
 
@@ -67,13 +68,13 @@ def test_requests_judge_the_way_that_was_asked():
     glide, circle = measure(take_of(0.2), MODEL, 0.5, 0.5), measure(take_of(0.2, 0.4), MODEL, 0.5, 0.5)
     assert Request().progress(glide) == pytest.approx(0.2)
     assert Request("backward").progress(glide) == pytest.approx(-0.2)
-    assert all(m.use < 1 for m in Request().strays(glide))
-    assert any(m.use > 1 for m in Request().strays(circle))
-    assert all(m.use < 1 for m in Request("arc", radius=0.5).strays(circle))
-    assert any(m.use > 1 for m in Request("arc", radius=0.5).strays(glide))
+    assert all(m.use < 1 for m in direction_margins(Request(), glide))
+    assert any(m.use > 1 for m in direction_margins(Request(), circle))
+    assert all(m.use < 1 for m in direction_margins(Request("arc", radius=0.5), circle))
+    assert any(m.use > 1 for m in direction_margins(Request("arc", radius=0.5), glide))
     assert Request("turn").progress(circle) == pytest.approx(0.4)
-    assert any(m.use > 1 for m in Request("turn").strays(circle))  # it walks while it turns
-    slow = {m.name: m.use for m in Request(speed=0.3).wanted(glide, [glide, fallen(15)])}
+    assert any(m.use > 1 for m in direction_margins(Request("turn"), circle))  # it walks while it turns
+    slow = {m.name: m.use for m in speed_margins(Request(speed=0.3), glide, [glide, fallen(15)])}
     assert slow["speed"] > 1
     assert slow["falls"] > 1
     assert worse_half([1.0, 2.0, 3.0, 4.0]) == 1.5

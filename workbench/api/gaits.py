@@ -1,4 +1,4 @@
-"""A gait on request, with its certificate."""
+"""A gait for a request, with its certificate."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from workbench.view.report.notebook import gait_html
 
 @dataclass(frozen=True)
 class GaitResult:
-    """What came of a request for a gait. optimized: all of it, with table and certificate; model: the robot that was asked
-    for."""
+    """The gait that was found for a request. optimized: everything found, with table (counts and milliseconds) and certificate
+    (its numbers carry their units in their names); model: the robot."""
 
     optimized: Optimized
     model: RobotModel
 
     @property
     def met(self) -> bool:
-        """Whether the gait keeps every limit and the speed asked for."""
+        """Whether the gait keeps every limit and the required speed."""
         return self.optimized.met
 
     @property
     def problem(self) -> str:
-        """Which limit binds, in a line; empty where the request is met."""
+        """Which limit binds, with value and unit, in a line; empty where the request is met."""
         return self.optimized.problem
 
     @property
     def motion(self) -> Motion:
-        """The gait as poses, in rad by joint. InputError where there is none."""
+        """The gait as poses: times (K,) [s], angles (K, n) [rad]. InputError where there is none."""
         return Motion.from_table(self._found()[0].cycle)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
@@ -61,10 +61,11 @@ class GaitResult:
 
 def optimize(model: RobotModel, request: Request | None = None, options: OptimizeOptions | None = None, *,
              ensemble: Ensemble | None = None, progress: Progress = no_progress, memory: Path | None = None) -> GaitResult:
-    """Seeks a gait within the limits of joints, servos and supply, on an ensemble of robots such as this one may be.
+    """Searches for a gait within the limits of joints, servos and supply, on an ensemble of robots that this one may be.
 
-    request: None asks for the fastest walk forwards. ensemble: None is the one that ships. memory: a file that lets a run that
-    was killed go on. InputError for a robot without legs.
+    request: None: the fastest walk forward. options: size of the search, certificate, seed. ensemble: None: the one that ships.
+    progress: called with the stage and the share done. memory: a file from which a run that was killed continues. Returns table,
+    certificate and which limit binds, also where the request cannot be met. InputError for a robot without legs.
     """
     found = seek(GaitMachine(model), request or Request(), ensemble or load_ensemble(), options or OptimizeOptions(), progress,
                  memory, other_engine())

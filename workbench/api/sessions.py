@@ -31,14 +31,18 @@ Progress = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """A session's takes beside their simulation. comparison: the numbers; session: what they are of."""
+    """A session's takes beside their simulation.
+
+    comparison: errors by take and joint, in SI units and radians (`Comparison.to_json` gives degrees); its `takes` hold the
+    recorded and the simulated trajectories, its `left_out` the damaged takes. session: what was compared.
+    """
 
     comparison: Comparison
     session: Session
 
     @property
     def headline(self) -> str:
-        """The finding in a sentence."""
+        """The result in a sentence, for the report's head."""
         return comparison_headline(self.comparison)
 
     def save(self, folder: str | PathLike[str], progress: Progress = no_progress) -> list[Path]:
@@ -57,8 +61,8 @@ class DiagnoseOptions:
     """How a session is diagnosed.
 
     jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
-    folder that keeps every rollout, so that a run that was killed goes on where it was; None: nothing is kept. without: names of
-    effects that are known not to be there, and are not looked for.
+    folder that keeps every rollout, so that a run that was killed continues; None: nothing is kept. without: names of effects
+    (docs/effects.md) that are known to be absent, and are not searched for. InputError for fewer than one process.
     """
 
     jobs: int = 2
@@ -73,8 +77,13 @@ class DiagnoseOptions:
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """Which physics the model left out. diagnosis: verdict, findings, what stays unexplained; its `model` is the robot with
-    what was found. takes: those behind it. next_motion: to record next, where two explanations tie."""
+    """Which physics the model left out.
+
+    diagnosis: verdict, findings with their parameters (units of docs/formats.md, section 7: degrees, N m, s), errors in deg or m,
+    what stays unexplained, damaged takes that were left out. session: what was diagnosed. takes: recorded and simulated
+    trajectories and residuals, for figures (SI, radians). next_motion: to record next, where the data cannot separate two
+    effects; else None.
+    """
 
     diagnosis: Diagnosis
     session: Session
@@ -88,8 +97,8 @@ class DiagnosisResult:
 
     def save(self, folder: str | PathLike[str], progress: Progress = no_progress, jobs: int = 2) -> list[Path]:
         """Writes findings.json, model.yaml, nominal.yaml, report.html, a 3D replay of each take, the next experiment's motion
-        and, in predict/, what the session asks to foretell; returns their paths, the report first. jobs: processes that
-        simulate the predictions. InputError where they cannot be written."""
+        and, in predict/, the predictions that the session asks for; returns their paths, the report first. jobs: processes
+        that simulate the predictions. InputError where they cannot be written."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         paths = write_diagnosis(self.diagnosis, self.takes, folder, str(self.session.path), progress)
@@ -126,9 +135,12 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
                     model: RobotModel | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> ComparisonResult:
     """Simulates, registers and compares every take of a session (or of a session.yaml).
 
-    config: of the rollouts, their base as each take says. model: another robot than the session's, such as a diagnosed one.
-    progress: called with the stage and the share done. jobs: processes that simulate.
-    A damaged take is left out and named in `comparison.left_out`; InputError for bad input, or where no take remains.
+    config: of the rollouts, their base as each take says. model: another model of the robot than the session's, such as a
+    diagnosed one. progress: called with the stage and the share done. jobs: processes that simulate.
+
+    Returns errors (RMS after the first command) of each joint [rad] and of the base [m], with noise and numerical floor, and the
+    takes in SI units and radians, world x forward, y left, z up. A damaged take is left out and named in `comparison.left_out`;
+    InputError for bad input, for a `model` with other links or joints, or where no take remains.
     """
     session = _loaded(session)
     session = session if model is None else session.with_model(model)
@@ -137,9 +149,12 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
 
 def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | None = None, *,
              progress: Progress = no_progress) -> DiagnosisResult:
-    """Finds the physics that a session's model left out: minutes for a small arm, up to an hour for a quadruped that walks.
+    """Finds the physics that a session's model left out: 30 to 50 s of processor time for a practice session (docs/validation.md)
+    in which one or two effects are missing, some minutes for more.
 
-    A damaged take is left out and named in `diagnosis.left_out`; InputError for bad input, or where no take remains.
+    session: loaded, or a session.yaml or its folder. progress: called with the stage and the share done. Returns effects with
+    probability, parameters and 90 % bounds (units of docs/formats.md, section 7), and the robot with those effects. A damaged
+    take is left out and named in `diagnosis.left_out`; InputError for bad input, or where no take remains.
     """
     options = options or DiagnoseOptions()
     session = _loaded(session)

@@ -20,11 +20,12 @@ NAN = float("nan")
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel of two takes, SI and radians; NaN where it is not known.
+    """One channel of two takes: a joint's angle [rad] or the base's path [m]; NaN where it is not known.
 
     error: RMS of recorded less simulated after the first command. noise: RMS at rest before it, over all takes of a session.
     floor: RMS between the rollout at its step and at half and a quarter of it, the larger. spread: RMS between rollouts with one
-    contact model and the other. correlation: Pearson's. lag: by how much the recording comes later [s].
+    contact model and the other; all four in rad or m. correlation: Pearson's, -1 to 1. lag: by how much the recording comes
+    later [s].
     """
 
     error: float
@@ -43,7 +44,8 @@ class Channel:
 
 @dataclass(frozen=True)
 class Pair:
-    """One number of each take, with the simulation's numerical floor and its spread between contact models."""
+    """One number of each take, with the simulation's numerical floor and its spread between contact models, all in one unit (m,
+    rad or m/s, as the field that holds it says)."""
 
     recorded: float
     simulated: float
@@ -53,12 +55,14 @@ class Pair:
 
 @dataclass(frozen=True)
 class TakeComparison:
-    """One take, recorded and simulated; both zeroed alike and on the recording's clock, here with their motion and forces.
+    """One take, recorded and simulated, both zeroed alike and on the recording's clock (`Take`: SI, radians, world axes forward,
+    left, up).
 
-    starts_at_sigma: how sure the start is [s]. Of the base link: body (its path, from where it rested), distance (straight, in
-    the plane) and forward [m], heading (change, positive to the left) [rad], speed (distance over the commands' time) [m/s],
-    smoothness (spectral arc length). joint_smoothness: each joint's. *_phases: how each foot stood, by its height;
-    force_phases: by the simulated forces.
+    joints: a Channel for each joint [rad]. starts_at_sigma: standard deviation of the start [s]. Of the base link: body (its path
+    [m], from where it rested), distance (straight, in the plane) and forward [m], heading (change, positive to the left) [rad],
+    speed (distance over the commands' time) [m/s], smoothness (spectral arc length, no unit, at most 0). joint_smoothness: the
+    same of each joint. recorded_phases, simulated_phases: when each foot stood, by its height; force_phases: by the simulated
+    forces. The base's fields are None where the base is held or was not seen.
     """
 
     name: str
@@ -87,7 +91,7 @@ class TakeComparison:
         return by_error(self.joints, {j: c.over_noise for j, c in self.joints.items()})
 
     def as_dict(self) -> dict[str, Any]:
-        """The contract's entry of one take, in degrees, metres and seconds, with more of our own."""
+        """The take's entry in comparison.json (docs/formats.md, section 6), in degrees, metres and seconds, and more fields."""
         out: dict[str, Any] = {"name": self.name, "starts_at": _plain(self.starts_at), "base": self.recorded.base}
         out["starts_at_sigma"] = _plain(self.starts_at_sigma)
         out["joints"] = {j: _channel(self.joints[j], "deg") for j in self.joints_by_error()}
@@ -111,7 +115,8 @@ class TakeComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All takes of a comparison. left_out: (take, why) of each damaged one. provenance: what made it."""
+    """All takes of a comparison. left_out: (name, reason) of each damaged one. provenance: versions, sha256 of the model, seed
+    and seconds."""
 
     takes: tuple[TakeComparison, ...]
     left_out: tuple[tuple[str, str], ...] = ()

@@ -20,6 +20,7 @@ from workbench.gait.limits import contact_margin, run_margins, table_margins, vi
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
 from workbench.gait.request import Request
+from workbench.gait.requirements import direction_margins, drift, speed_margins
 from workbench.gait.table import GaitTable
 from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel
@@ -70,7 +71,8 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(machine, table, request.limits),
-               *run_margins(machine, nominal, request.limits), *request.strays(nominal), *request.wanted(nominal, on_draws)]
+               *run_margins(machine, nominal, request.limits), *direction_margins(request, nominal),
+               *speed_margins(request, nominal, on_draws)]
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
         tables=hashes(gait=table.cycle, start=table.start, stop=table.stop), model_sha256=machine.model.sha256,
@@ -104,7 +106,7 @@ def _on_draws(request: Request, machine: GaitMachine, measured: Sequence[Measure
     feet = [m[1] for m in measured if m is not None]
     values = {
         f"speed {request.unit}": [request.progress(m) for m in measures],
-        "heading deg/m": [math.degrees(request.drift(m)) for m in measures],
+        "heading deg/m": [math.degrees(drift(request, m)) for m in measures],
         "slip m/s": [f.slip for f in feet], "foot clearance mm": [1000 * f.clearance for f in feet],
         "tipping margin deg": [math.degrees(f.tipping) for f in feet],
         "electrical power W": [m.power for m in measures], "largest RMS torque N m": [max(m.rms) for m in measures]}
@@ -123,7 +125,7 @@ def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]]
 def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]:
     """What steps and contact models move."""
     speeds = {k: request.progress(m) for k, m in measures.items()}
-    drifts = {k: math.degrees(request.drift(m)) for k, m in measures.items()}
+    drifts = {k: math.degrees(drift(request, m)) for k, m in measures.items()}
     steps = [v for k, v in speeds.items() if k.endswith("ms")] or [0.0]
     return {"speed": speeds, "heading deg/m": drifts, "steps": float(np.ptp(steps)),
             "all": float(np.std(list(speeds.values()))), "heading deg/m, all": float(np.std(list(drifts.values())))}
@@ -133,14 +135,14 @@ def _elsewhere(request: Request, name: str, nominal: GaitMeasure, measured: Meas
     """The same table in another engine."""
     (m, feet), r = measured, request
     return {"name": name, "speed": r.progress(m), "speed kept": r.progress(m) / max(r.progress(nominal), 1e-9),
-            "heading deg/m": math.degrees(r.drift(m)), "heading apart deg/m": math.degrees(r.drift(m) - r.drift(nominal)),
+            "heading deg/m": math.degrees(drift(r, m)), "heading apart deg/m": math.degrees(drift(r, m) - drift(r, nominal)),
             "fell": m.fell, "slip m/s": feet.slip}
 
 
 def _numbers(machine: GaitMachine, request: Request, m: GaitMeasure, feet: FeetMeasure) -> dict[str, Any]:
     weight, speed = machine.model.kinematics.mass * GRAVITY, max(float(np.hypot(*m.velocity)), 1e-6)
     return {
-        "speed": request.progress(m), "unit": request.unit, "heading deg/m": math.degrees(request.drift(m)),
+        "speed": request.progress(m), "unit": request.unit, "heading deg/m": math.degrees(drift(request, m)),
         "forward m/s": m.velocity[0], "left m/s": m.velocity[1], "turning deg/s": math.degrees(m.turn_rate),
         "electrical power W": m.power, "mechanical power W": m.mechanical,
         "electrical cost of transport": m.power / (weight * speed),

@@ -26,15 +26,20 @@ RANGES = ("friction", "supply_voltage", "supply_sag", "backlash", "command_delay
 """Keys of the file that hold `low` and `high`."""
 EFFECTS = {"friction": ("ground_friction", "friction"), "supply_voltage": ("supply_voltage", "voltage"),
            "supply_sag": ("supply_sag", "drop"), "backlash": ("backlash", "gap"), "command_delay": ("command_delay", "delay")}
-"""The effect and the parameter that each range is of, in the contract's units."""
+"""The effect and the parameter that each range is of, in the units of docs/formats.md, section 7."""
 EACH_SERVO = ("backlash", "command_delay")
 
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What is drawn. ranges: by key of RANGES, low and high, in the file's units. mass_share: by which each link's mass may
-    differ. payload: [kg]. zero_sd: [deg]. posterior: of a diagnosed model, whose parameters are drawn too. source: for
-    messages."""
+    """Robots that this one may be, from which a gait is tested on random draws.
+
+    ranges: low and high of uniform draws, by key: "friction" (of foot on ground), "supply_voltage" [V], "supply_sag" [V for each
+    servo at full duty], "backlash" [deg] of each leg's joint and "command_delay" [s] of each servo. mass_share: half width of a
+    uniform draw of each link's mass, as a share of it. payload: a mass [kg] at a random point of the base link. zero_sd: standard
+    deviation of the zero of each leg's joint [deg]. posterior: of a diagnosed model, whose parameters are drawn too, in place of
+    the range of the same effect. source: file, for messages.
+    """
 
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     mass_share: float = 0.0

@@ -15,6 +15,8 @@ from workbench.gait.limits import Margin, allowed_rms, contact_margin, run_margi
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, as_plain, fallen, from_plain, measure
 from workbench.gait.request import Request
+from workbench.gait.requirements import cost as cost_of
+from workbench.gait.requirements import direction_margins, speed_margins
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import AT_ONCE, GaitTable, Paths, gait_table, paths_of, table_of
@@ -130,9 +132,9 @@ class Evaluator:
         assert nominal is not None
         limits, request = self.request.limits, self.request
         ran = run_margins(self.machine, nominal, limits)
-        everything = (*margins, *ran, *request.strays(nominal), *request.wanted(nominal, draws))
+        everything = (*margins, *ran, *direction_margins(request, nominal), *speed_margins(request, nominal, draws))
         allowed = allowed_rms(self.machine, limits)
-        cost = request.cost(nominal, draws, max(r / a for r, a in zip(nominal.rms, allowed)))
+        cost = cost_of(request, nominal, draws, max(r / a for r, a in zip(nominal.rms, allowed)))
         return Candidate(table, everything, nominal, draws, cost)
 
     def _measured(self, take: Take, model: RobotModel, begin: float, period: float) -> GaitMeasure:

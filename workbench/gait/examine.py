@@ -39,10 +39,13 @@ LEAD = 0.3
 
 @dataclass(frozen=True)
 class CertifyOptions:
-    """How a gait is examined. seconds: of walking on the nominal robot, six as in the thesis. draw_seconds: on each draw.
-    draws: fresh ones. step: of the simulation, 1 ms [s]. checked: draws that Drake simulates as well, beside the nominal robot,
-    which is always Drake's; for checked_seconds of walking at checked_step [s], as it is the same discrete step that is compared.
-    floor_seconds: of each of the numerical `variants`. n_jobs: processes."""
+    """How a gait is examined for its certificate. InputError for a number out of range or a variant that is not known.
+
+    seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots of
+    the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too, beside
+    the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the same discrete
+    step is compared. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s].
+    n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0

@@ -17,20 +17,19 @@ from workbench.robot.option_checks import check_positive
 
 @dataclass(frozen=True)
 class GaitLimits:
-    """What a gait must keep. Each field: unit and reason.
+    """Limits that a gait has to keep. Each field: unit and reason. InputError for a number that is not positive.
 
     rms: torque of each servo [N m], RMS over the gait; None: half of what full duty gives at standstill. ROBOTIS advises a fifth,
-    which its own walk of the puppy breaks by far (the tail's 0.80 N m of 1.39); half is below what that walk asks and gives I²R
-    heat of a quarter of a stalled servo's, for minutes and not for hours. `advised` is the fifth.
-    torque: share of the torque-speed line that may be asked for 10 ms or longer; the rest of it is where a servo stops following.
-    fuse: supply current [A] (CM-530: 10 A). reach: feet off the path asked for [m]: a millimetre is within play and rounding.
-    clearance: between links [m]: 2 mm for cables and screw heads. lift: that each foot comes off the ground in each cycle [m]: 3
-    mm, twice what a degree of play in a knee lets it hang; feet that drag go as the floor lets them.
-    bus: bit rate of the servo bus [1/s].
-    tilt: of the base [rad], 30 deg, where the feet's track no longer holds the centre of mass over them. drift: change of heading
-    by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. What a robot turns of its
-    own zero offsets and latency is seen on its first metre, and a table of another `turn` straightens it: 0.06 rad a stance took
-    25 and 40 deg/m out of two gaits, one forward and one backward. aside: speed across over speed along.
+    which its own walk of the puppy exceeds by far (the tail's 0.80 N m of 1.39); half is below what that walk needs and gives I²R
+    heat of a quarter of a stalled servo's, for minutes and not for hours. The fifth is reported as advice. torque: share of the
+    torque-speed line that may be used for 10 ms or longer; the rest of it is where a servo stops following. fuse: supply current
+    [A] (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
+    links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
+    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. bus: bit rate of the
+    servo bus [1/s]. tilt: of the base [rad], 30 deg, where the feet's track no longer holds the centre of mass over them. drift:
+    change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn
+    that comes from a robot's own zero offsets and latency is seen on its first metre, and a table of another `turn` corrects it:
+    0.06 rad a stance took 25 and 40 deg/m out of two gaits, one forward and one backward. aside: sideways speed by forward speed.
     """
 
     rms: float | None = None
@@ -51,8 +50,8 @@ class GaitLimits:
 
 @dataclass(frozen=True)
 class Margin:
-    """How far one limit is: value and limit in `unit`, at `where` (a joint, a foot, two links, or the robot). use: value by
-    limit; above 1 it is broken. `advice`: a rule that it had better keep, and need not."""
+    """How near a limit is. name: of the limit. value, limit: in `unit`. where: a joint, a foot, two links, or the robot. use:
+    value divided by limit; above 1 the limit is broken. advice: whether it is only a recommendation."""
 
     name: str
     where: str

@@ -53,9 +53,10 @@ BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, var
 
 @dataclass(frozen=True)
 class OptimizeOptions:
-    """How long and from where a gait is sought. budget: of the search. certify: what the gait has to pass at the end. seed: of
-    the search; draws of the search and of the certificate come from it, different ones. n_jobs: threads and processes that
-    simulate. given: gaits to start from; planned: whether solved kino-centroidal programmes are, too."""
+    """How long and from where a gait is searched for. budget: size of the search. certify: the examination at the end. seed: of
+    the search; the draws of the search and those of the certificate come from it and differ. n_jobs: threads and processes that
+    simulate. given: gaits to start from; planned: whether the search also starts from solved kino-centroidal programmes.
+    InputError for a number out of range."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
@@ -70,8 +71,13 @@ class OptimizeOptions:
 
 @dataclass(frozen=True)
 class Optimized:
-    """What came of a request. met: whether its gait keeps every limit and the speed asked for. problem: else, in a line, which
-    limit binds, and what works. table, certified: of the gait, or of the nearest that works; None where none does."""
+    """Result of a search.
+
+    request: what was searched for. met: whether the gait keeps every limit and the required speed. problem: where it does not, in
+    a line: which limit binds, and what works. table: poses in counts and milliseconds (`cycle`, `start` from neutral, `stop`);
+    certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every limit, or
+    None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was needed.
+    """
 
     request: Request
     met: bool
@@ -83,8 +89,8 @@ class Optimized:
 
 def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions, progress: Progress,
              memory: Path | None = None, other: tuple[str, OtherEngine] | None = None) -> Optimized:
-    """Seeks and certifies. memory: a file that lets a run that was killed go on; the same request with the same seed and code
-    ends in the same table."""
+    """Searches for a gait and certifies it. memory: a file from which a run that was killed continues; the same request with the
+    same seed and code ends in the same table."""
     impossible = out_of_reach(machine, request)
     if impossible is not None:
         return _instead(machine, request, impossible, ensemble, options, progress, other)

@@ -12,6 +12,7 @@ import numpy as np
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
 from workbench.gait.request import Request
+from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
 from workbench.robot.option_checks import check_positive, check_whole
@@ -32,7 +33,8 @@ Progress = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class Budget:
-    """How much is tried, in numbers of gaits and not in seconds, so that the same seed ends in the same table.
+    """Size of the search, in numbers of gaits and not in seconds, so that the same seed ends in the same table. InputError for a
+    number out of range.
 
     seeds: random gaits at first. starts: the best of them, of different families or knees, from which CMA-ES goes on.
     population, generations: of each start, on the nominal robot; then `robust` generations, over `draws` robots of the
@@ -254,9 +256,9 @@ def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> 
 def _straight(request: Request, c: Candidate, before: Candidate | None) -> float:
     """The `turn` with which a gait should not turn more than asked, from one run of it or two."""
     assert c.nominal is not None
-    excess = request.excess_turning(c.nominal)
+    excess = excess_turning(request, c.nominal)
     if before is not None and before.nominal is not None and not before.nominal.fell:
-        change = excess - request.excess_turning(before.nominal)
+        change = excess - excess_turning(request, before.nominal)
         turned = c.shape.turn - before.shape.turn
         if change * turned > 0:
             return c.shape.turn - excess * turned / change

@@ -18,7 +18,8 @@ class Commands:
 
     times: (K,) [s], increasing. joints: (n,) names. goals: (K, n) [rad], zero = servo centre. speeds: (K, n) [rad/s],
     0 = at once. enabled: (K, n) torque enable. end: when the last command's dwell is over [s].
-    poses: (K,) index of the pose in its table, for the phase of the gait; -1 where there is none.
+    poses: (K,) index of the pose in its table, for the phase of the gait; -1 where there is none. InputError where shapes differ
+    or times do not increase.
     """
 
     times: Array

@@ -12,8 +12,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BodyTrack:
-    """Path of a rigid body: p (N, 3) [m] and quaternion wxyz (N, 4), continuous in sign, NaN where unseen;
-    error (N,) [m] mean marker error, if known."""
+    """Path of a frame in the world of its take (x forward, y left, z up), or, as a Motive file holds it, in the capture's axes.
+
+    p: (N, 3) [m], of the frame's origin: of a tracked rigid body its pivot. quat: (N, 4) wxyz, continuous in sign. Both NaN where
+    unseen. error: (N,) [m], mean marker error of each frame, where the recording has it.
+    """
 
     p: Array
     quat: Array

@@ -16,19 +16,26 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Take:
-    """One run of the robot, recorded or simulated. SI and radians; world x forward (the robot's first heading), y left, z up.
+    """One run of the robot, recorded or simulated. SI and radians; world W: x forward (the robot's first heading), y left, z up.
+    A field is None, or empty, where it was not measured or computed.
 
-    time: (N,) [s], from the first frame (a recording), or from the first command (a simulation, negative while it rests).
-    starts_at: time of the first command [s]; NaN where unknown.
-    joints: the n joints that were seen. q: (N, n) [rad]; NaN where unseen. `zeroed`: q is zero at the rest before the first
-    command, as motion capture sees it; else q is the angle itself. q_sigma: (N, n) standard deviation [rad].
-    p_WB (N, 3), quat_WB (N, 4) wxyz: pose of the base link's frame B in the world W. bodies: rigid bodies by asset,
-    in the take's world axes. torque: (N, n) [N m] on the joints. v: (N, n) [rad/s].
-    contact: foot -> ground reaction (N, 3) [N] in W. `problems`: what was mended, marked or left out, a line each.
-    mended: (N,) frames whose gaps were filled. off_axis: (N, n, 3) [rad] what of each joint's rotation its servo does not
-    turn, as a rotation vector in the base's axes in the neutral pose (forward, left, up). Only a simulated robot whose build is
-    not the model's has servo_q (N, n) [rad], the servo's own angle as its sensor tells it, where q is the link's, and links,
-    the pose of each link in W, where the model's lengths and joints do not give it.
+    source: "recording", "simulation" or "playback". time: (N,) [s], from the first frame (a recording), or from the first command
+    (a simulation, negative while it rests). starts_at: time of the first command [s]; NaN where unknown. base: "free", "fixed" or
+    "path". commands: what was sent to the servos, time zero at the first command. problems: what was repaired, marked or left
+    out, a line each. mended: (N,) frames whose gaps were filled.
+
+    joints: names of the n joints that were seen. q: (N, n) [rad]; NaN where unseen. zeroed: q is zero at the rest before the
+    first command, as motion capture sees it; else q is the angle itself. q_sigma: (N, n) standard deviation of q [rad]. v: (N, n)
+    [rad/s]. torque: (N, n) [N m] on the joints. off_axis: (N, n, 3) [rad], each joint's rotation about other axes than its
+    servo's, as a rotation vector in the base's axes in the neutral pose (forward, left, up).
+
+    p_WB (N, 3) [m], quat_WB (N, 4) wxyz: pose of the base link's frame B in W. bodies: path of each rigid body that cameras
+    track, by the name of its Motive asset (`RobotModel.rigid_bodies` says on which link it is), in W. contact: force of the
+    ground on each foot (N, 3) [N] in W, by foot, which has the name of the last joint that moves it (the knee;
+    `RobotModel.foot_links`).
+
+    Only of a simulated robot that is not built as its model (effects of the structure): servo_q (N, n) [rad], the servo's own
+    angle as its sensor measures it, where q is the link's; links, by name the path of each link's frame in W.
     """
 
     name: str

@@ -29,8 +29,8 @@ FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 @dataclass(frozen=True)
 class Ground:
-    """Friction of foot on ground (static and dynamic alike; None: the SDF's own), the ground's stiffness [N/m] and
-    Hunt-Crossley dissipation [s/m]; None or infinite stiffness: rigid."""
+    """The floor. friction: coefficient of foot on ground, static and dynamic alike; None: the SDF's own. stiffness [N/m] of a
+    contact point; None or infinite: rigid. dissipation: Hunt and Crossley's [s/m]; None: 0. InputError for a negative number."""
 
     friction: float | None = None
     stiffness: float | None = None
@@ -58,9 +58,10 @@ class RobotModel:
     """The nominal robot and the effects added to it; plain data that knows no simulator code.
 
     description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
-    constants by joint. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID by joint. feet: links that stand on the ground;
-    None: the last link with a collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the
-    description's meshes name. InputError where the description is wanted for the base's default and cannot be read.
+    constants by joint (AX-12A where none are given). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID
+    by joint. feet: links that stand on the ground; None: the last link with a collision shape on each branch (robot/feet.py).
+    packages: folder of each ROS package that the description's meshes name. InputError where the description is wanted for the
+    base's default and cannot be read.
     """
 
     description: str

@@ -19,10 +19,12 @@ SPEED_UNIT = 0.111 * 2 * math.pi / 60
 
 @dataclass(frozen=True, kw_only=True)
 class ServoConstants:
-    """Constants of one servo; torques N m, speeds rad/s, voltages V, margins and slopes in counts of 300/1023 deg.
+    """Constants of one servo (docs/formats.md, section 4).
 
-    Either `compliance_slope`, `compliance_margin` and `punch` (of 1023), or `proportional_gain` (duty per radian). sd: how well
-    numbers are known, by key, in their units; of others SHARES_KNOWN counts.
+    model: name of the servo. stall_torque [N m] and no_load_speed [rad/s] at rated_voltage [V]; supply_voltage [V].
+    coulomb_friction [N m], viscous_friction [N m s/rad] and reflected_inertia [kg m^2] at the joint. Either compliance_slope and
+    compliance_margin (counts of 300/1023 deg) and punch (of 1023), or proportional_gain (duty per radian). sd: standard deviation
+    of a constant, by key, in its unit; of others the share in SHARES_KNOWN. InputError names the key and what was expected.
     """
 
     model: str = "AX-12A"

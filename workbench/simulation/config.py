@@ -14,10 +14,11 @@ ENGINES = ("auto", "drake", "compiled")
 
 @dataclass(unsafe_hash=True)  # not frozen: Drake's YAML loader fills an instance in
 class SimulationConfig:
-    """How a robot is simulated; loadable by `pydrake.common.yaml.yaml_load_typed`.
+    """How a robot is simulated; loadable by `pydrake.common.yaml.yaml_load_typed`. InputError names a field out of range.
 
     time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic",
-    … as in Drake's GetIntegrationSchemes) to `accuracy`. approximation: of discrete contact. base: "free", "fixed" (held
+    … as in Drake's GetIntegrationSchemes) to `accuracy`. approximation: Drake's of discrete contact, "lagged", "sap" or
+    "similar". base: "free", "fixed" (held
     level, clear of the ground), or "path" (moved along a recorded path). drive: "servo" (the full law), "fast_servo"
     (Drake's implicit PD; see fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no

@@ -67,7 +67,8 @@ def first_reference(commands: Commands, servos: Array, zero: Array) -> Array:
 
 
 class Simulation:
-    """One robot in one configuration, built once; every run starts from the same settled neutral pose."""
+    """One robot in one configuration, built once as a Drake diagram; every run starts from the same settled neutral pose.
+    InputError for a robot, an effect or a configuration that cannot be simulated."""
 
     def __init__(self, model: RobotModel, config: SimulationConfig | None = None) -> None:
         from workbench.simulation.station import MakeStation
@@ -94,7 +95,7 @@ class Simulation:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Order of the columns of commands and takes."""
+        """Names of the joints (n,), in the order of the columns of commands and takes."""
         return self.model.joints
 
     def run(self, commands: Commands | None = None, duration: float | None = None, lead: float = 0.1, *,
@@ -106,9 +107,13 @@ class Simulation:
 
         duration [s] after the first command (default: to the end). lead [s] of rest before it. path: take whose base moves
         this one (base "path"). start: angles and velocities (n,) [rad, rad/s] in self.joints' order at the first command, in
-        place of rest in neutral: the links', or the servos' own by Start, which a free base gives its pose too; no lead then.
-        elapsed [s]: how long the robot has played before these commands, for effects that grow with it. steadied: where a free
-        base is put back to as it goes. Returns a Take with time 0 at the first command.
+        place of rest in neutral: the links', or the servos' own by Start, which also gives a free base its pose; no lead then.
+        elapsed [s]: how long the robot has played before these commands, for effects that grow with it. steadied: states to which
+        a free base is put back on its way. name: of the take.
+
+        Returns a Take with time 0 at the first command, in SI, radians and the world's axes (x forward, y left, z up).
+        InputError where neither commands, trajectory nor duration are given, `path` is missing where the base needs it, or
+        `start` lacks a free base's pose; for drive "playback", which has no dynamics.
         """
         if self.config.drive == "playback":
             raise InputError(None, "drive 'playback' shows a take; call play_back")
@@ -139,7 +144,7 @@ class Simulation:
 
     def stepped(self, start: Start | None = None) -> SteppedRun:
         """A run that takes its next commands while it goes: from rest in neutral, or from `start`. One at a time: a new run of
-        this simulation ends it."""
+        this simulation ends it. InputError unless the drive is "servo" and the base free or fixed."""
         from workbench.simulation.stepped import SteppedRun
 
         return SteppedRun(self, start)
@@ -161,11 +166,12 @@ class Simulation:
         return self._as_built(take, state)
 
     def play_back(self, take: Take) -> Take:
-        """The thesis's animation: the model posed at each frame of a take; see `workbench.simulation.playback`."""
+        """The thesis's animation: the model posed at each frame of a take, without dynamics; what the take did not see stays in
+        neutral, gaps are bridged. Returns a Take on the same clock."""
         return play_back(self.diagram, self.context, self.model, self.config.base, take)
 
-    def begin_stepped(self, start: Start | None) -> int:
-        """For SteppedRun: puts the robot where its run starts; returns what `is_stepping` knows it by."""
+    def _begin_stepped(self, start: Start | None) -> int:
+        """For SteppedRun: puts the robot where its run starts; returns what `_is_stepping` knows it by."""
         self._rest_in_neutral(None)
         if start is not None:
             self._put(start, None)
@@ -173,19 +179,11 @@ class Simulation:
         self.simulator.Initialize()
         return self._runs
 
-    def is_stepping(self, token: int) -> bool:
-        """Whether no other run has begun since `begin_stepped` gave this token."""
+    def _is_stepping(self, token: int) -> bool:
+        """Whether no other run has begun since `_begin_stepped` gave this token."""
         return token == self._runs
 
-    def advance_stepped(self, commands: Commands | None, begin: float, end: float) -> tuple[Array, dict[str, Array]]:
-        """For SteppedRun: goes on from `begin` to `end` [s]."""
-        return self._advance(commands, 0.0, begin, end)
-
-    def on_log_grid(self, t: float) -> float:
-        """The instant of the log nearest to t [s]."""
-        return self._whole_steps(t)
-
-    def present_state(self) -> Start:
+    def _present_state(self) -> Start:
         """The state of joints, base and ramps now."""
         q = np.array([j.get_angle(self._plant_context) for j in self._joints])
         v = np.array([j.get_angular_rate(self._plant_context) for j in self._joints])
@@ -198,11 +196,6 @@ class Simulation:
         bank, context = self._bank()
         reference = np.array(bank.GetOutputPort("reference").Eval(context))
         return Start(q - self._zero, v, logged=True, base=base, reference=reference)
-
-    def stepped_take(self, name: str, sent: Commands | None, commands: Commands | None, sampled: Array,
-                     forces: dict[str, Array]) -> Take:
-        """For SteppedRun: what was written down since its start."""
-        return self._take(name, 0.0, sent, commands, sampled, forces)
 
     def _as_built(self, take: Take, state: Array) -> Take:
         """The take with what the links do, where they do not follow the servos as the model says."""

@@ -33,7 +33,7 @@ class SteppedRun:
         self._played: Commands | None = None
         self._sampled: list[Array] = []
         self._forces: list[dict[str, Array]] = []
-        self._token = simulation.begin_stepped(start)
+        self._token = simulation._begin_stepped(start)
         self.time = 0.0
 
     def send(self, commands: Commands) -> None:
@@ -45,8 +45,8 @@ class SteppedRun:
     def advance(self, seconds: float) -> None:
         """Goes on for so long, in whole steps of the log."""
         self._check_alive()
-        end = self._simulation.on_log_grid(self.time + seconds)
-        sampled, forces = self._simulation.advance_stepped(self._played, self.time, end)
+        end = self._simulation._whole_steps(self.time + seconds)
+        sampled, forces = self._simulation._advance(self._played, 0.0, self.time, end)
         self._sampled.append(sampled)
         self._forces.append(forces)
         self.time = end
@@ -55,7 +55,7 @@ class SteppedRun:
     def state(self) -> Start:
         """Where the robot is now; another run starts from it."""
         self._check_alive()
-        return self._simulation.present_state()
+        return self._simulation._present_state()
 
     def take(self, name: str = "simulation") -> Take:
         """What has been written down so far, from the start of the run."""
@@ -64,10 +64,10 @@ class SteppedRun:
         unique, rows = np.unique(sampled, return_index=True)
         feet = self._forces[0] if self._forces else {}
         forces = {foot: np.concatenate([f[foot] for f in self._forces])[rows] for foot in feet}
-        return self._simulation.stepped_take(name, self._sent, self._played, unique, forces)
+        return self._simulation._take(name, 0.0, self._sent, self._played, unique, forces)
 
     def _check_alive(self) -> None:
-        if not self._simulation.is_stepping(self._token):
+        if not self._simulation._is_stepping(self._token):
             raise RuntimeError("another run of the same simulation has ended this one")
 
 

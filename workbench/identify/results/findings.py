@@ -23,7 +23,7 @@ FINDINGS, MODEL, NOMINAL = "findings.json", "model.yaml", "nominal.yaml"
 
 @dataclass(frozen=True)
 class Change:
-    """An error before and after an effect entered, in `unit`."""
+    """Error (RMS of recorded less simulated) before and after an effect is added, in `unit` ("deg" or "m")."""
 
     before: float
     after: float
@@ -36,7 +36,8 @@ class Change:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter in the contract's unit (section 7). low, high bound 90 %; infinite where the data give no bound."""
+    """A parameter in the units of docs/formats.md, section 7 (degrees). value, low, high: a number, or three of a vector; low and
+    high bound 90 %, infinite where the data give no bound."""
 
     value: float | Vector
     low: float | Vector
@@ -58,7 +59,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Alternative:
-    """An effect that the data cannot tell from the finding's."""
+    """An effect that the data cannot separate from the finding's. confidence: its probability, 0 to 1."""
 
     effect: str
     where: tuple[str, ...]
@@ -89,7 +90,7 @@ class FamilyBelief:
 
 @dataclass(frozen=True)
 class Recalibrated:
-    """A number of the nominal law that was known to `sd` and is used otherwise: no finding. sigmas: of sd that it went."""
+    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding."""
 
     number: str
     where: tuple[str, ...]
@@ -100,7 +101,7 @@ class Recalibrated:
 
     @property
     def sigmas(self) -> float:
-        """By how many of its standard deviations it went."""
+        """By how many standard deviations it was adjusted."""
         return (self.value - self.nominal) / self.sd
 
     def to_json(self) -> dict[str, Any]:
@@ -111,8 +112,10 @@ class Recalibrated:
 
 @dataclass(frozen=True)
 class Finding:
-    """A piece of physics that the model lacked. confidence: probability that it is there by this name, at that place. fit: error
-    on the stretches that were fitted; validation: on those that no choice and no parameter saw. evidence: for a person."""
+    """One effect that the nominal model lacks. where: joints, links, feet or rigid bodies; empty: the whole robot. confidence:
+    probability (0 to 1) that it is there. parameters: estimates by name, each with its unit. fit: error on the frames that were
+    fitted; validation: on those that neither selection nor parameters saw. alternatives: at most one, which the data cannot
+    separate from it. evidence: the same in words. family: probability of any effect of its family."""
 
     effect: str
     where: tuple[str, ...]
@@ -141,7 +144,7 @@ class Finding:
 
     @property
     def likely(self) -> bool:
-        """Whether the effect, or another that could be meant, is there rather than not."""
+        """Whether the effect, or its alternative, is more likely there than not."""
         return self.confidence + sum(a.confidence for a in self.alternatives) >= CONCLUSIONS.likely
 
     def to_json(self) -> dict[str, Any]:
@@ -195,7 +198,7 @@ class GapEntry:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What the fitted model leaves, and what it depends on (angle, speed, load, time, phase)."""
+    """RMS error that the fitted model leaves, and the floor of noise and numerics, in `unit`; description: what it depends on."""
 
     where: tuple[str, ...]
     error: float
@@ -211,8 +214,8 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class NextExperiment:
-    """A motion (file beside findings.json) to record next, on a base free or fixed, and the ties that it separates;
-    log_likelihood_ratios: expected of the right name over the other, for each tie, where they are known."""
+    """What to record next: motion (file beside findings.json), and the pairs of effects that it separates, with the expected log
+    likelihood ratio of each (natural logarithm), where known."""
 
     motion: str
     base: Literal["free", "fixed"]
@@ -226,9 +229,14 @@ class NextExperiment:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """All that a session says. model: nominal with the findings' effects; posterior: of their parameters. left_out: damaged
-    takes, (name, reason). stopped: whether the search came to its limit of work. provenance: workbench, drake,
-    model_sha256, seed, seconds; searched: of long sessions, the seconds by take that the search looked at."""
+    """Everything found in a session.
+
+    verdict: docs/formats.md, section 6. nominal: the session's robot; model: the same with the findings' effects; posterior: of
+    their parameters, in the units of section 7. gap: where, when and by how much recordings differ from the nominal model.
+    findings, rejected: effects that were kept, and not kept. unexplained: what the fitted model leaves. recalibrated: servo
+    constants adjusted within their tolerance. left_out: damaged takes, (name, reason). stopped: whether the search reached its
+    limit of work. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
+    """
 
     verdict: Verdict
     model: RobotModel
@@ -249,7 +257,7 @@ class Diagnosis:
             raise ValueError(f"verdict: expected one of {', '.join(get_args(Verdict))}, got {self.verdict!r}")
 
     def to_json(self) -> dict[str, Any]:
-        """The contract's findings.json."""
+        """Content of findings.json (docs/formats.md, section 6)."""
         out: dict[str, Any] = {
             "format": 1, "verdict": self.verdict,
             "gap": [g.to_json() for g in self.gap], "findings": [f.to_json() for f in self.findings],

@@ -14,12 +14,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TakeReport:
-    """One take against the nominal and the fitted model.
+    """One take beside its simulation with the nominal and with the fitted model.
 
-    channels: (c) joints, and on the ground what the body does. noise: (c,) what noise, numerics and contact models alone make
-    (standard deviation) [rad or m]. before, after: (N, c) recorded less simulated, over that, on the recording's frames; NaN
-    where unseen or before the first command. unseen: (N,) frames that no choice and no parameter saw. recorded, nominal, fitted:
-    the takes behind, observed alike, on one clock of N frames.
+    recorded, nominal, fitted: the takes (SI, radians, world frame of `Take`), observed alike, on one clock of N frames.
+    channels: (c) names of joints, and for a free base of the body's coordinates. noise: (c,) standard deviation of what sensor
+    noise, numerics and contact models alone cause [rad or m]. before, after: (N, c) recorded less simulated by the nominal and by
+    the fitted model, divided by `noise`; NaN where unseen or before the first command. unseen: (N,) frames that neither the
+    selection of effects nor a parameter saw. ValueError where shapes differ.
     """
 
     recorded: Take
@@ -41,7 +42,7 @@ class TakeReport:
 
     @property
     def name(self) -> str:
-        """Of the take."""
+        """Name of the take."""
         return self.recorded.name
 
     @property
@@ -51,7 +52,7 @@ class TakeReport:
 
     @property
     def judged(self) -> NDArray[np.bool_]:
-        """Frames (N,) that a model is judged on: the unseen ones, or all where there are none."""
+        """Frames (N,) on which a model is evaluated: the unseen ones, or all where there are none."""
         return self.unseen if self.unseen.any() else np.ones(len(self.unseen), dtype=bool)
 
     def ratios(self, residual: Array) -> dict[str, float]:
@@ -59,7 +60,7 @@ class TakeReport:
         return {c: rms(residual[self.judged, i]) for i, c in enumerate(self.channels)}
 
     def sigma(self, joint: str) -> float:
-        """What noise and numerics make of a joint's residual (standard deviation) [rad]; NaN where it was never seen."""
+        """Standard deviation of a joint's residual from noise and numerics alone [rad]; NaN where it was never seen."""
         column = self.channels.index(joint)
         return float(self.noise[column]) if np.isfinite(self.before[:, column]).any() else float("nan")
 
