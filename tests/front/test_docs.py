@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from docs.effects_page import PAGE, SEEN, page
+from docs.effects_page import LIMITS, PAGE, SEEN, meanings, page
 from workbench.cli.main import make_parser
 from workbench.effects.registry import known_effects
 
@@ -85,9 +85,20 @@ def test_the_page_of_effects_is_made_from_the_code_and_names_all() -> None:
     own = {name for name, e in known_effects().items() if type(e).__module__.startswith("workbench.")}
     assert set(SEEN) == own
     assert PAGE.read_text(encoding="utf-8") == page(), "run: python -m docs.effects_page"
-    for _, confused in SEEN.values():
-        for word in re.findall(r"\b[a-z]+_[a-z_]+\b", confused):
+    assert set(LIMITS) == {name for name in own if known_effects()[name].reduces_to}
+    for seen in SEEN.values():
+        assert seen.formula
+        for word in re.findall(r"\b[a-z]+_[a-z_]+\b", seen.confused):
             assert word in own, word
+
+
+def test_the_formats_page_says_what_each_effects_parameters_mean() -> None:
+    said = meanings()
+    assert said["viscous_friction"] == "`coefficient` N m s/rad, beyond nominal"
+    assert set(SEEN) <= set(said)
+    for name in SEEN:
+        own = {p.name for p in known_effects()[name].parameters}
+        assert own == set(re.findall(r"`(\w+)`", said[name])), name
 
 
 def test_every_page_is_in_the_navigation() -> None:

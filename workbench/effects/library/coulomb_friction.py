@@ -14,7 +14,7 @@ from workbench.servo import ServoLaw
 
 
 class CoulombFriction(Effect):
-    """Dry friction in a servo's gear, beyond nominal."""
+    """Coulomb (dry) friction in a servo's gear, beyond nominal."""
 
     name = "coulomb_friction"
     layer = "actuator"

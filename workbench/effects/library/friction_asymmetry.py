@@ -32,8 +32,8 @@ class _Asymmetric(ServoTerm):
 
 
 class FrictionAsymmetry(Effect):
-    """A gear that turns harder one way than the other: all dry friction, whatever it depends on, is `ratio` times as much to
-    positive angles as to negative ones, the mean of both as it was."""
+    """A gear that turns harder one way than the other: all Coulomb friction, whatever it depends on, is `ratio` times as much to
+    positive angles as to negative ones, while the mean of both stays."""
 
     name = "friction_asymmetry"
     layer = "actuator"

@@ -1,4 +1,4 @@
-"""A gear that rubs the more, the more torque it transmits."""
+"""Coulomb friction that grows with the torque that the gear transmits."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class _Rubbing(ServoTerm):
 
 
 class LoadFriction(Effect):
-    """A gear that rubs the more, the more torque it hands to its link; driven backwards it takes 1 / (1 - coefficient) of its
-    Coulomb friction to turn, and from 1 on it cannot be driven backwards.
+    """Coulomb friction that grows with the torque that the gear transmits. Driven backwards, the gear needs 1 / (1 - coefficient)
+    of its Coulomb friction to turn; from a coefficient of 1 on it cannot be driven backwards.
 
     Two options, as published friction models of such servos have them (M. Duclusaud and G. Passault, arXiv 2410.08650): `static`,
     more at rest, fading as exp(-(w / speed)^2); `backdrive`, more where motor and motion are opposed, so that the load drives the

@@ -14,7 +14,7 @@ from workbench.servo import ServoLaw
 
 
 class ReflectedInertia(Effect):
-    """Rotor and gear weigh more at the joint than nominal."""
+    """Rotor and gear have more inertia at the joint than nominal."""
 
     name = "reflected_inertia"
     layer = "actuator"

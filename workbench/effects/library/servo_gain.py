@@ -19,7 +19,7 @@ COUNTS = 0.01
 
 
 class ServoGain(Effect):
-    """A servo's law is steeper or flatter than nominal (duty per error); punch unchanged."""
+    """The servo law is steeper or flatter than nominal (duty per error); punch unchanged."""
 
     name = "servo_gain"
     layer = "actuator"

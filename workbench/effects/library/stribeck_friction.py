@@ -33,7 +33,7 @@ class _Sticking(ServoTerm):
 
 
 class StribeckFriction(Effect):
-    """A servo that sticks: more dry friction at rest, fading as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
+    """More Coulomb friction at rest, which fades with speed as exp(-(w / speed)^2) (Stribeck; Armstrong-Helouvry 1994)."""
 
     name = "stribeck_friction"
     layer = "actuator"

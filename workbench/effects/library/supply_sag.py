@@ -34,7 +34,7 @@ class _Sagging(ServoTerm):
 
 
 class SupplySag(Effect):
-    """A supply that gives way: its voltage drops with the sum of all servos' duties, and all of them share what is left."""
+    """The supply's voltage drops in proportion to the sum of all servos' duties, for all servos alike."""
 
     name = "supply_sag"
     layer = "actuator"

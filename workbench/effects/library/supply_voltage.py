@@ -19,7 +19,7 @@ a servo rated at 6 V is 1.4; more burns it."""
 
 
 class SupplyVoltage(Effect):
-    """The supply is not at its nominal voltage: every servo has that share of its stall torque and no-load speed."""
+    """The supply is not at its nominal voltage: stall torque and no-load speed of every servo change in proportion."""
 
     name = "supply_voltage"
     layer = "actuator"

@@ -30,7 +30,7 @@ class _Ceiling(ServoTerm):
 
 
 class TorqueCeiling(Effect):
-    """A motor whose torque, duty torque less back-EMF, goes no further: the driver's current limit, heat, or another servo."""
+    """The motor's torque, duty torque less back-EMF, is limited: the driver's current limit, heat, or another servo."""
 
     name = "torque_ceiling"
     layer = "actuator"

@@ -9,7 +9,7 @@ from workbench.robot import EffectSpec
 
 
 class ZeroOffset(Effect):
-    """The horn sits turned on its shaft: link angle less servo angle."""
+    """The horn is mounted at an angle on its shaft: a constant between link angle and servo angle."""
 
     name = "zero_offset"
     layer = "structure"
