@@ -56,8 +56,6 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
     """The robot in neutral, drawn obliquely, each joint coloured and sized by its error over noise and numerics."""
     k, shapes = model.kinematics, robot_shapes(model)
     poses = {link: (p[0], R[0]) for link, (p, R) in k.forward(np.zeros((1, len(k.joints)))).items()}
-    figure = new_figure(7.6, 4.6)
-    axes = figure.subplots()
     points = {j: _oblique(poses[f.child][0] + poses[f.child][1] @ f.p_BM) for j, f in k.frames.items()}
     carrying = {f.parent for f in k.frames.values()}
     tips = {j: k.centers[f.child] for j, f in k.frames.items() if f.child not in carrying}
@@ -69,6 +67,11 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
         if joint in tips:
             p, R = poses[f.child]
             segments.append([points[joint], _oblique(p + R @ tips[joint])])
+    ends = np.concatenate(segments)
+    (right, top), (width, height) = ends.max(axis=0), np.ptp(ends, axis=0)
+    line = max(0.16 * height, 0.1 * width)
+    figure = new_figure(7.6, float(np.clip(7.6 * 1.6 * max(height, 3 * line) / (width + 6 * line), 2.8, 4.6)))
+    axes = figure.subplots()
     axes.add_collection(LineCollection(segments, colors=COMMAND, linewidths=5, alpha=0.35, capstyle="round", zorder=1))
     loud = sorted((j for j in model.joints if ratios.get(j, 0.0) > LIMIT), key=lambda j: -ratios[j])[:4]
     for joint in model.joints:
@@ -78,13 +81,11 @@ def robot_map(model: RobotModel, ratios: Mapping[str, float]) -> Figure:
         axes.scatter(x, y, s=size, color=colour, edgecolor="#555555", linewidth=0.8, zorder=3)
         if joint not in loud:
             axes.annotate(joint, (x, y), xytext=(9, 4), textcoords="offset points", fontsize=8, color="#777777", zorder=2)
-    ends = np.concatenate(segments)
-    (right, top), (width, height) = ends.max(axis=0), np.ptp(ends, axis=0)
-    line = max(0.16 * height, 0.1 * width)
     for row, joint in enumerate(sorted(loud, key=lambda j: -points[j][1])):
         axes.annotate(f"{joint} {ratios[joint]:.1f}×", points[joint], xytext=(right + 2 * line, top - row * line),
                       va="center", fontsize=12, fontweight="bold", color=RECORDED, zorder=4,
                       arrowprops={"arrowstyle": "-", "color": RECORDED, "linewidth": 1.0, "alpha": 0.6})
+    axes.update_datalim([(right + 4 * line, top)])  # room for what is written there
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.15)
     axes.set_axis_off()
