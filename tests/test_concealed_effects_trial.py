@@ -152,7 +152,7 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
     assert kept_section(readme) == section(whole)
     text = readme.read_text()
     assert text.startswith("# Before")
-    assert "| effects named, exactly or as one of a tie of two | at least 90 % | 33 % (1 of 3;" in text
+    assert "| effects identified, exactly or as one of a tie of two | at least 90 % | 33 % (1 of 3;" in text
     keep(whole, tmp_path / "trial.json", readme)
     assert readme.read_text() == text
     assert "changed during the trial" not in text

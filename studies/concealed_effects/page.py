@@ -24,7 +24,7 @@ def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -
     """Writes the page; `result`: what `trial.report` writes beside it."""
     asked = criteria(scores)
     report = Report("Concealed effects", headline(asked, result), ABOUT, _key_numbers(result), _provenance(result))
-    report.add(Section("Asked and got", [criteria_table(asked), Text(_remarks(result))]))
+    report.add(Section("Required and reached", [criteria_table(asked), Text(_remarks(result))]))
     if not scores:
         return report.write(path)
     counts, bins, given = confusion(scores), reliability(scores), sizes(scores)
@@ -62,7 +62,7 @@ def criteria_table(asked: Sequence[Criterion]) -> Table:
     """What is asked beside what came."""
     words = {True: "yes", False: "**no**", None: "–"}
     rows = [[text.replace(" %", "\u00a0%") for text in (c.what, c.asked, c.got)] for c in asked]
-    return Table(["", "asked", "got", "met"], [[*row, words[c.met]] for row, c in zip(rows, asked)])
+    return Table(["", "required", "reached", "met"], [[*row, words[c.met]] for row, c in zip(rows, asked)])
 
 
 def _remarks(result: Mapping[str, Any]) -> str:

@@ -56,7 +56,7 @@ def section(result: Mapping[str, Any] | None) -> str:
     """The table and what has to be said beside it, in Markdown."""
     if result is None:
         return "No trial has been run yet.\n"
-    rows = ["| | asked | got | met |", "|---|---|---|---|"]
+    rows = ["| | required | reached | met |", "|---|---|---|---|"]
     words = {True: "yes", False: "**no**", None: "–"}
     rows += [f"| {c['what']} | {c['asked']} | {c['got']} | {words[c['met']]} |" for c in result["criteria"]]
     others = result["diagnosed"] - result["quiet"]

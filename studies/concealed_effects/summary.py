@@ -110,7 +110,7 @@ def criteria(scores: Sequence[Score]) -> list[Criterion]:
     inside, held = sum(p.inside for p in given), sum(b.holds for b in bins)
     median = float(np.median([p.error for p in given])) if given else None
     return [
-        _share("effects named, exactly or as one of a tie of two", "at least 90 %", hits, len(effects), 0.90, 1.0),
+        _share("effects identified, exactly or as one of a tie of two", "at least 90 %", hits, len(effects), 0.90, 1.0),
         Criterion("of those, placed right", "at least 95 %", _mean(shares),
                   f"{100 * sum(shares) / len(shares):.0f} % of {len(shares)}" if shares else "–",
                   bool(np.mean(shares) >= 0.95) if shares else None),
