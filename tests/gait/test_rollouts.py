@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.simulation_compiled.test_compiled_touching import pressing
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.evaluate import SEARCH
 from workbench.gait.rollouts import Rollouts
@@ -24,3 +25,10 @@ def test_a_kept_robot_plays_as_a_fresh_one(tmp_path):
             np.testing.assert_array_equal(getattr(take, name), getattr(fresh, name), err_msg=name)
         np.testing.assert_array_equal(servos.p_WB, fresh.p_WB)
         np.testing.assert_array_equal(servos.torque, fresh.torque)
+
+
+def test_a_gait_that_trips_over_itself_is_given_up_whatever_shapes_touch():
+    """The compiled station itself would play it."""
+    job = pressing("fixed", duration=0.5)
+    assert run_compiled(job) is not None
+    assert list(Rollouts(1).takes([job])) == [None]

@@ -15,7 +15,7 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, Simulation, SimulationConfig
 from workbench.simulation.compiled.arrays import Log, State, work_for
 from workbench.simulation.compiled.machine import Machine, machine_of
-from workbench.simulation.compiled.run import run
+from workbench.simulation.compiled.run import DONE, TOUCHED, run
 from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.tables import tables_of
 
@@ -71,14 +71,14 @@ def drake_steps(model: RobotModel, config: SimulationConfig, seed: int, count: i
 class CompiledSteps:
     """The compiled station of a model, for single steps from states of Drake's plant."""
 
-    def __init__(self, model: RobotModel, config: SimulationConfig) -> None:
+    def __init__(self, model: RobotModel, config: SimulationConfig, apart: bool = False) -> None:
         physics, self.free = physics_of(model), config.base == "free"
         self.tables = tables_of(model, physics.description, self.free)
-        self.machine: Machine = machine_of(model, physics, self.tables, self.free, config.time_step)
+        self.machine: Machine = machine_of(model, physics, self.tables, self.free, config.time_step, apart)
         self.config, self.zero = config, physics.zero
 
-    def after(self, step: Step) -> Array:
-        """State of the plant after the step."""
+    def after(self, step: Step) -> Array | None:
+        """State of the plant after the step; None where it is Drake's, as something touches that the station does not know."""
         m, n = self.machine, len(self.tables.joints)
         base = step.x[:7].copy() if self.free else np.array([1.0, 0, 0, 0, 0, 0, 0])
         start = 7 if self.free else 0
@@ -90,7 +90,10 @@ class CompiledSteps:
         none = np.zeros((0, joints))
         schedule = schedule._replace(begin=-step.time, goal=none, speed=none, on=none.astype(bool))
         log = Log(np.empty((0, n)), np.empty((0, n)), np.empty((0, 7)), np.empty((0, joints)), np.empty((0, 0, 3)))
-        assert run(*m, schedule, state, log, work_for(*m)) == 0
+        how = run(*m, schedule, state, log, work_for(*m))
+        if how == TOUCHED:
+            return None
+        assert how == DONE
         return np.concatenate([state.base if self.free else [], state.q, state.v])
 
 

@@ -41,7 +41,7 @@ class Rollouts:
         key = f"{job.model.sha256} {job.config!r}"
         try:
             if key not in self._robots:
-                self._robots[key] = CompiledJob(job)
+                self._robots[key] = CompiledJob(job, apart=True)
             self._robots.move_to_end(key)
             while len(self._robots) > KEPT:
                 self._robots.popitem(last=False)

@@ -16,17 +16,23 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+BOX, CYLINDER, OTHER = 0, 1, 2
+LINK_CONTACTS = 32
+"""Contacts between links that there is room for; Drake has the rest."""
+
+
 class Tree(NamedTuple):
     """Kinematics, inertia and what acts on joints. parent (n,): body that carries each joint. path (nv,): the velocity before
-    each on the way to the root, -1 at its end. group (nv,): the tree of Drake's forest that a velocity belongs to. R (n, 3, 3), p
-    (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3), inertia (n+1, 6): of bodies in their
-    joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping, stiffness, rest, lower, upper (n,): of
-    joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while it holds. gravity, pull (3,): the
-    latter on the base's origin."""
+    each on the way to the root, -1 at its end; row (nv,): before each of all. group (nv,): the tree of Drake's forest that a
+    velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
+    inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
+    stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while
+    it holds. gravity, pull (3,): the latter on the base's origin."""
 
     free: bool
     parent: Ints
     path: Ints
+    row: Ints
     group: Ints
     R: Array
     p: Array
@@ -83,15 +89,20 @@ class Servos(NamedTuple):
 
 class Shapes(NamedTuple):
     """Collision shapes. body (s,); p (s, 3) their middle, R (s, 3, 3) and half (s, 3): their box, in the body's frame; radius
-    (s,): of spheres, 0 of others. stiffness, dissipation, friction, depth (s,): of the pair with the ground; where between ground
-    (0) and shape (1) the contact point is. bodies (b,), middle (b, 3), reach (b,): a ball round the shapes of each body that has
-    any. near (k, 2): numbers in `bodies` of those that can touch each other. may_touch (s, s)."""
+    (s,): of spheres, 0 of others; solid (s,): BOX, CYLINDER along its box's z, or OTHER; size (s,): from the middle to the
+    farthest point of shape or box. stiffness, dissipation, friction, depth
+    (s,): of the pair with the ground; where between ground (0) and shape (1) the contact point is. bodies (b,), middle (b, 3),
+    reach (b,): a ball round the shapes of each body that has any. near (k, 2): numbers in `bodies` of those that can touch each
+    other. may_touch (s, s). pair (s, s): row in `pairs` of a sphere (first) and what it touches with a contact that is known, -1
+    of others; pairs (k, 4): stiffness, dissipation, friction, and where between the other (0) and the sphere (1) the point is."""
 
     body: Ints
     p: Array
     R: Array
     half: Array
     radius: Array
+    solid: Ints
+    size: Array
     stiffness: Array
     dissipation: Array
     friction: Array
@@ -101,6 +112,8 @@ class Shapes(NamedTuple):
     reach: Array
     near: Ints
     may_touch: NDArray[np.bool_]
+    pair: Ints
+    pairs: Array
 
 
 class Schedule(NamedTuple):
@@ -151,7 +164,11 @@ class Log(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational."""
+    """Room for one step, made once a run. Spatial vectors are about the root's origin, in W: rotational, then translational.
+
+    Of contact c: shape[c] on the floor, or -1 between links; last[c]: the last velocity that moves it, along `Tree.path`, or
+    along `Tree.row` where its links are on two branches: then other[c] is the other's last, else -1. crossed (1,): whether any
+    has such links. frame (3, 3): axes of the contact that is being found, in rows."""
 
     R: Array
     p: Array
@@ -183,6 +200,12 @@ class Work(NamedTuple):
     motor: Array
     relief: Array
     shape: Ints
+    last: Ints
+    other: Ints
+    crossed: NDArray[np.bool_]
+    stiffness: Array
+    dissipation: Array
+    friction: Array
     J: Array
     elastic: Array
     normal: Array
@@ -191,11 +214,12 @@ class Work(NamedTuple):
     dvc: Array
     hessian: Array
     turned: Array
+    frame: Array
 
 
 def work_for(tree: Tree, servos: Servos, shapes: Shapes) -> Work:
     """Room for one run of a robot."""
-    n, nv, m, s = len(tree.parent), len(tree.path), len(servos.joint), len(shapes.body)
+    n, nv, m, c = len(tree.parent), len(tree.path), len(servos.joint), len(shapes.body) + LINK_CONTACTS
     zeros = np.zeros
     return Work(
         R=zeros((n + 1, 3, 3)), p=zeros((n + 1, 3)), S=zeros((nv, 6)), mass=zeros(n + 1), moment=zeros((n + 1, 3)),
@@ -204,5 +228,7 @@ def work_for(tree: Tree, servos: Servos, shapes: Shapes) -> Work:
         gradient=zeros(nv), impulse=zeros(nv), scale=zeros(nv), dv=zeros(nv), dp=zeros(nv),
         active=zeros(int(tree.group.max(initial=0)) + 1, dtype=np.bool_), brake_gain=zeros(n),
         limit_on=zeros((n, 2), dtype=np.bool_), limit_v=zeros((n, 2)), limit_R=zeros(n), push=zeros(m), motor=zeros(m),
-        relief=zeros(m), shape=zeros(s, dtype=np.int64), J=zeros((s, 3, nv)), elastic=zeros(s), normal=zeros(s), soft=zeros(s),
-        vc=zeros((s, 3)), dvc=zeros((s, 3)), hessian=zeros((s, 4)), turned=zeros(4))
+        relief=zeros(m), shape=zeros(c, dtype=np.int64), last=zeros(c, dtype=np.int64), other=zeros(c, dtype=np.int64),
+        crossed=zeros(1, dtype=np.bool_), stiffness=zeros(c), dissipation=zeros(c), friction=zeros(c), J=zeros((c, 3, nv)),
+        elastic=zeros(c), normal=zeros(c), soft=zeros(c), vc=zeros((c, 3)), dvc=zeros((c, 3)), hessian=zeros((c, 4)),
+        turned=zeros(4), frame=zeros((3, 3)))

@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 _OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "fastmath": {"contract"}, "error_model": "numpy"}
 """No GIL; nothing is allocated, so nothing is counted; a product and a sum may be one instruction, with one rounding, but nothing
 is taken to be finite; 1/0 is infinity."""
-_SOURCES = ("arrays", "contact", "kernel", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
+_SOURCES = ("arrays", "contact", "kernel", "links", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
             "../../servo/term_bank")
 
 
@@ -48,6 +48,12 @@ def part(function: F) -> F:
     """A piece of a kernel; Python does not call it. Always inlined: a call hands over each number of each array of its tuples,
     and half of a step went into that."""
     return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+
+
+def rare(function: F) -> F:
+    """A piece of a kernel that is needed so rarely that the others are better off without its instructions among theirs: a call.
+    """
+    return numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
 def kernel(function: F) -> F:

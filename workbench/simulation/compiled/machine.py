@@ -6,13 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.effects.apply import Physics
 from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import RobotModel
 from workbench.servo.bank import HOLDING_DAMPING, MOST_CREEP
 from workbench.servo.terms import TermNumbers, most_friction
-from workbench.simulation.compiled.arrays import Array, Ints, Servos, Shapes, Tree
+from workbench.simulation.compiled.arrays import OTHER, Array, Ints, Servos, Shapes, Tree
 from workbench.simulation.compiled.tables import NotCoveredError, ShapeTable, Tables
 from workbench.simulation.contact import RIGID_STIFFNESS, partner_friction
 
@@ -28,13 +29,13 @@ class Machine(NamedTuple):
     shapes: Shapes
 
 
-def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, dt: float) -> Machine:
-    """NotCoveredError says what the arrays cannot hold."""
+def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, dt: float, apart: bool = False) -> Machine:
+    """NotCoveredError says what the arrays cannot hold. apart: contacts between links are not known, and end a run."""
     missing = [j for j in model.joints if j not in tables.joints]
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")
     joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.int64)
-    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), _shapes(model, physics, tables, free))
+    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), _shapes(model, physics, tables, free, apart))
 
 
 def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
@@ -80,48 +81,86 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n))
 
 
-def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool) -> Shapes:
+def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool, apart: bool) -> Shapes:
     t = tables.shapes
-    stiffness, dissipation, friction, depth = _pairs(model, physics, t) if free else (np.zeros(len(t.body)),) * 4
+    own = _materials(model, physics, t, free)
+    stiffness, dissipation, friction, depth = _on_floor(physics, t, own) if free else np.zeros((4, len(t.body)))
+    size = np.where(t.radius > 0, t.radius, np.linalg.norm(t.half, axis=1))
     bodies = np.unique(t.body)
     middle, reach = np.zeros((len(bodies), 3)), np.zeros(len(bodies))
     for i, b in enumerate(bodies):
         here = t.body == b
         middle[i] = t.p[here].mean(axis=0)
-        size = np.where(t.radius[here] > 0, t.radius[here], np.linalg.norm(t.half[here], axis=1))
-        reach[i] = float(np.max(np.linalg.norm(t.p[here] - middle[i], axis=1) + size))
+        reach[i] = float(np.max(np.linalg.norm(t.p[here] - middle[i], axis=1) + size[here]))
     near = [(i, k) for i, a in enumerate(bodies) for k, b in enumerate(bodies[:i])
             if t.may_touch[np.ix_(t.body == a, t.body == b)].any()]
+    pair, pairs = _between(t, own, apart)
     return Shapes(
-        body=t.body, p=t.p, R=t.R, half=t.half, radius=t.radius, stiffness=stiffness, dissipation=dissipation, friction=friction,
-        depth=depth, bodies=bodies, middle=middle, reach=reach, near=np.array(near, dtype=np.int64).reshape(-1, 2),
-        may_touch=t.may_touch)
+        body=t.body, p=t.p, R=t.R, half=t.half, radius=t.radius, solid=t.solid, size=size, stiffness=stiffness,
+        dissipation=dissipation, friction=friction, depth=depth, bodies=bodies, middle=middle, reach=reach,
+        near=np.array(near, dtype=np.int64).reshape(-1, 2), may_touch=t.may_touch, pair=pair, pairs=pairs)
 
 
-def _pairs(model: RobotModel, physics: Physics, t: ShapeTable) -> tuple[Array, Array, Array, Array]:
-    """Stiffness, dissipation and friction of each shape's pair with the ground, and where between them the point of contact is,
-    as AddGround and SetFootContact set the materials and Drake combines them (`workbench.simulation.contact`)."""
-    ground, n = physics.ground, len(t.body)
-    own_ground = ground.stiffness if ground.stiffness is not None and math.isfinite(ground.stiffness) else RIGID_STIFFNESS
-    given = [f for f in t.friction if f is not None]
-    mu_ground = ground.friction if ground.friction is not None else float(np.mean(given)) if given else 1.0
+def _materials(model: RobotModel, physics: Physics, t: ShapeTable, free: bool) -> Array:
+    """Stiffness, dissipation and friction (s, 3) of each shape, as AddGround and SetFootContact set them (`workbench.simulation.
+    contact`), on a free base alone; NaN where nothing says them."""
+    out = np.array([t.stiffness, t.dissipation, t.friction], dtype=float).T.reshape(-1, 3)
+    if not free:
+        return out
+    if physics.foot_stiffness is not None:
+        out[:, 0] = physics.foot_stiffness
+    if physics.ground.friction is not None:
+        out[:, 2] = physics.ground.friction
     feet = {model.kinematics.frames[foot].child: value for foot, value in physics.foot_friction.items()}
-    stiffness, dissipation, friction, depth = np.zeros((4, n))
-    for s in range(n):
-        k = t.stiffness[s] if physics.foot_stiffness is None else physics.foot_stiffness
-        d = t.dissipation[s]
-        mu = t.friction[s] if ground.friction is None else ground.friction
-        if t.link[s] in feet:
-            mu = partner_friction(feet[t.link[s]], mu_ground)
-        if k is None or d is None or mu is None:
-            if t.radius[s] > 0.0:
-                raise NotCoveredError(f"a foot of '{t.link[s]}' without stiffness, dissipation or friction of its own")
-            k, d, mu = UNTOUCHED, 0.0, 0.0
-        both = k + own_ground
-        stiffness[s], depth[s] = k * own_ground / both, k / both
-        dissipation[s] = own_ground / both * d + k / both * (ground.dissipation or 0.0)
-        friction[s] = 2.0 * mu * mu_ground / (mu + mu_ground) if mu + mu_ground > 0.0 else 0.0
-    return stiffness, dissipation, friction, depth
+    ground = _ground_friction(physics, t)
+    for s, link in enumerate(t.link):
+        if link in feet:
+            out[s, 2] = partner_friction(feet[link], ground)
+    return out
+
+
+def _ground_friction(physics: Physics, t: ShapeTable) -> float:
+    given = [f for f in t.friction if f is not None]
+    if physics.ground.friction is not None:
+        return physics.ground.friction
+    return float(np.mean(given)) if given else 1.0
+
+
+def _on_floor(physics: Physics, t: ShapeTable, own: Array) -> Array:
+    """Stiffness, dissipation and friction of each shape's pair with the ground, and where between them the point of contact is:
+    (4, s)."""
+    missing = _not_said(own)
+    if (missing & (t.radius > 0.0)).any():
+        foot = t.link[int(np.argmax(missing & (t.radius > 0.0)))]
+        raise NotCoveredError(f"a foot of '{foot}' without stiffness, dissipation or friction of its own")
+    ground = physics.ground
+    stiffness = ground.stiffness if ground.stiffness is not None and math.isfinite(ground.stiffness) else RIGID_STIFFNESS
+    floor = np.array([stiffness, ground.dissipation or 0.0, _ground_friction(physics, t)])
+    return _combined(np.where(missing[:, None], [UNTOUCHED, 0.0, 0.0], own), floor)
+
+
+def _between(t: ShapeTable, own: Array, apart: bool) -> tuple[Ints, Array]:
+    """`Shapes.pair` and `Shapes.pairs`: spheres with spheres, boxes and cylinders of other links, whose materials are said."""
+    known = ~_not_said(own)
+    solid = (t.radius > 0.0) | (t.solid != OTHER)
+    holds = t.may_touch & ((t.radius > 0.0) & known)[:, None] & (solid & known) & (not apart)
+    pair = np.full(holds.shape, -1, dtype=np.int64)
+    ball, other = np.nonzero(holds)
+    pair[ball, other] = np.arange(len(ball))
+    return pair, np.ascontiguousarray(_combined(own[ball], own[other]).T)
+
+
+def _not_said(own: Array) -> NDArray[np.bool_]:
+    return np.asarray(np.isnan(own).any(axis=1))
+
+
+def _combined(a: Array, b: Array) -> Array:
+    """Stiffness, dissipation and friction of pairs, and where the point of contact is between b (0) and a (1), as Drake combines
+    the materials (k, 3) of both: (4, k)."""
+    (ka, da, ma), (kb, db, mb) = a.T, b.T
+    both, rough = ka + kb, ma + mb
+    friction = np.divide(2.0 * ma * mb, rough, out=np.zeros(np.broadcast(ma, mb).shape), where=rough > 0.0)
+    return np.array([ka * kb / both, kb / both * da + ka / both * db, friction, ka / both])
 
 
 def _array(values: object) -> Array:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from workbench.simulation.compiled.arrays import Log, Schedule, Servos, Shapes, State, Tree, Work
-from workbench.simulation.compiled.contact import find_contacts, touches_otherwise
+from workbench.simulation.compiled.contact import floor_contacts
 from workbench.simulation.compiled.kernel import kernel, part
+from workbench.simulation.compiled.links import UNKNOWN, link_contacts
 from workbench.simulation.compiled.put import drop, put
 from workbench.simulation.compiled.servo import advance_servos, braking, command, push_joints
 from workbench.simulation.compiled.solve import prepare, solve
@@ -29,11 +30,12 @@ def _solve_step(tree: Tree, servos: Servos, shapes: Shapes, dt: float, elapsed: 
         w.force[k] = 0.0
     push_joints(servos, elapsed, 6 if tree.free else 0, state, w)
     gather(tree, state, dt, w)
-    if touches_otherwise(tree, shapes, state, w):
+    count = floor_contacts(tree, shapes, state, dt, w) if tree.free else 0
+    count = link_contacts(tree, shapes, state, dt, count, w)
+    if count == UNKNOWN:
         return -TOUCHED
-    count = find_contacts(tree, shapes, state, dt, w) if tree.free else 0
-    prepare(tree, shapes, state, dt, count, w)
-    return count if solve(tree, shapes, dt, count, w) >= 0 else -FAILED
+    prepare(tree, state, dt, count, w)
+    return count if solve(tree, dt, count, w) >= 0 else -FAILED
 
 
 @part
@@ -84,9 +86,11 @@ def _write_forces(tree: Tree, servos: Servos, shapes: Shapes, dt: float, count: 
                 log.force[row, s, r] = 0.0
         for c in range(count):
             s = w.shape[c]
+            if s < 0:  # not the floor's
+                continue
             x, y, z = w.vc[c, 0], w.vc[c, 1], w.vc[c, 2]
-            slip = shapes.friction[s] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
-            elastic, damping = w.elastic[c] - dt * shapes.stiffness[s] * z, 1.0 - shapes.dissipation[s] * z
+            slip = w.friction[c] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
+            elastic, damping = w.elastic[c] - dt * w.stiffness[c] * z, 1.0 - w.dissipation[c] * z
             log.force[row, s, 0], log.force[row, s, 1] = -slip * x / dt, -slip * y / dt
             log.force[row, s, 2] = max(elastic, 0.0) * max(damping, 0.0)
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-from workbench.simulation.compiled.arrays import Shapes, State, Tree, Work
-from workbench.simulation.compiled.contact import along_path
+from workbench.simulation.compiled.arrays import State, Tree, Work
+from workbench.simulation.compiled.contact import along
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.tree import copy_paths, factor, solve_factored, times_matrix
 from workbench.simulation.compiled.vectors import clamp
@@ -37,7 +37,7 @@ LINE_TOLERANCE = 1e-8
 
 
 @part
-def prepare(tree: Tree, shapes: Shapes, state: State, dt: float, count: int, w: Work) -> None:
+def prepare(tree: Tree, state: State, dt: float, count: int, w: Work) -> None:
     """Free motion v*, the constraints there are and their constants, from M, forces and contacts."""
     n = tree.parent.shape[0]
     o = 6 if tree.free else 0
@@ -50,11 +50,14 @@ def prepare(tree: Tree, shapes: Shapes, state: State, dt: float, count: int, w: 
     for k in range(tree.path.shape[0]):
         w.v_star[k] = state.v[k] + dt * w.v_star[k]
     for g in range(w.active.shape[0]):
-        w.active[g] = count > 0
+        w.active[g] = False
     for i in range(n):
         _prepare_joint(tree, state, i, o + i, dt, w)
     for c in range(count):
-        w.soft[c] = max(STICTION, shapes.friction[w.shape[c]] * SIGMA * _weight(tree, shapes, c, w) * w.normal[c])
+        w.active[tree.group[w.last[c]]] = True
+        if w.other[c] >= 0:
+            w.active[tree.group[w.other[c]]] = True
+        w.soft[c] = max(STICTION, w.friction[c] * SIGMA * _weight(tree, c, w) * w.normal[c])
     for k in range(tree.path.shape[0]):  # trees without constraints move freely
         w.v_next[k] = state.v[k] if w.active[tree.group[k]] else w.v_star[k]
 
@@ -77,17 +80,17 @@ def _prepare_joint(tree: Tree, state: State, i: int, k: int, dt: float, w: Work)
 
 
 @part
-def _weight(tree: Tree, shapes: Shapes, c: int, w: Work) -> float:
+def _weight(tree: Tree, c: int, w: Work) -> float:
     """Norm over three of J diag(A)^-1 J' of a contact."""
-    b = shapes.body[w.shape[c]]
+    path = tree.row if w.other[c] >= 0 else tree.path
     total = 0.0
     for r in range(3):
         for s in range(r + 1):
             entry = 0.0
-            j = 6 + b if b < tree.parent.shape[0] else 5
+            j = w.last[c]
             while j >= 0:
                 entry += w.J[c, r, j] * w.J[c, s, j] * w.scale[j] * w.scale[j]
-                j = tree.path[j]
+                j = path[j]
             total += entry * entry if r == s else 2.0 * entry * entry
     return math.sqrt(total) / 3.0
 
@@ -99,16 +102,16 @@ def _limit_impulse(w: Work, i: int, side: int, v: float) -> float:
 
 
 @part
-def _normal_impulse(shapes: Shapes, s: int, elastic: float, v: float, dt: float) -> tuple[float, float]:
+def _normal_impulse(w: Work, c: int, v: float, dt: float) -> tuple[float, float]:
     """Impulse of a contact at normal velocity v, and minus its slope (Hunt-Crossley, implicit)."""
-    force, damping = elastic - dt * shapes.stiffness[s] * v, 1.0 - shapes.dissipation[s] * v
+    force, damping = w.elastic[c] - dt * w.stiffness[c] * v, 1.0 - w.dissipation[c] * v
     if force <= 0.0 or damping <= 0.0:
         return 0.0, 0.0
-    return dt * force * damping, dt * (shapes.stiffness[s] * dt * damping + shapes.dissipation[s] * force)
+    return dt * force * damping, dt * (w.stiffness[c] * dt * damping + w.dissipation[c] * force)
 
 
 @part
-def _gradient(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> tuple[float, float]:
+def _gradient(tree: Tree, dt: float, count: int, w: Work) -> tuple[float, float]:
     """w.gradient = A (v - v*) - J' impulses, w.impulse = J' impulses, w.hessian of contacts (xx, xy, yy, zz); returns the
     residual and the scale of momentum."""
     o = 6 if tree.free else 0
@@ -123,7 +126,7 @@ def _gradient(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> tup
         if w.limit_on[i, 1]:
             w.impulse[o + i] -= _limit_impulse(w, i, 1, -v)
     for c in range(count):
-        _push_contact(tree, shapes, c, dt, w)
+        _push_contact(tree, c, dt, w)
     residual = momentum = impulse = 0.0
     for k in range(tree.path.shape[0]):
         if w.active[tree.group[k]]:
@@ -137,26 +140,25 @@ def _gradient(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> tup
 
 
 @part
-def _push_contact(tree: Tree, shapes: Shapes, c: int, dt: float, w: Work) -> None:
+def _push_contact(tree: Tree, c: int, dt: float, w: Work) -> None:
     """Adds J' times a contact's impulse to w.impulse; its part of the Hessian."""
-    s = w.shape[c]
     x, y = w.vc[c, 0], w.vc[c, 1]
-    per_speed = shapes.friction[s] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
+    per_speed = w.friction[c] * w.normal[c] / math.sqrt(x * x + y * y + w.soft[c] * w.soft[c])
     share = 1.0 / (x * x + y * y + w.soft[c] * w.soft[c])
-    normal, slope = _normal_impulse(shapes, s, w.elastic[c], w.vc[c, 2], dt)
+    normal, slope = _normal_impulse(w, c, w.vc[c, 2], dt)
     w.hessian[c, 0] = per_speed * (1.0 - x * x * share)
     w.hessian[c, 1] = -per_speed * x * y * share
     w.hessian[c, 2] = per_speed * (1.0 - y * y * share)
     w.hessian[c, 3] = slope
-    b = shapes.body[s]
-    j = 6 + b if b < tree.parent.shape[0] else 5
+    path = tree.row if w.other[c] >= 0 else tree.path
+    j = w.last[c]
     while j >= 0:
         w.impulse[j] += w.J[c, 2, j] * normal - per_speed * (w.J[c, 0, j] * x + w.J[c, 1, j] * y)
-        j = tree.path[j]
+        j = path[j]
 
 
 @part
-def _cost(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, w: Work) -> float:
+def _cost(tree: Tree, dt: float, count: int, alpha: float, w: Work) -> float:
     """The cost at v + alpha dv."""
     o = 6 if tree.free else 0
     cost = 0.0
@@ -174,25 +176,24 @@ def _cost(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, w: Wo
         if w.limit_on[i, 1]:
             cost += 0.5 * w.limit_R[i] * _limit_impulse(w, i, 1, -v) ** 2
     for c in range(count):
-        cost += _contact_cost(shapes, c, dt, alpha, w)
+        cost += _contact_cost(c, dt, alpha, w)
     return cost
 
 
 @part
-def _contact_cost(shapes: Shapes, c: int, dt: float, alpha: float, w: Work) -> float:
+def _contact_cost(c: int, dt: float, alpha: float, w: Work) -> float:
     """Antiderivatives of the impulses: of the normal's, constant from where it has ended, and of lagged friction's."""
-    s = w.shape[c]
-    k, d, elastic = shapes.stiffness[s], shapes.dissipation[s], w.elastic[c]
+    k, d, elastic = w.stiffness[c], w.dissipation[c], w.elastic[c]
     x, y, z = w.vc[c, 0] + alpha * w.dvc[c, 0], w.vc[c, 1] + alpha * w.dvc[c, 1], w.vc[c, 2] + alpha * w.dvc[c, 2]
     z = min(z, elastic / dt / (k + 1e-20), 1.0 / (d + 1e-20))
     change = -dt * k * z
     normal = dt * (z * (elastic + 0.5 * change) - 0.5 * d * z * z * (elastic + 2.0 / 3.0 * change))
     slip = math.sqrt(x * x + y * y + w.soft[c] * w.soft[c]) - w.soft[c]
-    return shapes.friction[s] * w.normal[c] * slip - normal
+    return w.friction[c] * w.normal[c] * slip - normal
 
 
 @part
-def _slope(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, curve: float, w: Work) -> tuple[float, float]:
+def _slope(tree: Tree, dt: float, count: int, alpha: float, curve: float, w: Work) -> tuple[float, float]:
     """First and second derivative of the cost along dv. curve: dv' A dv."""
     o = 6 if tree.free else 0
     first, second = 0.0, curve
@@ -213,24 +214,23 @@ def _slope(tree: Tree, shapes: Shapes, dt: float, count: int, alpha: float, curv
             first += _limit_impulse(w, i, 1, -v) * dv
             second += dv * dv / w.limit_R[i]
     for c in range(count):
-        s = w.shape[c]
         a, b, e = w.dvc[c, 0], w.dvc[c, 1], w.dvc[c, 2]
         x, y = w.vc[c, 0] + alpha * a, w.vc[c, 1] + alpha * b
         size = x * x + y * y + w.soft[c] * w.soft[c]
-        per_speed = shapes.friction[s] * w.normal[c] / math.sqrt(size)
-        normal, slope = _normal_impulse(shapes, s, w.elastic[c], w.vc[c, 2] + alpha * e, dt)
+        per_speed = w.friction[c] * w.normal[c] / math.sqrt(size)
+        normal, slope = _normal_impulse(w, c, w.vc[c, 2] + alpha * e, dt)
         first += per_speed * (x * a + y * b) - normal * e
         second += per_speed * (a * a + b * b - (x * a + y * b) ** 2 / size) + slope * e * e
     return first, second
 
 
 @part
-def _direction(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> float:
+def _direction(tree: Tree, dt: float, count: int, w: Work) -> float:
     """w.dv = -H^-1 gradient, w.dp = A dv, w.dvc = J dv; returns dv' A dv."""
     o = 6 if tree.free else 0
-    n = tree.parent.shape[0]
-    copy_paths(tree.path, w.M, w.H)
-    for i in range(n):
+    path = tree.row if w.crossed[0] else tree.path
+    copy_paths(path, w.M, w.H)
+    for i in range(tree.parent.shape[0]):
         v = w.v_next[o + i]
         if tree.brake[i] > 0.0 and abs(w.brake_gain[i] * v) <= tree.brake[i]:
             w.H[o + i, o + i] += dt * w.brake_gain[i]
@@ -239,17 +239,15 @@ def _direction(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> fl
         if w.limit_on[i, 1] and w.limit_v[i, 1] + v > 0.0:
             w.H[o + i, o + i] += 1.0 / w.limit_R[i]
     for c in range(count):
-        b = shapes.body[w.shape[c]]
-        _stiffen(tree, 6 + b if b < n else 5, c, w)
-    factor(tree.path, w.H)
+        _stiffen(tree, c, w)
+    factor(path, w.H)
     for k in range(tree.path.shape[0]):
         w.dv[k] = -w.gradient[k]
-    solve_factored(tree.path, w.H, w.dv)
+    solve_factored(path, w.H, w.dv)
     times_matrix(tree.path, w.M, w.dv, w.dp)
     for c in range(count):
-        b = shapes.body[w.shape[c]]
         for r in range(3):
-            w.dvc[c, r] = along_path(tree, 6 + b if b < n else 5, w.J[c, r], w.dv)
+            w.dvc[c, r] = along(tree, c, w.J[c, r], w.dv, w)
     curve = 0.0
     for k in range(tree.path.shape[0]):
         curve += w.dv[k] * w.dp[k]
@@ -257,9 +255,10 @@ def _direction(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> fl
 
 
 @part
-def _stiffen(tree: Tree, last: int, c: int, w: Work) -> None:
+def _stiffen(tree: Tree, c: int, w: Work) -> None:
     """H += J' G J of a contact."""
-    j = last
+    path = tree.row if w.other[c] >= 0 else tree.path
+    j = w.last[c]
     while j >= 0:
         x = w.hessian[c, 0] * w.J[c, 0, j] + w.hessian[c, 1] * w.J[c, 1, j]
         y = w.hessian[c, 1] * w.J[c, 0, j] + w.hessian[c, 2] * w.J[c, 1, j]
@@ -267,21 +266,21 @@ def _stiffen(tree: Tree, last: int, c: int, w: Work) -> None:
         i = j
         while i >= 0:
             w.H[j, i] += x * w.J[c, 0, i] + y * w.J[c, 1, i] + z * w.J[c, 2, i]
-            i = tree.path[i]
-        j = tree.path[j]
+            i = path[i]
+        j = path[j]
 
 
 @part
-def _step_length(tree: Tree, shapes: Shapes, dt: float, count: int, curve: float, w: Work) -> float:
+def _step_length(tree: Tree, dt: float, count: int, curve: float, w: Work) -> float:
     """Where the cost is least along dv: Newton on its slope, by halves where that is slow (as rtsafe, Press et al. 2007,
     section 9.4)."""
     falls = 0.0
     for k in range(tree.path.shape[0]):
         falls -= w.gradient[k] * w.dv[k]
-    slope, curvature = _slope(tree, shapes, dt, count, LONGEST_STEP, curve, w)
+    slope, curvature = _slope(tree, dt, count, LONGEST_STEP, curve, w)
     if slope <= 0.0:
         return LONGEST_STEP
-    if falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, shapes, dt, count, LONGEST_STEP, w):
+    if falls < COST_ABSOLUTE + COST_RELATIVE * _cost(tree, dt, count, LONGEST_STEP, w):
         return 1.0
     if slope / falls < LINE_TOLERANCE:
         return LONGEST_STEP
@@ -289,7 +288,7 @@ def _step_length(tree: Tree, shapes: Shapes, dt: float, count: int, curve: float
     low, high, at = 0.0, LONGEST_STEP, guess
     change = before = low - high
     for _ in range(MOST_ITERATIONS):
-        slope, curvature = _slope(tree, shapes, dt, count, at, curve, w)
+        slope, curvature = _slope(tree, dt, count, at, curve, w)
         slope, curvature = slope / falls, curvature / falls
         if slope < 0.0:
             low = at
@@ -311,7 +310,7 @@ def _step_length(tree: Tree, shapes: Shapes, dt: float, count: int, curve: float
 
 
 @part
-def solve(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> int:
+def solve(tree: Tree, dt: float, count: int, w: Work) -> int:
     """From w.v_next, the guess, to the velocities at the step's end; returns how many iterations it took, -1 if it failed."""
     anything = False
     for g in range(w.active.shape[0]):
@@ -320,16 +319,16 @@ def solve(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> int:
         return 0
     times_matrix(tree.path, w.M, w.v_star, w.momentum_star)
     times_matrix(tree.path, w.M, w.v_next, w.momentum)
-    cost = _cost_here(tree, shapes, dt, count, w)
+    cost = _cost_here(tree, dt, count, w)
     stalled = False
     for iteration in range(MOST_ITERATIONS + 1):
-        residual, scale = _gradient(tree, shapes, dt, count, w)
+        residual, scale = _gradient(tree, dt, count, w)
         if stalled or residual <= ABSOLUTE + RELATIVE * scale:
             return iteration
         if iteration == MOST_ITERATIONS or not residual < math.inf:
             break
-        curve = _direction(tree, shapes, dt, count, w)
-        alpha = _step_length(tree, shapes, dt, count, curve, w)
+        curve = _direction(tree, dt, count, w)
+        alpha = _step_length(tree, dt, count, curve, w)
         for k in range(tree.path.shape[0]):
             w.v_next[k] += alpha * w.dv[k]
             w.momentum[k] += alpha * w.dp[k]
@@ -337,11 +336,11 @@ def solve(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> int:
             for r in range(3):
                 w.vc[c, r] += alpha * w.dvc[c, r]
         before = cost
-        cost = _cost_here(tree, shapes, dt, count, w)
+        cost = _cost_here(tree, dt, count, w)
         stalled = abs(before - cost) < COST_ABSOLUTE + COST_RELATIVE * 0.5 * (abs(before) + abs(cost)) and alpha > 0.5
     return -1
 
 
 @part
-def _cost_here(tree: Tree, shapes: Shapes, dt: float, count: int, w: Work) -> float:
-    return _cost(tree, shapes, dt, count, 0.0, w)
+def _cost_here(tree: Tree, dt: float, count: int, w: Work) -> float:
+    return _cost(tree, dt, count, 0.0, w)

@@ -24,7 +24,7 @@ from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
 
-ENDED = {TOUCHED: "shapes touch that are no foot on the floor"}
+ENDED = {TOUCHED: "shapes touch that are neither a foot on the floor nor a sphere on another link"}
 """Why a run was given up, by how it ended; any other way, Drake shall say."""
 _first, _ran = Lock(), Event()
 
@@ -85,16 +85,17 @@ class _Plan:
 
 
 class CompiledJob:
-    """A job with its arrays; made, it is covered, but for what only the run can tell."""
+    """A job with its arrays; made, it is covered, but for what only the run can tell. apart: links that touch end it, whatever
+    shapes they touch with."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, apart: bool = False) -> None:
         _check(job)
         self.job, self.model, self.config = job, job.model, job.config
         self.free = self.config.base == "free"
         self.model.check_base(floating=self.free)
         self.physics: Physics = physics_of(self.model)
         self.tables: Tables = tables_of(self.model, self.physics.description, self.free)
-        self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step)
+        self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step, apart)
         self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
         self.plan = self._plan()
 
@@ -121,7 +122,7 @@ class CompiledJob:
         return other
 
     def take(self, as_seen: bool = True) -> Take:
-        """Settles, plays, and reads the log; NotCoveredError where something touches that is no foot on the floor. as_seen: with
+        """Settles, plays, and reads the log; NotCoveredError where something touches in a way that is Drake's. as_seen: with
         angles as cameras see them where something is between servos and links; else servos' angles and velocities stand."""
         plan = self.plan
         schedule = schedule_of(self.config, plan.commands, plan.lead, plan.duration, self.job.elapsed, self.job.steadied)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
 import numpy as np
-from pydrake.geometry import GeometryId, SceneGraphInspector, Sphere
+from pydrake.geometry import Box, Cylinder, GeometryId, SceneGraphInspector, Shape, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
@@ -26,7 +26,7 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
-from workbench.simulation.compiled.arrays import Array, Ints, Tree
+from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
 from workbench.simulation.contact import SelectFeet
 
 KEPT_TABLES = 64
@@ -46,6 +46,7 @@ class ShapeTable:
     R: Array
     half: Array
     radius: Array
+    solid: Ints
     link: tuple[str, ...]
     stiffness: tuple[float | None, ...]
     dissipation: tuple[float | None, ...]
@@ -172,8 +173,9 @@ class _Reader:
         mass, com, inertia = self._weights(n)
         stiffness, rest = self._springs()
         tree = Tree(
-            free=self.free, parent=parent, path=path, group=_groups(path), R=R, p=p, axis=axis, mass=mass, com=com,
-            inertia=inertia, armature=self._armature(), damping=np.array([j.default_damping() for j in self.turning]),
+            free=self.free, parent=parent, path=path, row=np.arange(-1, len(path) - 1, dtype=np.int64), group=_groups(path), R=R,
+            p=p, axis=axis, mass=mass, com=com, inertia=inertia, armature=self._armature(),
+            damping=np.array([j.default_damping() for j in self.turning]),
             stiffness=stiffness, rest=rest, lower=np.array([j.position_lower_limit() for j in self.turning]),
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
             gravity=np.zeros(3), pull=np.zeros(3))
@@ -226,7 +228,7 @@ class _Reader:
 
     def _shapes(self, n: int, on_root: RigidTransform) -> ShapeTable:
         links = {int(b.index()): b for b in (self.plant.get_body(i) for i in self.plant.GetBodyIndices(self.instance))}
-        found: list[tuple[int, RigidTransform, Array, float, str, GeometryId]] = []
+        found: list[tuple[int, RigidTransform, Array, Shape, str, GeometryId]] = []
         for index, link in links.items():
             on, X = self.anchors[index]
             X = on_root @ X if on < 0 else X
@@ -236,16 +238,18 @@ class _Reader:
                 box, shape = self.inspector.GetObbInGeometryFrame(g), self.inspector.GetShape(g)
                 if box is None:
                     raise NotCoveredError(f"shape '{self.inspector.GetName(g)}' has no end")
-                radius = float(shape.radius()) if isinstance(shape, Sphere) else 0.0
                 X_BBox = X @ self.inspector.GetPoseInFrame(g) @ box.pose()
-                found.append((on if on >= 0 else n, X_BBox, box.half_width(), radius, link.name(), g))
+                found.append((on if on >= 0 else n, X_BBox, box.half_width(), shape, link.name(), g))
         ids = [f[5] for f in found]
         body = np.array([f[0] for f in found], dtype=np.int64)
         may = np.array([[a != b and body[i] != body[k] and not self.inspector.CollisionFiltered(a, b) for k, b in enumerate(ids)]
                         for i, a in enumerate(ids)], dtype=bool).reshape(len(ids), len(ids))
         return ShapeTable(
             body=body, p=_rows([f[1].translation() for f in found], 3), R=_rows([f[1].rotation().matrix() for f in found], 3, 3),
-            half=_rows([f[2] for f in found], 3), radius=np.array([f[3] for f in found]), link=tuple(f[4] for f in found),
+            half=_rows([f[2] for f in found], 3),
+            radius=np.array([f[3].radius() if isinstance(f[3], Sphere) else 0.0 for f in found], dtype=float),
+            solid=np.array([BOX if isinstance(f[3], Box) else CYLINDER if isinstance(f[3], Cylinder) else OTHER for f in found],
+                           dtype=np.int64), link=tuple(f[4] for f in found),
             stiffness=tuple(self._material(g, "point_contact_stiffness") for g in ids),
             dissipation=tuple(self._material(g, "hunt_crossley_dissipation") for g in ids),
             friction=tuple(self._friction(g) for g in ids), may_touch=may)
