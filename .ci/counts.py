@@ -1,4 +1,4 @@
-"""How well the house can be read, in numbers that may only shrink; part of `make lint`.
+"""How well the code can be read, in numbers that may only shrink; part of `make lint`.
 
     python .ci/counts.py [--list]
 
@@ -24,9 +24,9 @@ ROOM = ROOT / "workbench"
 LONGEST, MOST_COMPLEX = 300, 15
 """Lines of a file, and complexity of a function, that need no exception."""
 STAYS = ("compare", "identify", "experiment")
-"""Rooms whose numbers stand in their options; without identify/selection, which the search by evidence replaces."""
+"""Packages whose numbers stand in their options; without identify/selection, which the search by evidence replaces."""
 NO_NAMES = ("cli", "compare", "experiment", "identify", "view")
-"""Rooms that know no effect by its name."""
+"""Packages that know no effect by its name."""
 LIMITS = {
     "levels of imports in identify/, selection and options apart": 7,
     "circles of imports": 0,

@@ -61,7 +61,7 @@ def test_capture_with_a_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     (gap,) = said["gaps"].values()
     assert gap == pytest.approx(1 / said["frames"])
     assert said["share_of_gaps"] == pytest.approx(gap / 4)
-    assert any("1 mended" in p for p in said["problems"])
+    assert any("1 filled" in p for p in said["problems"])
 
 
 def test_joint_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

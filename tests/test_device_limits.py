@@ -113,7 +113,7 @@ def test_unknown_joints(model: RobotModel) -> None:
 
 def test_export_refuses_unless_forced(model: RobotModel, tmp_path: Path) -> None:
     too_fast = replace(WALK, times=WALK.times * 0.8, source="fast.csv")
-    with pytest.raises(InputError, match=r"fast.csv: pose 3, joint blm: moving speed 532 asks 59.1 rpm.* \(and 2 more\)"):
+    with pytest.raises(InputError, match=r"fast.csv: pose 3, joint blm: moving speed 532 is 59.1 rpm.* \(and 2 more\)"):
         export(too_fast, model, tmp_path / "out")
     assert not (tmp_path / "out").exists()
     forced = export(too_fast, model, tmp_path / "out", force=True)

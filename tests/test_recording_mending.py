@@ -69,7 +69,7 @@ def test_short_gaps_are_mended_with_their_uncertainty_long_ones_marked(made, mod
     assert np.isnan(take.q[355:360, c]).all()
     assert np.isnan(take.q_sigma[200:230, c]).all()
     assert np.flatnonzero(take.mended).tolist() == [100, 101, 102, 103]
-    assert ("FLmid: 39 of 360 frames unseen in 3 gap(s); 1 mended, up to 4 frames; "
+    assert ("FLmid: 39 of 360 frames unseen in 3 gap(s); 1 filled, up to 4 frames; "
             "2 left open, the longest 30 frames from 1.667 s") in take.problems
     others = [i for i, j in enumerate(take.joints) if j != "flm"]
     np.testing.assert_allclose(take.q[:, others], sound.q[:, others])

@@ -213,7 +213,7 @@ def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeR
     page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
     assert "96 % sure that it is this or joint compliance at flm" in page
     assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
-    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings do not tell" in finding_line(tied)
+    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings cannot separate" in finding_line(tied)
 
 
 def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeReport) -> None:
@@ -232,12 +232,12 @@ def test_the_verdict_is_one_sentence(model: RobotModel) -> None:
     assert headline(two).startswith("Backlash at flm and ground friction explain part of")
     guess = replace(finding("ground_friction"), where=(), confidence=0.4, alternatives=())
     assert headline(replace(two, findings=(finding(), guess))) == (
-        "Backlash at flm explains part of what the model missed; the rest has no sure name yet.")
+        "Backlash at flm explains part of what the model missed; the rest is not identified with certainty yet.")
     assert headline(replace(two, findings=(guess,))) == (
         "Nothing that the workbench knows is likely to be what the model missed; nearest comes ground friction.")
     nothing = replace(full, findings=(), gap=(), rejected=(), unexplained=(), next_experiment=None)
     assert headline(replace(nothing, verdict="no_gap")).startswith("The model explains these recordings")
-    assert "nothing that the workbench knows" in headline(replace(nothing, verdict="unexplained"))
+    assert "no effect that the workbench knows explains how" in headline(replace(nothing, verdict="unexplained"))
 
 
 def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     assert sorted(p.name for p in paths) == ["findings.json", "model.yaml", "nominal.yaml", "replay-walk.html", "report.html"]
     page = (tmp_path / "out/report.html").read_text()
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
-             "Where the recordings leave the model", "2 more places and times", "Or joint compliance at flm: 2 %",
+             "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
              "Tried in its place", "dead band at flm takes 900 off", "Before and after, on what nothing saw",
              "What is left", "a &lt;take&gt;", "What else was tried", "its signature is not that of what is missing",
@@ -258,7 +258,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
 def test_a_session_without_a_gap_has_a_page_too(model: RobotModel, take: TakeReport) -> None:
     quiet = replace(take, before=take.after, nominal=take.fitted, unseen=take.time > 0.2)
     page = diagnosis_report(Diagnosis("no_gap", model, model), [quiet], "Session quiet").html()
-    assert "Nowhere do the recordings leave the nominal model by more than chance." in page
+    assert "Nowhere do the recordings differ from the nominal model by more than chance." in page
     assert "Afterwards all is within" in page
     assert "What to record next" not in page
     assert "no_gap" not in diagnosis_report(Diagnosis("unexplained", model, model), [], "Nothing to show").html()

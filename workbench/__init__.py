@@ -5,7 +5,7 @@
     result = workbench.diagnose("session.yaml")
     result.save("runs/mine")
 
-SI units and radians inside; degrees in files. `workbench.InputError` is raised for whatever a user can mend.
+SI units and radians inside; degrees in files. `workbench.InputError` is raised for input that a user can correct.
 """
 
 from importlib import import_module

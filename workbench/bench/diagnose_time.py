@@ -22,7 +22,7 @@ from workbench.simulation.batch import Job, simulate_batch
 
 NAME = "diagnose_time"
 MEANING = "processor seconds of one diagnosis on one process: an arm of three joints, one log, one joint with more dry friction"
-READING, RACE = "reading, registering, floors of the nominal robot", "race, and all chosen fitted together"
+READING, RACE = "reading, registering, floors of the nominal robot", "screening, and all chosen fitted together"
 EXPERIMENT = "next experiment"
 STAGES = (("reading", READING), ("simulating", READING), ("registering", READING), ("fitting together", "fits together"),
           ("explaining", RACE), ("rivals", "rivals"), ("numbers", "finer step and floors"), ("rolling out the fitted", "report"))

@@ -107,7 +107,7 @@ def fit_against_mujoco_sysid(duration: float, repeats: int, seed: int, iteration
                                          "mujoco_sysid": row(fine) | {"wall_seconds": fine_seconds}},
         "differs": f"the log is MuJoCo's at {1e3 * TRUE_STEP:g} ms. Ours: a damped Gauss-Newton with long differences and "
                    "Broyden updates, few rollouts, each of a Drake station that is built anew; what its step is wrong by on the "
-                   "nominal robot, told by finer rollouts in the preparation, is taken off, and a lag of up to 2 ms is "
+                   "nominal robot, known from finer rollouts in the preparation, is taken off, and a lag of up to 2 ms is "
                    "allowed. Theirs: fresh differences in each step, all in one call of C, on one thread here; no correction "
                    "for the step, and each joint over its own RMS. Both count building of models."}
     return Figure(NAME, MEANING, value, quartiles, details=details)

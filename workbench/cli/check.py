@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def add_yes(parser: argparse.ArgumentParser) -> None:
     """--yes: long work is meant."""
     parser.add_argument("--yes", action="store_true",
-                        help="simulate that long (asked for beyond ten minutes of the robot's time)")
+                        help="simulate that long (required beyond ten minutes of the robot's time)")
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> None:

@@ -24,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="find the physics that a session's model left out",
         description="Locates where recordings and model differ, tries every known effect where it could act, fits what is "
         "likely, keeps what lowers the error on stretches that no fit saw, and writes findings.json, model.yaml, nominal.yaml, "
-        "the session's predictions and report.html. A run that was stopped goes on where it was.",
+        "the session's predictions and report.html. A run that was stopped continues when it is called again.",
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     add_yes(parser)
@@ -71,7 +71,7 @@ def finding_line(finding: Finding) -> str:
     from workbench.view.report.words import this_or
 
     tie, error = finding.tie, finding.validation
-    other = f" {this_or(tie)}, which these recordings do not tell apart" if tie else ""
+    other = f" {this_or(tie)}, which these recordings cannot separate" if tie else ""
     family = "" if finding.family is None else f", {finding.family.name} {finding.family.confidence:.2f}"
     return f"{finding.evidence} (confidence {finding.together:.2f}{other}{family}; error on unseen stretches " \
            f"{error.before:.2f} -> {error.after:.2f} {error.unit})"

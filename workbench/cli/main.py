@@ -38,7 +38,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser with every verb's arguments; imports no room, so that help comes at once."""
+    """The parser with every verb's arguments; imports no other package, so that help comes at once."""
     parser = OneLineParser(
         prog="workbench", description=(workbench.__doc__ or "").partition("\n")[0], allow_abbrev=False,
         epilog="`workbench VERB --help` explains each. Exit codes: 0 done, 1 a defect of the workbench, 2 bad input (one line: "
@@ -113,7 +113,7 @@ def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
 
 
 def _refused(name: str, error: OSError | ValueError) -> int:
-    """Says in one line what the user can mend; what is a defect of ours goes on."""
+    """Says in one line what the user can correct; what is a defect of ours goes on."""
     problem = _readable(error)
     if problem is None:
         raise error
@@ -126,7 +126,7 @@ def _serious(record: logging.LogRecord) -> bool:
 
 
 def _readable(error: OSError | ValueError) -> str | None:
-    """One line for what the user can mend; None for what is a defect of ours."""
+    """One line for what the user can correct; None for what is a defect of ours."""
     from workbench.robot.errors import InputError
 
     if isinstance(error, InputError):

@@ -19,11 +19,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "optimize",
-        help="seek a gait that the servos can follow, as a certified table",
-        description="Seeks a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
-        "supply, on a robot that nobody measured (an ensemble of them), and certifies it: gait.csv, start.csv (from neutral into "
+        help="search for a gait that the servos can follow, as a certified table",
+        description="Searches for a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
+        "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv, start.csv (from neutral into "
         "it), stop.csv, certificate.json and a page. A request that cannot be met says which limit binds, and exits with 2. "
-        "Stopped and called again with the same arguments it goes on where it was and ends in the same table.")
+        "A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
     parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as can be (default: max)")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--backward", action="store_true", help="go backwards")
@@ -34,12 +34,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of what "
                         "full duty gives; ROBOTIS advises a fifth)")
     best = parser.add_mutually_exclusive_group()
-    best.add_argument("--least-energy", action="store_true", help="with the least electrical power, at the speed asked for or at "
+    best.add_argument("--least-energy", action="store_true", help="with the least electrical power, at the required speed or at "
                       "that of the ROBOTIS walk")
     best.add_argument("--smoothest", action="store_true", help="with the least jerk of the base, likewise")
     best.add_argument("--gentlest", action="store_true", help="with the least RMS torque, likewise")
     parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all point back, as the robot has them")
-    parser.add_argument("--ensemble", metavar="FILE", help="the robots to stand, as YAML (default: the one that ships)")
+    parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the gait has to work, as YAML "
+                        "(default: the file that ships)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="threads and processes that simulate (default: 2)")
@@ -49,7 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Seeks, certifies, writes, and says what came of it."""
+    """Searches, certifies, writes, and says what came of it."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine

@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     for departure in registers.departures(model):
         print(f"workbench play: warning: {departure}", file=sys.stderr)
     if bus.retries:
-        print(f"workbench play: warning: {bus.retries.total()} answers had to be asked for again", file=sys.stderr)
+        print(f"workbench play: warning: {bus.retries.total()} answers had to be requested again", file=sys.stderr)
     print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late; torque is "
           f"{'off' if played.released else 'on'}")
     if played.stopped:

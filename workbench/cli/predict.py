@@ -13,7 +13,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "predict",
-        help="foretell the takes that a session asks for",
+        help="predict the takes that a session lists",
         description="Plays each entry of the session's `predict` on a fitted model and writes NAME.csv: a Motive CSV as the "
         "cameras of the entry's start file would see it, or for `commands` a joint log with their times.",
     )

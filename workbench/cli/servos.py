@@ -19,8 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "servos",
         help="show what hangs on the servos' bus, and every register that differs from the model",
-        description="Asks every ID, and each servo for all its registers. Shows who answers, in what state, and what differs "
-        "from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing.")
+        description="Looks for a servo at every ID, and reads all registers of each. Shows who answers, in what state, and what "
+        "differs from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing.")
     add_bus(parser)
     add_model(parser)
     parser.add_argument("--write", action="store_true", help="set return delay and angle limits as the model has them; read back")
@@ -30,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Surveys, writes what is asked for, and says what there is; 2 where something has to be mended."""
+    """Surveys, writes what is asked for, and says what there is; 2 where something has to be fixed."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey

@@ -74,8 +74,8 @@ def session_check(session: Session) -> SessionCheck:
     if refused:
         found["takes"] = [refused]
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
-        found["predict"] = ["no take tells the yaw of the capture: it is taken from where the bodies stand at the start, good to "
-                            "some degrees; give the session's `yaw` [deg], or a captured take"]
+        found["predict"] = ["the yaw of the capture cannot be found from takes: it is estimated from where the bodies stand at "
+                            "the start, to some degrees; give the session's `yaw` [deg], or a captured take"]
     longest = max(seconds, key=lambda name: seconds[name])
     doubtful = {of: lines for of, lines in found.items() if lines}
     return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), refused)

@@ -86,7 +86,8 @@ def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
     told = [layout_yaw(tracks_of(start), session.model) for start in starts]
     known = [yaw for yaw in told if yaw is not None]
     if not known:
-        raise InputError(session.path, "yaw: is missing, and neither takes nor where the bodies of the start files stand tell it")
+        raise InputError(session.path, "yaw: is missing, and cannot be found from takes, nor from where the bodies of the "
+                         "start files stand")
     return float(np.angle(np.mean(np.exp(1j * np.array(known)))))
 
 

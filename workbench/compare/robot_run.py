@@ -41,7 +41,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     """Checks all servos, plays the motion while the cameras record, and writes takes, registers, motion and session.
 
     virtual: the emulated robot whose bus this is; its cameras are emulated, too, by `seed`. recorder: of real ones. InputError
-    where something has to be mended first; nothing was moved then.
+    where something has to be fixed first; nothing was moved then.
     """
     tell = progress or (lambda what, done: None)
     found = survey(bus, model, ids=(), progress=tell)

@@ -46,7 +46,7 @@ class TakeSpec:
 
 @dataclass(frozen=True)
 class PredictSpec:
-    """To foretell: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
+    """To predict: a captured take (`motion`, `start` file, `starts_at` [s], `frames`), or a log (`commands`)."""
 
     name: str
     motion: Path | None = None

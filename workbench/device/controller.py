@@ -108,7 +108,7 @@ class Controller:
         self._send(frame(FrameType.PLAY))
         began = self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.PLAY, ANSWER)
         if not isinstance(began, StateMessage):
-            raise BusError("it was told to play, and does not")
+            raise BusError("it was commanded to play, and does not")
         end, stopped = self.now() + seconds, ""
         while self.now() < end and not stopped:
             progress("playing", 1 - (end - self.now()) / seconds)

@@ -99,7 +99,7 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
             broken = bool(asked[k, i] > no_load)
             limit = no_load if broken else reached
             what = "its no-load speed" if broken else "what the servo reaches unloaded against its own friction"
-            text = (f"moving speed {table.speeds[k, i]} asks {asked[k, i]:.1f} rpm, beyond {what}, "
+            text = (f"moving speed {table.speeds[k, i]} is {asked[k, i]:.1f} rpm, beyond {what}, "
                     f"{limit:.1f} rpm at {servo.supply_voltage:g} V")
             yield Violation("speed", joint, float(asked[k, i]), limit, "rpm", text, pose=int(k) + 1, warning=not broken)
 
@@ -121,7 +121,7 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
         k = int(np.argmax(lasting))
         if lasting[k] > 0.01 * servo.torque_at_full_duty:
             value, limit = abs(float(torque[k])), float(allowed[k])
-            text = (f"at {time[k]:.2f} s the simulation asks {value:.2f} N m, for {HOLD * 1000:g} ms or longer more than "
+            text = (f"at {time[k]:.2f} s the simulation needs {value:.2f} N m, for {HOLD * 1000:g} ms or longer more than "
                     f"the servo has at that speed and {servo.supply_voltage:g} V, {limit:.2f} N m")
             yield Violation("torque", joint, value, limit, "N m", text)
         rms, advised = float(np.sqrt(np.nanmean(torque**2))), RECOMMENDED * servo.torque_at_full_duty

@@ -197,7 +197,7 @@ class Loading:
         return any(said.endswith(prompt) for prompt in self._profile.prompt)
 
     def _command(self, command: bytes) -> None:
-        self._progress("2 of 4: asking it to take a program", None)
+        self._progress("2 of 4: asking it to load a program", None)
         self._drain()
         self._state = HALF  # from LOAD on the old program may be erased
         self._write(command + self._profile.line_end)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from types import FrameType
 
-WORDS = {"SIGINT": "Ctrl-C", "SIGTERM": "asked to end (SIGTERM)", "SIGHUP": "the terminal was closed (SIGHUP)"}
+WORDS = {"SIGINT": "Ctrl-C", "SIGTERM": "terminated (SIGTERM)", "SIGHUP": "the terminal was closed (SIGHUP)"}
 
 
 @dataclass

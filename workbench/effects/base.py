@@ -41,12 +41,12 @@ NEAR, BEYOND = 0.08, 0.8
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect, in the contract's unit; `si` times it is SI. low, high: what is physically possible. typical: where
-    it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of them. shapes: it
-    only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it takes the place of a
-    value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording goes below, as
-    every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left out; empty: it
-    is always given."""
+    """A number of an effect, in the unit of docs/formats.md; `si` times it is SI. low, high: what is physically possible.
+    typical: where it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of
+    them. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
+    takes the place of a value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording
+    goes below, as every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left
+    out; empty: it is always given."""
 
     name: str
     unit: str
@@ -133,13 +133,13 @@ class Effect:
         raise NotImplementedError
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
-        """The values, in the contract's units, at which the effect vanishes: infinity for a stiffness or a ceiling, the
+        """The values, in the units of docs/formats.md, at which the effect vanishes: infinity for a stiffness or a ceiling, the
         typical value for a number that only shapes the effect, the robot's own for one that replaces it."""
         return (0.0,) * sum(3 if p.vector else 1 for p in self.parameters)
 
     def as_other(self, name: str, spec: EffectSpec, model: RobotModel) -> tuple[float, ...]:
         """The values at which the effect `name` (`reduces_to`, or of `equivalent_to`) does nearly the same at the same place, in
-        the contract's units; empty where that is not known."""
+        the formats page's units; empty where that is not known."""
         return ()
 
     def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
@@ -147,8 +147,8 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """How far its numbers may lie from neutral on this robot, in the contract's units, a vector by its length: a search moves
-        no number further, and of servo logs it refutes what wants to go there."""
+        """How far its numbers may lie from neutral on this robot, in the units of docs/formats.md, a vector by its length: a
+        search moves no number further, and of servo logs it refutes what wants to go there."""
         return math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
@@ -195,8 +195,8 @@ class Effect:
         return measurement
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """Its first parameter, in the contract's unit, as the servos' own registers tell it, and the standard error; None where
-        they do not."""
+        """Its first parameter, in the unit of docs/formats.md, as the servos' own registers tell it, and the standard error; None
+        where they do not."""
         return None
 
 
@@ -208,7 +208,7 @@ def mean_of_logs(values: Sequence[float], least: float) -> tuple[float, float] |
 
 
 def scalar(spec: EffectSpec, name: str) -> float:
-    """A parameter that is one number, in the contract's unit."""
+    """A parameter that is one number, in the unit of docs/formats.md."""
     value = spec.parameters[name]
     assert not isinstance(value, tuple)
     return value

@@ -1,4 +1,4 @@
-"""All effects that this installation knows, by name: the contract's, and those of other packages."""
+"""All effects that this installation knows, by name: the workbench's own, and those of other packages."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class Rival:
 
     @property
     def freedom(self) -> Array:
-        """How far each number of its own effects may still go (p,), in the contract's units."""
+        """How far each number of its own effects may still go (p,), in the units of docs/formats.md."""
         return np.array([EXPERIMENT.freedom * n.felt for n in self._numbers()])
 
     def moved(self, x: Array) -> Rival:

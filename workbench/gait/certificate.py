@@ -62,8 +62,8 @@ class Certificate:
         lines = [f"{self.request}: {factor * n['speed']:.3g} {unit} on the nominal robot of the model"]
         if d.get("count"):
             low = factor * d[f"speed {n['unit']}"][1]
-            lines.append(f"{d['count']} robots nobody measured: {d['falls']} fell, 5th percentile {low:.3g} {unit}, heading "
-                         f"{d['heading deg/m RMS']:.2g} deg/m RMS")
+            lines.append(f"{d['count']} random variants of the robot: {d['falls']} fell, 5th percentile {low:.3g} {unit}, "
+                         f"heading {d['heading deg/m RMS']:.2g} deg/m RMS")
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
         lines.append(f"binds: {worst}")
         advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)

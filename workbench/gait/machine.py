@@ -1,4 +1,4 @@
-"""What stays the same while gaits of one robot are sought: legs, ranges, servos, self-contact, inverse dynamics."""
+"""What stays the same while gaits of one robot are searched for: legs, ranges, servos, self-contact, inverse dynamics."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class Found:
 
 
 def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, given: Sequence[GaitShape] = ()) -> Found:
-    """Seeks a gait for the evaluator's request. given: shapes to start from, beside the random ones."""
+    """Searches for a gait for the evaluator's request. given: shapes to start from, beside the random ones."""
     space = space_of(evaluator.machine, evaluator.request)
     run = _Run(evaluator, budget, space, progress)
     shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]

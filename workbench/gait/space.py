@@ -1,4 +1,4 @@
-"""Where gaits are sought: a box of shapes for each request, and shapes as points of a unit cube."""
+"""Where gaits are searched for: a box of shapes for each request, and shapes as points of a unit cube."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MOST_BATCHES = 10
 
 @dataclass(frozen=True)
 class Space:
-    """Names and ranges (n,) of what is sought, in SI. poses are halves of their number and whole."""
+    """Names and ranges (n,) of what is searched for, in SI. poses are halves of their number and whole."""
 
     names: tuple[str, ...]
     low: Array

@@ -38,7 +38,7 @@ Residuals = Mapping[int, Array]
 
 
 class ReadOff(Protocol):
-    """An effect of one number that was read off the recordings: its mean and variance, in the contract's unit."""
+    """An effect of one number that was read off the recordings: its mean and variance, in the unit of docs/formats.md."""
 
     @property
     def spec(self) -> EffectSpec:
@@ -52,7 +52,7 @@ class ReadOff(Protocol):
 
 
 def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The contract's word; what has a name that is less likely than not is not explained by it."""
+    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it."""
     if not gap:
         return "no_gap"
     if not findings:
@@ -99,7 +99,7 @@ def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
-    """Values and 90 % bounds in the contract's units; numbers that were read off, not fitted, have no bounds."""
+    """Values and 90 % bounds in the units of docs/formats.md; numbers that were read off, not fitted, have no bounds."""
     half = CONCLUSIONS.z90 * np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
@@ -221,8 +221,8 @@ def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> 
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
-    """Of all numbers in the contract's units; variances by the local slope between a size and its value. read_off: effects of one
-    number that no fit identified."""
+    """Of all numbers in the units of docs/formats.md; variances by the local slope between a size and its value. read_off:
+    effects of one number that no fit identified."""
     if not fit.effects and not read_off:
         return Posterior()
     names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))

@@ -76,7 +76,7 @@ def _late(e: TakeEvidence, residual: Array, joints: Sequence[str]) -> set[str]:
 
 
 def in_file_units(value: float, channel: str) -> tuple[float, str]:
-    """A channel's value [m or rad] in the contract's units."""
+    """A channel's value [m or rad] in the units of docs/formats.md."""
     return (value, "m") if channel in ("forward", "left", "height") else (float(np.rad2deg(value)), "deg")
 
 

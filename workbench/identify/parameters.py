@@ -25,7 +25,7 @@ class Candidate:
     value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
     that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
-    numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the contract's
+    numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the formats page's
     units, by number; empty: they are not told."""
 
     effect: Effect
@@ -100,7 +100,7 @@ class Candidate:
         return np.asarray(out)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the contract's units, cut to what is possible; x: of those that are fitted."""
+        """Numbers in the units of docs/formats.md, cut to what is possible; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
         for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
@@ -115,7 +115,7 @@ class Candidate:
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:
-        """The sizes of finite neutral values at these numbers, in the contract's units, as far as they may go."""
+        """The sizes of finite neutral values at these numbers, in the units of docs/formats.md, as far as they may go."""
         x = [(v - n) / (t - n) for v, n, t, fixed in zip(values, self.neutral, self.typical, self.fixed) if not fixed]
         return np.asarray(np.clip(x, *self.bounds()))
 

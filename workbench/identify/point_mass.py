@@ -34,7 +34,7 @@ class PointMass(Candidate):
     """A payload. Sizes: its mass and its moments about the link's centre of mass."""
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the contract's units; x: mass and moments, or as the class says."""
+        """Numbers in the units of docs/formats.md; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         return super().values([x[0], *(x[1:] / max(x[0], FIT.least_mass))])
 
@@ -87,7 +87,7 @@ class SwungMass(PointMass):
         return ~self.shapes
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the contract's units; x: mass and moments, or as the class says."""
+        """Numbers in the units of docs/formats.md; x: mass and moments, or as the class says."""
         x = np.asarray(x, dtype=float)
         away = FIT.swung_distance * 2.0 ** float(np.clip(x[0], *FIT.swung_doublings))
         unit = self.typical[0] * (self.typical[1] - self.neutral[1])  # of moments [kg m]

@@ -24,7 +24,8 @@ _FILES = ("compare/channels.py", "compare/comparison.py", "compare/session_takes
 
 @cache
 def rollout_code() -> str:
-    """Of everything between a model and the channels of its rollout: versions, and the content of the rooms it goes through."""
+    """Of everything between a model and the channels of its rollout: versions, and the content of the packages it goes
+    through."""
     root = Path(__file__).parents[1]
     digest = hashlib.sha256(" ".join(version(name) for name in ("drake", "numba", "numpy", "scipy")).encode())
     for path in sorted([*(p for room in _ROOMS for p in (root / room).rglob("*.py")), *(root / name for name in _FILES)]):

@@ -1,6 +1,6 @@
 """Whether a servo log can be what it says: turns that no servo makes, units that are not those of the file, sensors that stand.
 
-What is certain is mended; all is told, by joint and time.
+What is certain is repaired; all is reported, by joint and time.
 """
 
 from __future__ import annotations
@@ -49,8 +49,9 @@ CHECKS = LogChecks()
 
 
 def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
-    """The recording with leaps of its positions mended and `problems` that say so, and whatever else cannot be right; InputError
-    where a number is beyond all bounds. Only of logs on one clock; cameras' tracks are mended with the robot in view."""
+    """The recording with leaps of its positions repaired and `problems` that say so, and whatever else cannot be right;
+    InputError where a number is beyond all bounds. Only of logs on one clock; cameras' tracks are repaired with the robot in
+    view."""
     time = recording.time
     _bounded(recording, checks)
     if recording.sensing != "encoders" or len(time) < 3 or np.any(np.diff(time) <= 0):

@@ -1,4 +1,4 @@
-"""Quaternions wxyz in bulk, (..., 4); the few operations this room needs, without a Python loop.
+"""Quaternions wxyz in bulk, (..., 4); the few operations this package needs, without a Python loop.
 
 Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; what has no gaps is left to scipy.
 """

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 def take_from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,
                         base: str = "free") -> Take:
-    """Joint angles with their uncertainty, base and bodies in the take's world, damage mended, marked and reported.
+    """Joint angles with their uncertainty, base and bodies in the take's world, damage repaired, marked and reported.
 
     The world W has x along the robot's first heading, y left, z up; its origin lies under the base link's origin at rest, on the
     capture's floor. InputError where an asset is no link of the model, where a recording has no rigid bodies, or a log's joints
@@ -38,7 +38,7 @@ def take_from_recording(recording: Recording, measurement: Measurement, model: R
 
 
 def take_from_tracks(tracks: Tracks, measurement: Measurement, model: RobotModel, name: str, base: str) -> Take:
-    """As `take_from_recording`, of mended tracks."""
+    """As `take_from_recording`, of repaired tracks."""
     m = measurement
     angles = joint_angles(tracks, model, m.yaw, base)
     noise = np.array([m.noise.get(j, np.nan) for j in angles.joints])

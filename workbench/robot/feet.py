@@ -1,4 +1,4 @@
-"""Which links are feet, how a foot is called, and where it can touch the ground: one definition for all rooms."""
+"""Which links are feet, how a foot is called, and where it can touch the ground: one definition for all packages."""
 
 from __future__ import annotations
 

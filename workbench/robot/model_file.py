@@ -119,7 +119,7 @@ def load_model_file(path: str | Path) -> ModelFile:
     """Reads a model.yaml.
 
     InputError names the file, the key and what was expected: an unknown key, a missing SDF, an effect at a place that the robot
-    lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects' room to say.
+    lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects package to say.
     """
     path = Path(path)
     top = Fields(path, read_yaml(path))

@@ -1,4 +1,4 @@
-"""The end of the demo: a new gait, sought in seconds, certified, exported."""
+"""The end of the demo: a new gait, searched for in seconds, certified, exported."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def demo_options() -> OptimizeOptions:
 
 
 def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:
-    """Seeks a gait, writes it with its certificate and page into `folder`, and its firmware tables if its certificate is good."""
+    """Searches for a gait, writes it with its certificate and page into `folder`, and its firmware tables if its certificate is
+    good."""
     request = Request(speed=SPEED)
     result = optimize(GaitMachine(model), request, load_ensemble(), demo_options(),
                       lambda what, done: progress(f"a new gait: {what}", done))
@@ -40,7 +41,7 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
         if result.met:
             export(load_motion(folder / "gait.csv", model), model, folder / "firmware", result.certified.take)
             parts.append(Text("`gait/report.html` shows it in 3D, with every limit; `gait/firmware/` is what the robot plays. "
-                              "`workbench optimize --help` says what else can be asked for."))
+                              "`workbench optimize --help` lists what else can be requested."))
     return Section("A new gait", parts)
 
 

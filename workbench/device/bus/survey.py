@@ -44,7 +44,7 @@ class Survey:
     doubled: tuple[int, ...]
 
     def problems(self) -> tuple[str, ...]:
-        """What has to be mended before anything moves, a line each."""
+        """What has to be fixed before anything moves, a line each."""
         out = [f"joint {joint} does not answer" for joint in self.missing]
         out += [f"servo {i}: two servos seem to have this ID, or its cable is bad" for i in self.doubled]
         out += self._supply()
@@ -101,7 +101,7 @@ def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
     numbers: dict[int, int] = {}
     for k, servo in enumerate(wanted):
         if progress is not None:
-            progress("asking each ID", k / len(wanted))
+            progress("looking at each ID", k / len(wanted))
         numbers |= bus.find([servo])
     doubled = tuple(i for i in wanted if (i in numbers or i in joints) and bus.answers(i) > 1)
     if not numbers and not doubled:

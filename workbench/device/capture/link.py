@@ -64,7 +64,7 @@ class UdpLink:
     @property
     def description(self) -> str:
         """Whom this link speaks to, and through what."""
-        how = "chosen by the route to it" if self.chosen else "as asked"
+        how = "chosen by the route to it" if self.chosen else "as given"
         return f"server {self._server[0]} through interface {self.interface} ({how}; this machine has {', '.join(addresses())})"
 
     def now(self) -> float:

@@ -17,7 +17,7 @@ from workbench.robot import InputError
 
 
 def preflight(found: Survey) -> None:
-    """InputError where something has to be mended before anything moves: the first problem, and how many there are."""
+    """InputError where something has to be fixed before anything moves: the first problem, and how many there are."""
     problems = found.problems()
     if problems:
         more = f" (and {len(problems) - 1} more; `workbench servos` shows all)" if len(problems) > 1 else ""

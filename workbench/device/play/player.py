@@ -143,7 +143,7 @@ class _Performance:
         low, high = profile.angle(0), profile.angle(profile.largest_position)
         for joint, angle in self.goals.items():
             if not low <= angle <= high:
-                raise BusError(f"stands at {math.degrees(angle):.0f} deg, beyond what it can be told; turn it back by hand",
+                raise BusError(f"stands at {math.degrees(angle):.0f} deg, beyond the range of its goals; turn it back by hand",
                                self.rig.ids[joint], joint)
 
     def _ramp(self, target: Mapping[str, float], what: str) -> None:

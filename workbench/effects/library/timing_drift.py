@@ -22,7 +22,7 @@ class TimingDrift(Effect):
     parameters = (Parameter("per_pose", "s", -0.05, 0.2, 0.003),)
 
     def sentence(self, spec: EffectSpec) -> str:
-        return f"Each pose takes {1000 * scalar(spec, 'per_pose'):.1f} ms longer than told."
+        return f"Each pose takes {1000 * scalar(spec, 'per_pose'):.1f} ms longer than commanded."
 
     def commands(self, commands: Commands, where: tuple[str, ...], values: Mapping[str, float], model: RobotModel) -> Commands:
         k = np.arange(len(commands.times))

@@ -50,7 +50,7 @@ class UncertainValue:
 @dataclass(frozen=True)
 class Measured:
     """A link that is not as long as drawn, a horn that sits turned, or what a servo's register says: value and standard deviation
-    in the contract's unit. seen: how that is known, for a person."""
+    in the unit of docs/formats.md. seen: how that is known, for a person."""
 
     effect: str
     where: str

@@ -108,7 +108,7 @@ class Explanation:
         return out
 
     def posterior(self) -> Posterior:
-        """Of all numbers of the model's effects, in the contract's units; a recalibrated zero is one of them."""
+        """Of all numbers of the model's effects, in the units of docs/formats.md; a recalibrated zero is one of them."""
         model = self.model
         names = parameter_names(model.effects)
         blocks: dict[tuple[str, tuple[str, ...]], Array] = {}

@@ -1,4 +1,4 @@
-"""What each effect more would do around a fit, and the evidence that this foretells."""
+"""What each effect more would do around a fit, and the evidence that this predicts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BETWEEN, BEYOND = (0.25, 0.5, 0.75), (0.25, 0.5, 1.0)
 
 @dataclass(frozen=True)
 class Move:
-    """A hypothesis that a fit could go on to. r: what it is foretold to leave; J: its slopes; gain [nats]: of log posterior."""
+    """A hypothesis that a fit could go on to. r: what it is predicted to leave; J: its slopes; gain [nats]: of log posterior."""
 
     hypothesis: Hypothesis
     r: Array
@@ -65,7 +65,7 @@ def _neutral(effect: Effect) -> tuple[float, ...]:
 
 
 def linearised(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Move]]:
-    """Every extension at some sizes, and what it foretells at its best one; the best first."""
+    """Every extension at some sizes, and what it predicts at its best one; the best first."""
     asked = [(c, x, k) for c in extensions(region, f.hypothesis) for x, k in points(c, f.hypothesis)]
     left = yield [f.hypothesis.with_effect(c, x) for c, x, _ in asked]
     along = ways([Probe(c, x, k, r) for (c, x, k), r in zip(asked, left)])
@@ -91,7 +91,7 @@ def best_of_each(moves: Sequence[Move]) -> list[Move]:
 
 def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceOptions) -> list[Move]:
     """Of the best moves of one effect a beam, and of those of two as many more, but only two that the same effect leads: lines
-    foretell worse what comes beside it than that one is in all of them."""
+    predict worse what comes beside it than that one is in all of them."""
     out, led = list(alone[:options.beam]), Counter[object]()
     for m in both:
         leads = (m.added[0].key, m.added[0].options)
@@ -102,7 +102,7 @@ def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceO
 
 
 def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequence[Move]) -> list[Move]:
-    """Two of the best moves at once, foretold by what each does alone."""
+    """Two of the best moves at once, predicted by what each does alone."""
     return [_both(region, options, f, a, b) for a, b in combinations(moves[:options.paired], 2)
             if a.added[0].key != b.added[0].key or a.added[0].key in {c.key for c in f.hypothesis.effects}]
 

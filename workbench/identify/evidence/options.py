@@ -22,7 +22,7 @@ class EvidenceOptions:
     leave is correlated for longer. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip
     answers smaller ones with noise; spread: of the moves that tell the last slopes, likewise: half of what was known before.
     iterations: most steps of a fit. beam: states that are extended, and moves of one effect that are fitted of each; refined:
-    moves of one or two that are, led of these by the same one; paired: of the best moves, those that are also foretold two at a
+    moves of one or two that are, led of these by the same one; paired: of the best moves, those that are also predicted two at a
     time. most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit
     sees all.
 

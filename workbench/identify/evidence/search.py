@@ -1,4 +1,4 @@
-"""One search: linearise, score moves by the evidence that they foretell, fit the best few, keep a beam, stop by evidence."""
+"""One search: linearise, score moves by the evidence that they predict, fit the best few, keep a beam, stop by evidence."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def _begun(region: Region, options: EvidenceOptions) -> Asks[tuple[Region, Fitte
 
 
 def _level(found: Found, options: EvidenceOptions) -> Asks[Found]:
-    """The beam's states extended by the moves that foretell most, and those fitted."""
+    """The beam's states extended by the moves that predict most, and those fitted."""
     return (yield from _extended(found, options, found.beam(options), options.refined))
 
 
@@ -141,7 +141,7 @@ def _exchanged(found: Found, options: EvidenceOptions) -> Asks[Found]:
 
 
 def _extended(found: Found, options: EvidenceOptions, states: Sequence[Fitted], refined: int) -> Asks[Found]:
-    """Some states extended, each by so many of the moves that foretell most; those are fitted, and the beam polished."""
+    """Some states extended, each by so many of the moves that predict most; those are fitted, and the beam polished."""
     fits, region, moves = dict(found.fits), found.region, []
     states = [f for f in states if f.hypothesis.key not in found.extended and len(f.hypothesis.effects) < options.most]
     for f in states:
@@ -179,7 +179,7 @@ def reduced(region: Region, options: EvidenceOptions, f: Fitted) -> Fitted:
 
 
 def _moved(region: Region, options: EvidenceOptions, f: Fitted, m: Move) -> Asks[Fitted]:
-    """A move fitted, with the slopes that foretold it where they tell all its numbers; and once more with the nominal law as it
+    """A move fitted, with the slopes that predicted it where they tell all its numbers; and once more with the nominal law as it
     stands, as what was recalibrated for want of an effect may hold a fit where it is."""
     shaped = any(c.shapes.any() or c.size > 1 for c in m.added)
     h = m.hypothesis

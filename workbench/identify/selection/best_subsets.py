@@ -50,7 +50,7 @@ def subsets_for(
 ) -> list[list[CandidateFit]]:
     """Sets of effects that, as responses predict it, explain a joint far better than fewer do, with sizes to begin from.
 
-    trials: of a race beside `current` on these takes, whose base is fixed.
+    trials: of a screening beside `current` on these takes, whose base is fixed.
     """
     known = [(t, looked) for t in trials if t.joint in (joint, None) and (looked := _signatures(search, t, takes)) is not None]
     base = {i: current.residuals[i] for i in takes}

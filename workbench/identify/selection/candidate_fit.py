@@ -33,10 +33,10 @@ class CandidateFit:
 
 @dataclass(frozen=True)
 class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that an earlier race's responses predict, that
-    those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of one
-    number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; unheld: whether no take
-    had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
+    """What rivals that are fitted side by side know of each other: the best gain that an earlier screening's responses predict,
+    that those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of
+    one number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; unheld: whether no
+    take had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     screened_out: dict[str | None, float] = field(default_factory=dict)

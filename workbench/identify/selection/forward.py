@@ -180,8 +180,8 @@ def _closed_at(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, 
 
 def _accepted(worth: Sequence[CandidateFit]) -> list[list[CandidateFit]]:
     """Which to take, of those that are worth it: the best and the best at other joints where it is about as good; of the whole
-    robot's the best, but not what leaves half where another closes nearly all. Where a race does not tell who is ahead, each of
-    them to be fitted."""
+    robot's the best, but not what leaves half where another closes nearly all. Where the screening does not show which is ahead,
+    each of them to be fitted."""
     if not worth:
         return []
     best = worth[0]

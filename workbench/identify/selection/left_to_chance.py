@@ -1,6 +1,6 @@
 """What a loose link does within its play is chance: once it is found, its channels across the servo's axis count by that.
 
-Which end it lies at, no model foretells for long. Two links that rattle each by chance are apart by a sixth of the square of
+Which end it lies at, no model predicts for long. Two links that rattle each by chance are apart by a sixth of the square of
 their play, in the mean square, which is far beyond noise: else whatever happens to shake the model's link at the right moment
 looks like the next cause, and hides a load on the body.
 """

@@ -29,8 +29,8 @@ class ScreeningOptions:
     """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
     remembered: float = 0.15
     remembered_least: float = 0.25
-    """Shares of the best gain and of the least, as responses of a race beside fewer effects predict it, from which on an effect
-    is looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
+    """Shares of the best gain and of the least, as responses of a screening beside fewer effects predict it, from which on an
+    effect is looked at: beside what came since it does something else, as a foot on soft ground carries otherwise."""
     most_fitted: int = 3
     """Effects judged by all channels that are fitted at a time, of one number and of several: those of which most is
     predicted."""

@@ -1,4 +1,4 @@
-"""A race between effects for what is missing: one group's way through it, as a generator that wants rollouts."""
+"""The screening of effects for what is missing: one group's way through it, as a generator that wants rollouts."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], t
 
 
 class CandidateEvaluation:
-    """One group's way through a race: looked at, guessed, begun, fitted while it is not behind, judged.
+    """One group's way through the screening: looked at, guessed, begun, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
     beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. responses: of earlier
@@ -99,7 +99,7 @@ class CandidateEvaluation:
         return out + [self._judged(b, x, final) for b, x in zip(alive, sizes)]
 
     def _past(self) -> Part[tuple[list[Array], list[float]] | None]:
-        """Sizes and gains as responses of an earlier race predict them, where that is hopeless; None: to be looked at."""
+        """Sizes and gains as responses of an earlier screening predict them, where that is hopeless; None: to be looked at."""
         known = self.responses.get(self._name) if self.walking else None
         guesses = None if known is None else self._guessed(*known)
         if guesses is not None:

@@ -48,11 +48,11 @@ def read_bam_log(path: str | Path) -> Recording:
         load = _column(source, entries, "load", False)
         load = np.where(load > 32767, load - 65536, load)
         if not np.any(load):
-            problems.append("load is 0 in every row: it was not read, and no duty is told")
+            problems.append("load is 0 in every row: it was not read, so that there is no duty")
         elif np.nanmax(np.abs(load)) <= _FULL_DUTY:
             channels[f"duty.{joint}"] = load / _FULL_DUTY
         else:
-            problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, and no duty is told")
+            problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, so that there is no duty")
     if "input_volts" in entries[0]:
         channels["voltage"] = _column(source, entries, "input_volts", False)
     enabled = np.ones(len(time))

@@ -96,7 +96,8 @@ def _channel(source: str, table: pa.Table, index: int, name: str) -> Array:
 
 
 def write_joint_log(path: str | Path, time: Array, channels: Mapping[str, Array]) -> Path:
-    """Writes a joint log whole or not at all; channels in SI and radians, by the contract's names; NaN becomes a blank."""
+    """Writes a joint log whole or not at all; channels in SI and radians, by the names of docs/formats.md; NaN becomes a
+    blank."""
     rows = [np.asarray(time, dtype=float), *(np.asarray(c, dtype=float) / _SCALE.get(n.partition(".")[0], 1.0)
                                             for n, c in channels.items())]
     out = io.StringIO()

@@ -136,7 +136,7 @@ def _on_clock(header: MotiveHeader, table: pa.Table, frames: NDArray[np.int64], 
     span, ticks = np.ptp(time[good]), frames[good][-1] - frames[good][0]
     seconds = float(np.median(np.diff(time[good])))
     if seconds <= 0:
-        problems.append("the Time column does not increase; times are told by the frame numbers alone")
+        problems.append("the Time column does not increase; times are taken from the frame numbers alone")
     steady = seconds > 0 and np.median(np.abs(np.diff(time[good]) - seconds)) < 0.2 * seconds
     if not steady or not span > 0 or abs(span * rate / ticks - 1) < _DISAGREE:
         return frames, rate
@@ -157,7 +157,7 @@ def _rate(source: str, header: MotiveHeader, table: pa.Table, frames: NDArray[np
         return rate
     time = column(table, 1) if header.columns > 1 else np.zeros(1)
     if len(time) < 2 or not time[-1] > time[0]:
-        raise InputError(source, "header: no Export Frame Rate, and no times to tell it from")
+        raise InputError(source, "header: no Export Frame Rate, and no times to compute it from")
     problems.append("the header does not say the frame rate; it is taken from the Time column")
     return float((frames[-1] - frames[0]) / (time[-1] - time[0]))
 

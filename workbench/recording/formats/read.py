@@ -44,7 +44,8 @@ def split_part(path: Path) -> tuple[Path, str | None]:
 
 
 def read_recording(path: str | Path) -> Recording:
-    """Reads a recording of any known format, told by its content; its joints' channels checked, and mended where that is certain.
+    """Reads a recording of any known format, recognised by its content; its joints' channels checked, and repaired where that is
+    certain.
 
     One recording of a file of several is called FILE#PART. InputError where the content is of no format or is damaged.
     """

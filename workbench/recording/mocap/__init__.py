@@ -1,1 +1,1 @@
-"""From rigid bodies of motion capture to joint angles: mending, registration, observation of simulated takes."""
+"""From rigid bodies of motion capture to joint angles: repair, registration, observation of simulated takes."""

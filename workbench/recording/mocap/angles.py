@@ -1,4 +1,4 @@
-"""Joint angles and the base's pose from mended tracks, through the kinematic tree."""
+"""Joint angles and the base's pose from repaired tracks, through the kinematic tree."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def joint_angles(tracks: Tracks, model: RobotModel, yaw: float, base: str) -> An
 
 
 def angle_sigma(angles: Angles, noise: Array, rate: float) -> Array:
-    """Standard deviation of each sample (N, n) [rad]: the noise (n,) at rest, and in mended samples the error of a straight
+    """Standard deviation of each sample (N, n) [rad]: the noise (n,) at rest, and in filled samples the error of a straight
     line under the joint's own angular acceleration a, a t(T - t)/2."""
     step = max(1, round(0.025 * rate))
     q = angles.q

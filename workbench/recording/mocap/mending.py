@@ -111,7 +111,7 @@ def _filled(tracks: Tracks, longest: float) -> Tracks:
         left = gaps[~short]
         text = f"{asset}: {int(length.sum())} of {n} frames unseen in {len(gaps)} gap(s)"
         if short.any():
-            text += f"; {int(short.sum())} mended, up to {int(length[short].max())} frames"
+            text += f"; {int(short.sum())} filled, up to {int(length[short].max())} frames"
         if len(left):
             worst = left[np.argmax(left[:, 1] - left[:, 0])]
             text += f"; {len(left)} left open, the longest {worst[1] - worst[0]} frames from {tracks.time[worst[0]]:.3f} s"

@@ -88,7 +88,7 @@ def find_pivots(tracks: Tracks, angles: Angles, model: RobotModel, yaw: float, r
 
 
 def _frames(tracks: Tracks, angles: Angles, root: int) -> NDArray[np.int64]:
-    """Frames in which the base is seen and nothing is mended, evenly spread, at most a few hundred."""
+    """Frames in which the base is seen and nothing is repaired, evenly spread, at most a few hundred."""
     use = np.flatnonzero(tracks.seen[root] & ~tracks.mended)
     if len(use) < 10:
         use = np.flatnonzero(tracks.seen[root])

@@ -149,7 +149,7 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
             return tracks
         names = " and ".join(tracks.assets[i] for i in worst)
         return replace(tracks, problems=(*tracks.problems, f"{names}: no joint of the model holds them together as they move"))
-    even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # two like legs can be mended at either joint
+    even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # two like legs can be repaired at either joint
     holds = min(even, key=lambda h: _out_of_place(_put_back(tracks, [0], [h]), model))
     fixed = _put_back(tracks, [0], [holds])
     return replace(fixed, problems=(*tracks.problems, *_told(tracks, [0], [holds])))

@@ -24,7 +24,7 @@ _MAX_HOLE = 20  # a clock with more than this many missing frames for each one s
 class Tracks:
     """time (N,) [s]. assets: A names. p: (A, N, 3) [m], q: (A, N, 4) unit quaternions wxyz, NaN where unseen, both in the model's
     axes turned by the yaw that is not known yet: x, -z, y of the capture's x, y, z. seconds_squared: (A, N), zero where
-    seen, t(T - t) [s^2] of a mended sample t into a gap of T."""
+    seen, t(T - t) [s^2] of a filled sample t into a gap of T."""
 
     time: Array
     rate: float
@@ -153,7 +153,7 @@ def seen_joints(tracks: Tracks, model: RobotModel, base: str) -> tuple[list[Seen
         if not between or not known:
             continue
         if len(between) > 1:
-            problems.append(f"joints {' and '.join(between)}: not told apart, as no link between them is tracked")
+            problems.append(f"joints {' and '.join(between)}: they cannot be separated, as no link between them is tracked")
             continue
         f = k.frames[between[0]]
         axis = to_base @ neutral[f.parent] @ f.axis_of_parent

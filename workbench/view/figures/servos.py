@@ -74,7 +74,7 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
     plane.set_ylim(-reach, reach)
     plane.set_xlabel("joint speed [deg/s]")
     plane.set_ylabel("motor torque [N m]")
-    plane.set_title("asked of the servos")
+    plane.set_title("required of the servos")
     rows = np.arange(len(joints))
     over = np.maximum(share_torque, share_speed) > 1
     bars.barh(rows - 0.2, 100 * share_torque, 0.36, color=SIMULATED, label="torque at that speed")

@@ -63,7 +63,7 @@ def headline(comparison: Comparison) -> str:
 def _summary(comparison: Comparison) -> str:
     problems = sum(len(t.recorded.problems) for t in comparison.takes)
     text = ("Errors are RMS after the first command. Noise is the recording's at rest before it; the numerical floor is the same "
-            "rollout with the step halved and quartered. The spread between contact models is stated apart.")
+            "rollout with the step halved and quartered. The spread between contact models is stated separately.")
     return text + (f" {_count(problems, 'remark')} on the recordings: see each take." if problems else "")
 
 

@@ -111,12 +111,13 @@ def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
     what = [sentence_of(f) for f in diagnosis.findings]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
-        what.append(f"Judged on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that no choice and "
-                    "no parameter saw. **1×** is what measurement noise, numerics and the choice of contact model make alone.")
+        what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that neither "
+                    "the selection of effects nor a parameter saw. **1×** is what measurement noise, numerics and the choice of "
+                    "contact model make alone.")
     if any(c in BODY for s in takes for c in s.channels):
         what.append(
-            f"Walking is chaotic: to be judged, a simulated walk is put back beside the recorded one every {PROBLEM.window:g} s; "
-            "paths and 3D show it left to itself."
+            "Walking is chaotic: for evaluation, a simulated walk is put back beside the recorded one every "
+            f"{PROBLEM.window:g} s; paths and 3D show it left to itself."
         )
     if seen := diagnosis.provenance.get("searched"):
         what.append(f"The search looked at {sum(seen.values()):.0f} s of these, where most is missing ({listed(list(seen))}).")
@@ -163,16 +164,16 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
         over = over or sorted((c for c in worst if worst[c] > LIMIT), key=lambda c: -worst[c])
         named = over if len(over) < 6 else [*over[:4], f"{len(over) - 4} more places"]
         if over and diagnosis.verdict != "no_gap":
-            said = f"The recordings leave the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
+            said = f"The recordings differ from the nominal model at {listed(named)}. {layers_of(diagnosis)}".strip()
         else:
-            said = "Nowhere do the recordings leave the nominal model by more than chance" + (
+            said = "Nowhere do the recordings differ from the nominal model by more than chance" + (
                 "; the table shows what comes nearest." if diagnosis.gap else ".")
         parts.append(Text(said))
         at_joints: dict[str, float] = {}
         for c, ratio in worst.items():
             at_joints[joint_of(c)] = max(at_joints.get(joint_of(c), 0.0), ratio)
         parts.append(Picture(robot_map(diagnosis.nominal, at_joints),
-                             "Each joint, by how far it leaves the nominal model; one wrong joint moves others."))
+                             "Each joint, by how far it is from the nominal model; one wrong joint moves others."))
     if diagnosis.gap:
         header = ["layer", "where", "take", "when [s]", "phase", "error", "noise"]
         parts += folded(header, [_gap_row(g) for g in diagnosis.gap], "more places and times")
@@ -180,12 +181,12 @@ def _where(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> Section:
     parts += maps[:1]
     if maps[1:]:
         parts.append(Details("The same map of the other takes", maps[1:]))
-    return Section("Where the recordings leave the model", parts)
+    return Section("Where the recordings differ from the model", parts)
 
 
 def _map_caption(take: TakeReport) -> str:
     said = (f"{take.name}: each row a joint or a motion of the body, darker where it is further from the model. "
-            "Green on top: stretches that no choice saw. Grey: not seen")
+            "Green on top: stretches that no selection saw. Grey: not seen")
     if any(c in BODY for c in take.channels):
         said += f", or the model's body had just been put back beside the recorded one, as every {PROBLEM.window:g} s"
     return said + "."
@@ -236,7 +237,7 @@ def _recalibrated(numbers: Sequence[Recalibrated]) -> Section:
     """Of the nominal law, within what was known of it."""
     rows = [[r.number.replace("_", " "), listed(r.where), f"{r.nominal:.4g}", f"{r.value:.4g}", unbroken(r.unit),
              f"{r.sigmas:+.1f}"] for r in numbers]
-    said = "Numbers of the nominal law that were known only so well. Using them otherwise within that is no finding."
+    said = "Constants of the servo law that were adjusted within what is known of them. This is no finding."
     return Section("What was recalibrated", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
 
@@ -279,7 +280,7 @@ def _left(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
         nothing = diagnosis.verdict in ("no_gap", "explained")
         return Section("What is left", [Text("Nothing beyond what noise, numerics and chance make." if nothing else
-                                             "What is still beyond the green band above has no name yet.")])
+                                             "What is still beyond the green band above is not explained yet.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
     header = ["what is still off", "take", "by", "over noise", "and it goes"]
     off = [left_row(u) for u in order if is_error(u)]

@@ -79,7 +79,7 @@ def _headline(result: Optimized) -> str:
     speed = f"{math.degrees(n['speed']):.0f} deg/s" if turns else f"{100 * n['speed']:.0f} cm/s"
     said = f"{str(result.request)[0].upper()}{str(result.request)[1:]}: {speed} on the model"
     if d.get("count"):
-        said += f"; of {d['count']} robots nobody measured {d['falls'] or 'none'} fell"
+        said += f"; of {d['count']} random variants {d['falls'] or 'none'} fell"
     return said + ("." if result.met else "; the request is not met.")
 
 
@@ -116,9 +116,9 @@ def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | Non
         Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in the last two seconds."),
         Picture(phase_portrait(busiest, take.resampled(take.time[take.time > last - 2.0])),
                 f"Speed over angle of {busiest}, the servo with most to do, in the last two seconds."),
-        Details("Angles asked and reached, torques, attitude", [
+        Details("Commanded and reached angles, torques, attitude", [
             Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
-                    "Each joint, asked (ramp) and reached; the foot's stance is shaded."),
+                    "Each joint, commanded (ramp) and reached; the foot's stance is shaded."),
             Picture(joint_torques(take.since_start, take.joints, {"on the link": take.torque}, limit=limit),
                     "Torque of each joint, and the servo's at full duty."),
             Picture(body_attitude(take, others=others))])]
@@ -151,7 +151,7 @@ def _draws_section(certificate: Certificate) -> Section:
     parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
                       f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
                       "No second engine was at hand: what is said here is one engine's word."))
-    return Section("Robots nobody measured", parts)
+    return Section("Random variants of the robot", parts)
 
 
 def _way_section(certificate: Certificate) -> Section:
@@ -171,7 +171,7 @@ def _table_section(table: GaitTable) -> Section:
     speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
     return Section("The table", [
-        Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it asks for `certificate.json` beside "
+        Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it needs `certificate.json` beside "
              "it."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])

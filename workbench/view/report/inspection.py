@@ -1,4 +1,4 @@
-"""What a file is, told by its content, and what is wrong with it."""
+"""What a file is, recognised by its content, and what is wrong with it."""
 
 from __future__ import annotations
 

@@ -35,10 +35,10 @@ def headline(diagnosis: Diagnosis) -> str:
         case "partly_explained" if not likely:
             return f"Nothing that the workbench knows is likely to be what the model missed; nearest comes {names}."
         case "partly_explained":
-            sure = "" if len(likely) == len(diagnosis.findings) else "sure "
-            return f"{explain} part of what the model missed; the rest has no {sure}name yet."
+            sure = "" if len(likely) == len(diagnosis.findings) else " with certainty"
+            return f"{explain} part of what the model missed; the rest is not identified{sure} yet."
         case "unexplained":
-            return "The recordings leave the model, and nothing that the workbench knows explains how."
+            return "The recordings differ from the model, and no effect that the workbench knows explains how."
 
 
 def _with_rival(f: Finding) -> str:
@@ -62,7 +62,7 @@ def this_or(tie: Alternative) -> str:
 
 
 def title_of(effect: str, where: Sequence[str]) -> str:
-    """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, at which the data cannot tell."""
+    """`joint_compliance`, ("flm",) -> "joint compliance at flm"; of several places, which the data cannot separate."""
     return name_of(effect) + (f" at {listed(where, 'or')}" if where else "")
 
 
@@ -182,13 +182,13 @@ def left_row(u: Unexplained) -> list[str]:
 
 
 def next_said(n: NextExperiment) -> str:
-    """What to play, how the robot is held, and what that tells apart."""
+    """What to play, how the robot is held, and what that separates."""
     base = ("with the base held on the stand, feet in the air" if n.base == "fixed" else
             "with the robot free on the floor")
     pairs = [f"{name_of(a)} from {name_of(b)}" for a, b in n.separates]
     odds = [f"{p} (expected odds of the right name: {_odds(x)})" for p, x in zip(pairs, n.log_likelihood_ratios)] or pairs
-    return f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It tells {listed(odds)}; it keeps within the " \
-           "servos' limits."
+    return f"Play [{n.motion}]({n.motion}) {base}, and record it like the others. It separates {listed(odds)}; it keeps within " \
+           "the servos' limits."
 
 
 def _odds(ratio: float) -> str:
