@@ -213,7 +213,8 @@ def test_a_tie_of_two_is_as_sure_as_both_together(model: RobotModel, take: TakeR
     page = diagnosis_report(replace(diagnosis(model), findings=(tied,)), [take], "Session small").html()
     assert "96 % sure that it is this or joint compliance at flm" in page
     assert "50 %, or joint compliance at flm 46 %: 96 % for one of the two" in page
-    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings cannot separate" in finding_line(tied)
+    line = finding_line(tied)
+    assert "(confidence 0.96 that it is this or joint compliance at flm, which these recordings cannot separate" in line
 
 
 def test_a_sentence_is_said_once_in_its_section(model: RobotModel, take: TakeReport) -> None:

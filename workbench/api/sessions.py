@@ -120,7 +120,8 @@ class PredictionResult:
     """What a model predicts of takes that it was not fitted to; the files are written already.
 
     takes: the simulated takes, in SI units and radians, time zero at the first command. paths: the file of each take, in the same
-    order. left_out: name of each damaged take of the session, and why it was left out (the others tell the capture's yaw).
+    order. left_out: name of each damaged take of the session, and why it was left out (from the others the capture's yaw is
+    found).
     """
 
     takes: tuple[Take, ...]

@@ -81,8 +81,8 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
 
 
 def _yaw_of_starts(session: Session, starts: Sequence[Recording]) -> float:
-    """The yaw [rad] that where the bodies stand tells, of a session of predictions alone: good to some degrees, as pivots lie
-    anywhere on their links. InputError where they do not tell it."""
+    """The yaw [rad] of a session of predictions alone, from where the bodies stand: good to some degrees, as pivots lie
+    anywhere on their links. InputError where that does not give it."""
     told = [layout_yaw(tracks_of(start), session.model) for start in starts]
     known = [yaw for yaw in told if yaw is not None]
     if not known:

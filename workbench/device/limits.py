@@ -1,4 +1,4 @@
-"""Whether the servos can do what a pose table asks."""
+"""Whether the servos can do what a pose table requires."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 RPM = 2 * math.pi / 60
 HOLD = 0.01
 """How long a torque has to last to count [s]: the one-step impulses of a rigid contact are nothing that a servo, whose
-control loop turns once a millisecond, is asked to hold."""
+control loop runs once a millisecond, has to hold."""
 RECOMMENDED = 1 / 5
 """ROBOTIS: motion is stable where the load stays below a fifth of the stall torque (AX-12A manual)."""
 
@@ -48,7 +48,7 @@ class Violation:
 
 
 def check_limits(table: PoseTable, model: RobotModel, simulated: Take | None = None) -> list[Violation]:
-    """What the table asks beyond the joints' ranges, the servos' speed and, as it ran in simulation, their torque.
+    """What the table requires beyond the joints' ranges, the servos' speed and, as it ran in simulation, their torque.
 
     Broken limits come first, then warnings. The registers' own range is the table's to refuse. InputError for a joint
     that the model or the take lacks.
@@ -86,7 +86,7 @@ def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
 
 def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     """Moving speeds beyond the no-load speed at the supply voltage; a warning from the speed on at which full duty only just
-    overcomes the servo's own friction. Speed 0 (at once) asks for the travel over the dwell."""
+    overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell."""
     angles = table.angles()
     travel = np.abs(angles - np.roll(angles, 1, axis=0)) / (table.dwells_ms[:, None] / 1000)
     asked = np.where(table.speeds > 0, table.rates(), travel) / RPM

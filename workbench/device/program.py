@@ -29,7 +29,7 @@ class Program:
 def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: bool) -> tuple[TableFile, tuple[Violation, ...]]:
     """The table of a motion (CSV or .mtn), or a binary table as it is; InputError where a limit is broken, unless `force`.
 
-    cycles: stops after so many; None: goes on until it is told.
+    cycles: stops after so many; None: goes on until it is stopped.
     """
     if Path(motion).suffix == ".table":
         return read_table_file(motion), ()

@@ -48,7 +48,7 @@ class JointBounds:
 @dataclass(frozen=True)
 class TableFile:
     """A pose table with what makes it safe to play. joints: as many as the table's columns. cycles: how many, where `stops`;
-    else the table goes on until it is told to stop or another comes."""
+    else the table goes on until it is stopped or another comes."""
 
     table: PoseTable
     joints: tuple[JointBounds, ...]
@@ -57,7 +57,7 @@ class TableFile:
 
 
 def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | None = None) -> tuple[JointBounds, ...]:
-    """Bounds of a model's joints in counts, no narrower than what the table itself asks (`export` has checked it, or was forced).
+    """Bounds of a model's joints in counts, no narrower than the table's own goals (`export` has checked it, or was forced).
 
     numbers: model number of each joint's servo (default: the AX-12A's). InputError for a table that the controller's program
     cannot play.

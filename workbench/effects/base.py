@@ -29,7 +29,7 @@ Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
-"""Effects that do nearly the same until data tell them apart: where no member is sure, the family may be."""
+"""Effects that do nearly the same, until data separate them: where no member is sure, the family may be."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
 """Ways to read an effect off the recordings (workbench/identify/estimators)."""
@@ -101,13 +101,13 @@ class Effect:
     """Whether it leaves no trace in the angles of its own joint where these are zeroed in neutral, only in what gravity and
     ground make of it."""
     like_a_late_start: ClassVar[bool] = False
-    """Whether, of the whole robot, it does what a later first command does: only a known start tells it."""
+    """Whether, of the whole robot, it does what a later first command does: only a known start separates the two."""
     reduces_to: ClassVar[str] = ""
     """The nested effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none
     does, where it is small."""
     equivalent_to: ClassVar[tuple[str, ...]] = ()
-    """Observationally equivalent effects: no walk tells it from them, as both move the robot alike, by less apart than engines
-    are."""
+    """Observationally equivalent effects: no walk separates it from them, as both move the robot alike, by less apart than
+    engines are."""
     includes: ClassVar[tuple[str, ...]] = ()
     """Effects at the same place whose freedom it has, so that these say nothing beside it."""
     steady_pull: ClassVar[bool] = False

@@ -30,7 +30,7 @@ class Certificate:
     kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait, start, stop). margins: of
     limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the quantiles 0, 5, 50, 95, 100 % over the
     ensemble; falls, and how many were drawn. floor: by which steps and contact models move speed and heading. other_engine: the
-    same table elsewhere; empty where it was not asked. ways: the way in and out. provenance: versions, seeds, time.
+    same table elsewhere; empty where there was none. ways: the way in and out. provenance: versions, seeds, time.
     """
 
     kept: bool

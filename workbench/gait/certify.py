@@ -99,7 +99,7 @@ def _all(work: Sequence[Work], n_jobs: int, progress: Progress) -> Iterator[Any]
 
 def _on_draws(request: Request, machine: GaitMachine, measured: Sequence[Measured | None],
               ) -> tuple[dict[str, Any], list[GaitMeasure]]:
-    """Quantiles over robots nobody measured, and the measures; None: a robot that fell."""
+    """Quantiles over the robots of the ensemble, and the measures; None: a robot that fell."""
     if not measured:
         return {"count": 0}, []
     measures = [fallen(len(machine.model.joints)) if m is None else m[0] for m in measured]

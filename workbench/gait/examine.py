@@ -67,7 +67,7 @@ class CertifyOptions:
 
 @dataclass(frozen=True)
 class Examiner:
-    """One table on one robot, on the slope asked for. Every method is one piece of work and can be sent to another process."""
+    """One table on one robot, on the required slope. Every method is one piece of work and can be sent to another process."""
 
     model: RobotModel
     legs: tuple[Leg, ...]
@@ -105,7 +105,7 @@ class Examiner:
         return take, told
 
     def robots(self, robots: Sequence[RobotModel]) -> list[Measured | None]:
-        """Robots nobody measured, by the compiled station; None for one that lay on the floor or tripped over itself."""
+        """Robots of the ensemble, by the compiled station; None for one that lay on the floor or tripped over itself."""
         config = SimulationConfig(time_step=self.options.step, contact_period=0.0, log_period=0.01)
         takes = Rollouts(1).takes([self._job(r, config, self.options.draw_seconds) for r in robots])
         return [None if take is None else self._measured(take, robot) for take, robot in zip(takes, robots)]

@@ -77,7 +77,7 @@ def allowed_rms(machine: GaitMachine, limits: GaitLimits) -> np.ndarray:
 
 
 def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> list[Margin]:
-    """What can be told without a simulation: ranges, moving speeds, reach, self-contact, bus time, the controller's memory."""
+    """What is known without a simulation: ranges, moving speeds, reach, self-contact, bus time, the controller's memory."""
     model, out = machine.model, []
     for part in (table.cycle, table.start, table.stop):
         angles = part.angles()
@@ -101,14 +101,14 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
 
 
 def contact_margin(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> Margin:
-    """Of links against each other, at the poses asked for."""
+    """Of links against each other, at the poses of the table, before rounding."""
     near = machine.self_contact.nearest(table.asked)
     where = " and ".join(near.links) if near.links[0] else "robot"
     return _of("self-contact", where, 1000 * limits.clearance, 1000 * max(near.distance, 1e-6), "mm of clearance")
 
 
 def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) -> list[Margin]:
-    """What a run on the nominal robot tells: torque, RMS, current, tilt; and ROBOTIS's advice."""
+    """Limits that a run on the nominal robot shows: torque, RMS, current, tilt; and ROBOTIS's advice."""
     out, law = [], machine.law
     allowed = allowed_rms(machine, limits)
     for i, joint in enumerate(machine.model.joints):

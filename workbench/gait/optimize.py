@@ -40,7 +40,7 @@ MEMORY = ".rollouts.jsonl"
 
 
 IN_HAND = 0.02
-"""By which a search goes beyond the speed asked for: twice what 2 ms and 1 ms differ by."""
+"""By which a search goes beyond the required speed: twice what 2 ms and 1 ms differ by."""
 DRIFT_SHARE = 0.6
 """Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
 SPREAD_SHARE = 0.7
@@ -102,7 +102,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             progress("planning seeds", 0.0)
         planned = planned_seeds(machine, request) if options.planned else ()
         found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
-        if not found.best.good:  # it may keep what was asked for all the same, with less in hand than the search wanted
+        if not found.best.good:  # it may keep the request all the same, with a smaller reserve than the search requires
             again = Evaluator(machine, request, draws, memory, options.n_jobs)
             (best,) = again.judged([found.best.shape], options.budget.draws, list)
             found = replace(found, best=best) if best.good else found
@@ -131,7 +131,8 @@ def _briefly(options: CertifyOptions) -> CertifyOptions:
 
 
 def sought(request: Request) -> Request:
-    """What a search is asked, so that its gait keeps the request in the certificate's longer and finer runs, too."""
+    """The requirements of a search, stricter than the request, so that its gait keeps the request in the certificate's longer and
+    finer runs, too."""
     speed = None if request.speed is None else request.speed * (1 + IN_HAND)
     return replace(request, speed=speed, limits=replace(
         request.limits, drift=DRIFT_SHARE * request.limits.drift, spread=SPREAD_SHARE * request.limits.spread))
@@ -152,7 +153,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
 
 
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
-    """What no gait can do, told before any search: speed beyond what feet reach at the servos' no-load speed, a slope beyond
+    """What no gait can do, known before any search: speed beyond what feet reach at the servos' no-load speed, a slope beyond
     friction."""
     law = machine.law
     legs = {leg.foot: max(float(law.full_torque[i] / law.back_emf[i]) for i in map(machine.model.joints.index, leg.joints))

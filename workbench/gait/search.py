@@ -63,7 +63,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search ended with. best: the best gait; nearest: the best that keeps all limits but the speed asked for, if `best`
+    """What a search ended with. best: the best gait; nearest: the best that keeps all limits but the required speed, if `best`
     does not keep that; generations and rollouts: how many it took; others: that keep every limit, too, the best first."""
 
     best: Candidate
@@ -127,7 +127,7 @@ class _Run:
         return out[:self.budget.starts]
 
     def note_generation(self, candidates: list[Candidate]) -> None:
-        """After a generation: keeps the best, tells it."""
+        """After a generation: keeps the best, reports it."""
         self._note(candidates)
         self.generation += 1
         assert self.best is not None
@@ -162,7 +162,7 @@ class _Run:
         return tuple(c for c in sorted(self._good, key=Candidate.rank) if c is not self.best)[:self.budget.finalists - 1]
 
     def hopeless(self) -> bool:
-        """Whether the speed asked for is far from what was found."""
+        """Whether the required speed is far from what was found."""
         asked, found = self.evaluator.request.speed, self.nearest or self.best
         if asked is None or found is None or found.nominal is None:
             return False
@@ -254,7 +254,7 @@ def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> 
 
 
 def _straight(request: Request, c: Candidate, before: Candidate | None) -> float:
-    """The `turn` with which a gait should not turn more than asked, from one run of it or two."""
+    """The `turn` with which a gait should not turn more than required, from one run of it or two."""
     assert c.nominal is not None
     excess = excess_turning(request, c.nominal)
     if before is not None and before.nominal is not None and not before.nominal.fell:

@@ -26,7 +26,7 @@ HALF = 0.5
 @dataclass(frozen=True, eq=False)
 class GaitTable:
     """A gait as the firmware plays it. cycle: the poses that repeat. start: from neutral into the cycle. stop: from the cycle's
-    end to neutral. reach: (P, F) [m] how far the feet of `cycle` stay from the path asked for. asked: (P, n) [rad] the angles
+    end to neutral. reach: (P, F) [m] how far the feet of `cycle` stay from their path. asked: (P, n) [rad] the angles
     that the joints should have at the poses."""
 
     shape: GaitShape
@@ -84,8 +84,8 @@ def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
 
 def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tuple[int, int] = GENTLY, led: bool = True
              ) -> GaitTable:
-    """`gait_table` of paths that are known. led: whether goals are ahead of the angles by what the inverse servo law asks; that
-    takes most of the time, and no path that feet cannot reach is worth it."""
+    """`gait_table` of paths that are known. led: whether goals are ahead of the angles by what the inverse servo law requires;
+    that takes most of the time, and no path that feet cannot reach is worth it."""
     shape, q, small, stand = paths.shape, paths.q, paths.small, paths.stand
     goals = _within(machine, q, q + shape.lead * machine.droop(shape, q, paths.stance)) if led and shape.lead else q
     dwells = _dwells(shape)
@@ -100,7 +100,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tup
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
-    """Goals no farther than joints turn, unless the path itself is: what is asked beyond the angles ends there."""
+    """Goals no farther than joints turn, unless the path itself is: what is commanded beyond the angles ends there."""
     lower, upper = machine.bounds
     half = np.array([u.count for u in machine.units]) / 2
     return np.clip(goals, np.minimum(q, lower + half), np.maximum(q, upper - half))

@@ -128,7 +128,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     progress("judging the engine", None)
     apart = {BESIDE_DRAKE.format("nominal"): judged(evaluator, session.model, "nominal")}
 
-    # 2. The gap: where, when and in which layer they leave the nominal model
+    # 2. The gap: where, when and in which layer they differ from the nominal model
     gap = ledger(seen.evidence, nominal.residuals)
 
     # 3. What is read off without a search: geometry, the servos' registers, commands that never arrived, stops, mounts, frames

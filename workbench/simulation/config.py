@@ -61,7 +61,7 @@ class SimulationConfig:
 
     @property
     def uses_cenic(self) -> bool:
-        """Drake's CENIC steps the plant: friction is implicit, and contact forces between steps cannot be asked for (Drake
+        """Drake's CENIC steps the plant: friction is implicit, and contact forces between steps cannot be computed (Drake
         1.51 aborts)."""
         return self.time_step == 0 and self.integrator == "cenic"
 

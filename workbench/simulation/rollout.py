@@ -50,8 +50,8 @@ class BaseState(NamedTuple):
 class Start(NamedTuple):
     """State of the robot at the first command: angles q and velocities v (n,) [rad, rad/s] in the model's order of joints.
 
-    logged: the servos' own, as their sensors tell them (a log's), else the links'. base: where a free base is and how it moves.
-    reference: (n,) [rad] where the servos' ramps are; None: `first_reference`."""
+    logged: the servos' own, as their sensors measure them (a log's), else the links'. base: where a free base is and how it
+    moves. reference: (n,) [rad] where the servos' ramps are; None: `first_reference`."""
 
     q: Array
     v: Array

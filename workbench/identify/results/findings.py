@@ -173,8 +173,8 @@ class Rejected:
 
 @dataclass(frozen=True)
 class GapEntry:
-    """Where, when and in which layer a recording leaves the nominal model. when: spans of the take's clock [s]. phase: of the
-    gait, empty where there is none. error, floor: RMS there, and of noise and numerics, in `unit`."""
+    """Where, when and in which layer a recording differs from the nominal model. when: spans of the take's clock [s]. phase: of
+    the gait, empty where there is none. error, floor: RMS there, and of noise and numerics, in `unit`."""
 
     layer: Layer
     where: tuple[str, ...]

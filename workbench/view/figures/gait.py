@@ -1,4 +1,4 @@
-"""A certified gait as figures: how near each limit is, and what robots nobody measured make of it."""
+"""A certified gait as figures: how near each limit is, and how it goes on random variants of the robot."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def show(subject: object, meshcat: Meshcat | None = None) -> Meshcat:
     """Puts a RobotModel, or a Session's first take, into Meshcat and returns it; `.web_url()` says where it is to be seen.
 
     meshcat: where to; None: a server of its own, on the first free port from 7000 on, while this process lives. A take of your
-    own is shown by `workbench.view.scene.live.show_take`, which is told whose it is. InputError for anything else.
+    own is shown by `workbench.view.scene.live.show_take`, which takes the model. InputError for anything else.
     """
     raise InputError(None, f"show: expected a RobotModel or a Session, got {type(subject).__name__}")
 
