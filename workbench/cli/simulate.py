@@ -19,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
-    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="walking, or held level on a stand")
+    parser.add_argument("--base", choices=("free", "fixed"), help="walking, or held level on a stand (default: as in the takes "
+                        "of the session that the model is of, else free)")
     parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
                         help="full servo law; its fast approximation; joints that follow the motion exactly")
     parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often the motion is played (default: 1)")
@@ -43,11 +44,12 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.scene.replay import write_replay
 
     model = load_model(args.model, args.packages)
-    model.check_base(floating=args.base == "free")
+    base = args.base or model.usual_base
+    model.check_base(floating=base == "free")
     motion = load_motion(args.motion, model)
     check_model("simulate", model)
     check_motion("simulate", motion, args.cycles, args.yes)
-    config = SimulationConfig(time_step=args.time_step, base=args.base, drive=args.drive, contact=args.contact)
+    config = SimulationConfig(time_step=args.time_step, base=base, drive=args.drive, contact=args.contact)
     with output_directory(args.out) as folder, Progress("simulate", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
         progress("writing")

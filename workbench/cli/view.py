@@ -19,7 +19,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "A file that opens without a server is what `simulate` writes: replay.html.")
     parser.add_argument("subject", metavar="MODEL|TAKE|SESSION")
     parser.add_argument("--take", metavar="NAME", help="which take of a session (default: its first)")
-    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of a recording or motion (default: free)")
+    parser.add_argument("--base", choices=("free", "fixed"),
+                        help="of a recording or motion (default: as the model's takes, else free)")
     parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="how often a motion is played (default: 3)")
     parser.add_argument("--port", type=positive, metavar="N", help="of the server (default: the first free one from 7000 on)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="end by itself after that long")
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
         elif subject == "model":
             meshcat = show(model, open_meshcat(args.port))
         else:
-            take = take_of(args.subject, model, args.base, args.cycles, progress)
+            take = take_of(args.subject, model, args.base or model.usual_base, args.cycles, progress)
             meshcat = show_take(model, take, meshcat=open_meshcat(args.port))
     print(f"open {meshcat.web_url()} (Ctrl-C ends)", flush=True)
     until = time.monotonic() + (args.seconds or float("inf"))

@@ -55,8 +55,7 @@ def session_problems(session: Session) -> list[str]:
 def session_check(session: Session) -> SessionCheck:
     """What is doubtful in a session: its robot, its servos, each of its takes and predictions, every file of them read and
     checked against the robot. A damaged take, which the verbs leave out, is one of them."""
-    held = all(base == "fixed" for base in [*(t.base for t in session.takes), *(p.base for p in session.predict)])
-    found: dict[str, list[str]] = {"robot": model_problems_of(session.model, held)}
+    found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
     seconds = {"": 0.0}
     damaged = set()
     for of, entries in (("take", session.takes), ("predict", session.predict)):
@@ -90,9 +89,9 @@ def _no_yaw(session: Session) -> str | None:
     return None
 
 
-def model_problems_of(model: RobotModel, held: bool = False) -> list[str]:
-    """What is doubtful in a robot's description, its servos' constants and its effects, a line each. held: its base is."""
-    out = list(model.held_problems if held else model.problems)
+def model_problems_of(model: RobotModel) -> list[str]:
+    """What is doubtful in a robot's description, its servos' constants and its effects, a line each."""
+    out = list(model.held_problems if model.held else model.problems)
     doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
     out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
     given = set(model.servos)

@@ -45,7 +45,7 @@ def forces_of_file(path: str | Path, model: RobotModel, base: Base = "free", cyc
         progress("inverse dynamics", None)
         return InverseDynamics(model, "fixed").of_motion(motion, cycles)
     model.check_base(floating=True)
-    simulation = Simulation(model, SimulationConfig(drive="ideal"))
+    simulation = Simulation(model, SimulationConfig(base="free", drive="ideal"))
     take = play_motion(simulation, motion, cycles, progress=lambda done: progress("simulating ideal joints", done))
     progress("inverse dynamics", None)
     return inverse_dynamics(model, take)

@@ -110,6 +110,7 @@ def load_session(path: str | Path) -> Session:
                 raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
     if not takes and not predict:
         raise top.error("takes", "expected at least one take")
+    model = model.with_held(all(base == "fixed" for base in [*(t.base for t in takes), *(p.base for p in predict)]))
     return Session(path, model, takes, predict, registers=None if registers is None else load_registers(registers, model),
                    yaw=None if yaw is None else math.radians(yaw))
 
@@ -161,9 +162,9 @@ def _entry_name(f: Fields) -> str:
 
 
 def _base(f: Fields, model: RobotModel) -> Base:
-    """free or fixed; where the take does not say: free, unless the SDF itself holds the robot."""
+    """free or fixed; where the take does not say: as the robot usually is."""
     said = f.text("base", choices=("free", "fixed"))
-    base: Base = "fixed" if said == "fixed" or (said is None and model.kinematics.fixed_to_world) else "free"
+    base: Base = model.usual_base if said is None else "fixed" if said == "fixed" else "free"
     try:
         model.check_base(floating=base == "free")
     except InputError as e:

@@ -30,7 +30,7 @@ SECONDS, CYCLES = 2.0, 2
 which over half a metre would be told as drift."""
 LEAD = 0.03
 """At rest before the first command [s], by which feet that stand are told from feet that do not."""
-SEARCH = SimulationConfig(time_step=2e-3, contact_period=0.0, log_period=0.01)
+SEARCH = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_period=0.01)
 """While searching: 2 ms and 1 ms agree to a hundredth in speed."""
 
 

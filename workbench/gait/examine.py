@@ -76,7 +76,7 @@ class Examiner:
 
     def nominal(self) -> tuple[Take, GaitMeasure, FeetMeasure]:
         """The nominal robot in Drake, with contact forces."""
-        config = SimulationConfig(time_step=self.options.step, engine="drake")
+        config = SimulationConfig(base="free", time_step=self.options.step, engine="drake")
         (take,) = simulate_batch([self._job(self.model, config, self.options.seconds, "optimised gait")])
         return take, *self._measured(take, self.model)
 
@@ -84,7 +84,7 @@ class Examiner:
         """In and out: a run of start, some cycles, stop, and a second at rest."""
         cycles = max(2, math.ceil(1.0 / self.table.period))
         commands = self.table.commands(cycles, whole=True)
-        job = Job(self.model, SimulationConfig(time_step=self.options.step), commands, commands.end + 1.0, LEAD,
+        job = Job(self.model, SimulationConfig(base="free", time_step=self.options.step), commands, commands.end + 1.0, LEAD,
                   name="in and out")
         (take,) = simulate_batch([job])
         assert take.p_WB is not None
@@ -106,14 +106,14 @@ class Examiner:
 
     def robots(self, robots: Sequence[RobotModel]) -> list[Measured | None]:
         """Robots of the ensemble, by the compiled station; None for one that lay on the floor or tripped over itself."""
-        config = SimulationConfig(time_step=self.options.step, contact_period=0.0, log_period=0.01)
+        config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
         takes = Rollouts(1).takes([self._job(r, config, self.options.draw_seconds) for r in robots])
         return [None if take is None else self._measured(take, robot) for take, robot in zip(takes, robots)]
 
     def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
         """One of them by the compiled station and by Drake, at the same step."""
         o = self.options
-        config = SimulationConfig(time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
+        config = SimulationConfig(base="free", time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
         (take,) = Rollouts(1).takes([self._job(robot, config, o.checked_seconds)])
         (again,) = simulate_batch([self._job(robot, replace(config, engine="drake"), o.checked_seconds)])
         ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot)[0]
@@ -121,7 +121,7 @@ class Examiner:
 
     def variant(self, name: str) -> GaitMeasure:
         """The nominal robot, computed in another way: one of VARIANTS."""
-        config = replace(SimulationConfig(contact_period=0.0, log_period=0.01), **VARIANTS[name])
+        config = replace(SimulationConfig(base="free", contact_period=0.0, log_period=0.01), **VARIANTS[name])
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
         return self._measured(take, self.model)[0]
 

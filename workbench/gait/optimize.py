@@ -186,7 +186,7 @@ def robotis_walk(model: RobotModel) -> GaitMeasure:
         motion = load_motion(data_file(WALK), model)
     except InputError:
         raise InputError(None, "the ROBOTIS walk is not for this robot; expected a speed (--speed V)") from None
-    take = simulate_batch([Job(model, SimulationConfig(), motion.commands(13), 6.0)])[0]
+    take = simulate_batch([Job(model, SimulationConfig(base="free"), motion.commands(13), 6.0)])[0]
     return measure(take, model, motion.duration, motion.duration)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import yaml
 
@@ -60,8 +60,9 @@ class RobotModel:
     description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
     constants by joint (AX-12A where none are given). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID
     by joint. feet: links that stand on the ground; None: the last link with a collision shape on each branch (robot/feet.py).
-    packages: folder of each ROS package that the description's meshes name. InputError where the description is wanted for the
-    base's default and cannot be read.
+    packages: folder of each ROS package that the description's meshes name. held: its base was held in all its takes, and
+    is where a simulation is not told otherwise. InputError where the description is wanted for the base's default, and cannot be
+    read.
     """
 
     description: str
@@ -73,6 +74,7 @@ class RobotModel:
     effects: tuple[EffectSpec, ...] = ()
     feet: tuple[str, ...] | None = None
     packages: Mapping[str, str] = field(default_factory=dict)
+    held: bool = False
 
     def __post_init__(self) -> None:
         if not self.base:
@@ -105,6 +107,11 @@ class RobotModel:
         return Kinematics.from_file(self.path)
 
     @property
+    def usual_base(self) -> Literal["free", "fixed"]:
+        """How its base is where nobody says it: fixed of a robot that was always held, or that its file mounts on the world."""
+        return "fixed" if self.held or self.kinematics.fixed_to_world else "free"
+
+    @property
     def joints(self) -> tuple[str, ...]:
         """Names of the actuated joints, alphabetical (the thesis's order)."""
         return self.kinematics.joints
@@ -128,7 +135,13 @@ class RobotModel:
 
     def with_physics(self, servos: Mapping[str, ServoConstants], effects: Sequence[EffectSpec]) -> RobotModel:
         """As `with_effects`, with these servos, too."""
-        other = replace(self, servos=servos, effects=tuple(effects))
+        return self._sharing(replace(self, servos=servos, effects=tuple(effects)))
+
+    def with_held(self, held: bool) -> RobotModel:
+        """The same robot, its base usually held, or not."""
+        return self if held == self.held else self._sharing(replace(self, held=held))
+
+    def _sharing(self, other: RobotModel) -> RobotModel:
         vars(other).update({k: v for k, v in vars(self).items() if k in ("source", "kinematics", "foot_links")})
         return other
 

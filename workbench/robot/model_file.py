@@ -95,6 +95,8 @@ def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
         robot["packages"] = {name: str(Path(place).resolve()) for name, place in model.packages.items()}
     if model.feet is not None:
         robot["feet"] = list(model.feet)
+    if model.held:
+        robot["held"] = True
     return {"robot": robot, "ground": {k: v for k, v in asdict(model.ground).items() if v is not None}}
 
 

@@ -36,9 +36,10 @@ def read_model(top: Fields) -> RobotModel:
     ids = _bus_ids(f, joints)
     feet = _feet(f, links)
     servos = read_servos(f, joints)
+    held = f.flag("held")
     f.done()
     return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
-                   ground=ground or model.ground, feet=feet)
+                   ground=ground or model.ground, feet=feet, held=held)
 
 
 def _ground(f: Fields | None) -> Ground | None:

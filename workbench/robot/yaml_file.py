@@ -176,6 +176,13 @@ class Fields:
             raise self.error(key, f"expected a whole number{_bounds(least, most)}, got {_show(value)}")
         return value
 
+    def flag(self, key: str) -> bool:
+        """true or false; false where the key is absent."""
+        value = self.raw(key)
+        if value is not None and not isinstance(value, bool):
+            raise self.error(key, f"expected true or false, got {_show(value)}")
+        return bool(value)
+
     def file(self, key: str) -> Path | None:
         """A file that exists, relative to the YAML file's folder."""
         name = self.text(key)

@@ -1,11 +1,11 @@
 """Every choice of a simulation, in one typed place."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
-from workbench.robot import InputError
+from workbench.robot import InputError, RobotModel
 from workbench.robot.option_checks import check_choice
 
-BASES = ("free", "fixed", "path")
+BASES = ("auto", "free", "fixed", "path")
 DRIVES = ("servo", "fast_servo", "ideal", "playback")
 CONTACTS = ("point", "hydroelastic")
 APPROXIMATIONS = ("lagged", "sap", "similar")
@@ -19,7 +19,8 @@ class SimulationConfig:
     time_step [s]: of the discrete plant; 0: continuous, stepped by `integrator` ("runge_kutta3", "implicit_euler", "cenic",
     … as in Drake's GetIntegrationSchemes) to `accuracy`. approximation: Drake's of discrete contact, "lagged", "sap" or
     "similar". base: "free", "fixed" (held
-    level, clear of the ground), or "path" (moved along a recorded path). drive: "servo" (the full law), "fast_servo"
+    level, clear of the ground), "path" (moved along a recorded path), or "auto" (`RobotModel.usual_base`).
+    drive: "servo" (the full law), "fast_servo"
     (Drake's implicit PD; see fast_servo.py), "ideal" (joints follow a trajectory, torques result), "playback" (poses of a
     recording, no dynamics). contact: "point" or "hydroelastic". hydroelastic_modulus [Pa]: of feet that are given no
     hydroelastic shape by the SDF. settle [s]: time in which the robot comes to rest in neutral. log_period [s]: of what is
@@ -30,7 +31,7 @@ class SimulationConfig:
     """
 
     time_step: float = 1e-3
-    base: str = "free"
+    base: str = "auto"
     drive: str = "servo"
     contact: str = "point"
     approximation: str = "lagged"
@@ -46,6 +47,10 @@ class SimulationConfig:
 
     def __post_init__(self) -> None:
         self.check()
+
+    def of(self, model: RobotModel) -> "SimulationConfig":
+        """The same with the robot's usual base in place of "auto"."""
+        return self if self.base != "auto" else replace(self, base=model.usual_base)
 
     def check(self) -> None:
         """InputError names a field out of range; called again when a station is made, as loaders and callers may set fields."""

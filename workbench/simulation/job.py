@@ -34,3 +34,6 @@ class Job:
     start: Start | tuple[Array, Array] | None = None
     elapsed: float = 0.0
     steadied: BaseStates | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "config", self.config.of(self.model))

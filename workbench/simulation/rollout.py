@@ -74,7 +74,7 @@ class Simulation:
         from workbench.simulation.station import MakeStation
 
         self.model = model
-        self.config = config or SimulationConfig()
+        self.config = (config or SimulationConfig()).of(model)
         self.diagram = MakeStation(model, self.config)
         self.plant = self.diagram.plant()
         self.context: Context = self.diagram.CreateDefaultContext()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
 from pydrake.common.value import Value
+from pydrake.geometry import Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
@@ -48,7 +50,7 @@ def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> Ro
     drives "fast_servo" and "ideal" follow), "base_path" (base "path"), and logs named after the port they write down:
     "state_log", "net_actuation_log", "reference_log".
     """
-    config = config or SimulationConfig()
+    config = (config or SimulationConfig()).of(model)
     config.check()
     physics = physics_of(model)
     _check_ends(config, physics)
@@ -56,6 +58,7 @@ def MakeStation(model: RobotModel, config: SimulationConfig | None = None) -> Ro
     builder = RobotDiagramBuilder(time_step=config.time_step)
     plant = builder.plant()
     instance = _add_model(builder, model, physics)
+    _warn_of_no_shape(builder, instance, model, config)
     _steady_springs(plant, physics)
     plant.mutable_gravity_field().set_gravity_vector(physics.gravity)
     if config.time_step > 0:
@@ -103,6 +106,15 @@ def _add_model(builder: RobotDiagramBuilder, model: RobotModel, physics: Physics
         if physics.description is not None:
             return parser.AddModelsFromString(physics.description, "sdf")[0]
         return parser.AddModels(str(model.path))[0]
+
+
+def _warn_of_no_shape(builder: RobotDiagramBuilder, instance: ModelInstanceIndex, model: RobotModel, config: SimulationConfig
+                      ) -> None:
+    plant, inspector = builder.plant(), builder.scene_graph().model_inspector()
+    frames = [plant.GetBodyFrameIdOrThrow(b) for b in plant.GetBodyIndices(instance)]
+    if config.base == "free" and not any(inspector.NumGeometriesForFrameWithRole(f, Role.kProximity) for f in frames):
+        warnings.warn(f"{model.description}: no link has a collision shape, so this robot falls through the ground; expected "
+                      "shapes, or SimulationConfig(base=\"fixed\")", stacklevel=3)
 
 
 def _feet(model: RobotModel, friction: Mapping[str, float]) -> dict[str, float]:

@@ -68,7 +68,7 @@ def _vendor_walk(model: RobotModel, seconds: float) -> tuple[Take, GaitMeasure] 
     except InputError:
         return None
     commands = motion.commands(math.ceil(seconds / motion.duration))
-    take = simulate_batch([Job(model, SimulationConfig(), commands, seconds, 0.3, name="ROBOTIS walk")])[0]
+    take = simulate_batch([Job(model, SimulationConfig(base="free"), commands, seconds, 0.3, name="ROBOTIS walk")])[0]
     return take, measure(take, model, motion.duration, motion.duration)
 
 
