@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
+from numbers import Integral, Real
 from typing import Any
 
 from workbench.robot.errors import InputError
@@ -19,7 +19,7 @@ def check_whole(options: Any, **least: int) -> None:
     """InputError where a field of `options` is not a whole number of at least so much."""
     for name, bound in least.items():
         value = getattr(options, name)
-        if isinstance(value, bool) or value != int(value) or value < bound:
+        if isinstance(value, bool) or not isinstance(value, Integral) or value < bound:
             raise InputError(None, f"{name}: expected a whole number of at least {bound}, got {value!r}")
 
 
@@ -27,5 +27,5 @@ def check_positive(options: Any, *names: str) -> None:
     """InputError where a field of `options` is not a positive number; infinity is one."""
     for name in names:
         value = getattr(options, name)
-        if isinstance(value, bool) or math.isnan(value) or value <= 0:
+        if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0:
             raise InputError(None, f"{name}: expected a positive number, got {value!r}")

@@ -267,7 +267,7 @@ def _unseen(takes: Sequence[TakeReport]) -> Section:
     parts += [Picture(body_path(s.fitted, s.recorded, {"nominal": s.nominal}),
                       f"{s.name}: the body's path as measured, and simulated with what was found and without (nominal).")
               for s in takes if _walks(s)]
-    return Section("Before and after, on what nothing saw", parts)
+    return Section("Before and after, on unseen stretches", parts)
 
 
 def _walks(take: TakeReport) -> bool:
@@ -282,9 +282,9 @@ def _left(diagnosis: Diagnosis) -> Section:
         return Section("What is left", [Text("Nothing beyond what noise, numerics and chance make." if nothing else
                                              "What is still beyond the green band above is not explained yet.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
-    header = ["what is still off", "take", "by", "over noise", "and it goes"]
+    header = ["what is still off", "take", "by", "over noise", "and it varies"]
     off = [left_row(u) for u in order if is_error(u)]
-    still = [Text("On stretches that nothing saw, the fitted model is still off by more than noise and numerics make (1×). No "
+    still = [Text("On unseen stretches the fitted model is still off by more than noise and numerics make (1×). No "
                   "effect that was tried explains it."), *folded(header, off, "more")] if off else []
     return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
