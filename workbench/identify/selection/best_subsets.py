@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -35,14 +36,25 @@ class Response:
 
     def sizes(self, share: Array) -> Array:
         """With these shares (k,) of the points, as far as they may go."""
-        low, high = self.trial.candidate.bounds()
-        shapes = self.trial.candidate.shapes
-        return np.clip(np.where(shapes, self.points[0], share @ self.points), low, high)
+        low, high = self._bounds
+        return np.minimum(np.maximum(np.where(self.shapes, self.points[0], share @ self.points), low), high)
 
     def shares(self, x: Array) -> Array:
         """The shares of the points that make these sizes."""
-        makes = ~self.trial.candidate.shapes
-        return np.asarray(np.linalg.lstsq(self.points[:, makes].T, x[makes], rcond=None)[0], dtype=float)
+        return self._inverse @ x[~self.shapes]
+
+    @cached_property
+    def shapes(self) -> NDArray[np.bool_]:
+        """Of the sizes, those that only shape the effect; asked for in every set, as are its bounds."""
+        return self.trial.candidate.shapes
+
+    @cached_property
+    def _bounds(self) -> tuple[Array, Array]:
+        return self.trial.candidate.bounds()
+
+    @cached_property
+    def _inverse(self) -> Array:
+        return np.asarray(np.linalg.pinv(self.points[:, ~self.shapes].T), dtype=float)
 
 
 def subsets_for(
@@ -137,7 +149,7 @@ class _NormalEquations:
 
 def possible(s: Response, x: Array) -> bool:
     """Whether an effect is there at all, at these sizes."""
-    return bool(np.abs(x[~s.trial.candidate.shapes]).max(initial=0.0) > 0)
+    return bool(np.abs(x[~s.shapes]).max(initial=0.0) > 0)
 
 
 def worst_joint(beyond: dict[str, float]) -> str | None:
