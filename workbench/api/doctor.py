@@ -6,7 +6,7 @@ import os
 import platform
 import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import workbench
+from workbench.robot.errors import InputError
+from workbench.robot.plug_ins import installed
 
 State = Literal["ok", "missing", "broken"]
 MEMORY_GB, DISK_GB = 4.0, 1.0
@@ -67,7 +69,7 @@ def examine(defaults: Path) -> Health:
         lambda: _package("scipy", "scipy", True, "pip install scipy"),
         lambda: _package("numba", "numba", False, "pip install numba: compiled rollouts, which fits use"),
         lambda: _package("mujoco", "mujoco", False, "pip install 'mujoco[sysid]': the second engine of studies and certificates"),
-        _cores, _memory, _disk, _compiled, _meshcat, _completion, lambda: _defaults(defaults))
+        _cores, _memory, _disk, _compiled, _meshcat, _completion, _effects, _formats, _servos, lambda: _defaults(defaults))
     return Health((Check("workbench", "ok", f"{workbench.__version__} in {Path(workbench.__file__).parent}"),
                    *(look() for look in looks)))
 
@@ -137,6 +139,34 @@ def _meshcat() -> Check:
     except Exception as e:  # Drake says why in many ways
         return Check("Meshcat", "missing", " ".join(str(e).split())[:120], "free a port from 7000 on, or use --port")
     return Check("Meshcat", "ok", f"serves at {url}")
+
+
+def _effects() -> Check:
+    from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
+
+    return _extensible("effects", ENTRY_POINT_GROUP, known_effects)
+
+
+def _formats() -> Check:
+    from workbench.recording.formats.registry import ENTRY_POINT_GROUP, known_formats
+
+    return _extensible("recording formats", ENTRY_POINT_GROUP, lambda: [f.name for f in known_formats()])
+
+
+def _servos() -> Check:
+    from workbench.robot.servo_profile_file import ENTRY_POINT_GROUP, servo_profiles
+
+    return _extensible("servo families", ENTRY_POINT_GROUP, servo_profiles)
+
+
+def _extensible(name: str, group: str, known: Callable[[], Collection[str]]) -> Check:
+    """All that is known of a kind, by name, and which packages add to it."""
+    added = [f"{entry} from package {package}" for entry, package in installed(group).items()]
+    try:
+        names = sorted(known())
+    except InputError as e:
+        return Check(name, "broken", str(e), "mend that package, or uninstall it")
+    return Check(name, "ok", f"{len(names)}: {', '.join(names)}; plug-ins: {', '.join(added) or 'none'}")
 
 
 def _completion() -> Check:

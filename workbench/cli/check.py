@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -20,9 +21,9 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
                         help="simulate that long (required beyond ten minutes of the robot's time)")
 
 
-def check_session(verb: str, session: Session, yes: bool = True) -> None:
-    """Warns of a session's problems; InputError where its takes cannot be used together, or where one lasts so long that it is
-    mostly a slip, unless `yes`."""
+def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
+    """Warns of a session's problems, and returns the names of the takes of which it said that they are left out; InputError where
+    its takes cannot be used (together), or where one lasts so long that it is mostly a slip, unless `yes`."""
     from workbench.compare.file_problems import session_check
     from workbench.robot import InputError
 
@@ -31,6 +32,14 @@ def check_session(verb: str, session: Session, yes: bool = True) -> None:
     if found.refused:
         raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
+    return frozenset(t.name for t in session.takes if f"take '{t.name}'" in found.damaged)
+
+
+def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:
+    """Names the takes that were left out and why, but for those of which it was `told` before the work."""
+    for name, reason in left_out:
+        if name not in told:
+            print(f"workbench {verb}: warning: take '{name}' left out: {reason}", file=sys.stderr)
 
 
 def check_model(verb: str, model: RobotModel) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from workbench.cli.check import add_yes, check_files, check_session
+from workbench.cli.check import add_yes, check_files, check_session, say_left_out
 from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
 
 STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
@@ -43,12 +42,13 @@ def run(args: argparse.Namespace) -> int:
     from workbench.view.report.comparison import write_comparison
 
     config = SimulationConfig(contact=args.contact, engine="drake")
+    told: frozenset[str] = frozenset()
     with output_directory(args.out, need=16 << 20) as folder, Progress("compare", stages=STAGES) as progress:
         if args.b is None:
             session = load_session(args.a)
             if args.model != PUPPY:
                 session = session.with_model(load_model(args.model, args.packages))
-            check_session("compare", session, args.yes)
+            told = check_session("compare", session, args.yes)
             result = compare_session(session, config, progress=progress, jobs=args.jobs)
             comparison, written = result.comparison, result.save(folder, progress)
         else:
@@ -58,7 +58,6 @@ def run(args: argparse.Namespace) -> int:
                                        n_jobs=args.jobs)
             written = write_comparison(comparison, model, folder, f"{args.a} and {args.b}", progress)
     print(comparison.table())
-    for name, reason in comparison.left_out:
-        print(f"workbench compare: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    say_left_out("compare", comparison.left_out, told)
     print(f"wrote {args.out}: {', '.join(path.name for path in written)}")
     return 0

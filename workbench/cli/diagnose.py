@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from workbench.cli.check import add_yes, check_session
+from workbench.cli.check import add_yes, check_session, say_left_out
 from workbench.cli.options import add_out, positive
 
 if TYPE_CHECKING:
@@ -49,14 +49,13 @@ def run(args: argparse.Namespace) -> int:
     from workbench.compare.session import load_session
 
     session = load_session(args.session)
-    check_session("diagnose", session, args.yes)
+    told = check_session("diagnose", session, args.yes)
     with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
           rollout_memory(args.out, session, args.memory) as memory):
         result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory, tuple(args.without)), progress=progress)
         paths = result.save(folder, progress, args.jobs)
     diagnosis = result.diagnosis
-    for name, reason in diagnosis.left_out:
-        print(f"workbench diagnose: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    say_left_out("diagnose", diagnosis.left_out, told)
     if diagnosis.stopped:
         print("workbench diagnose: the search stopped at its limit of work; --thorough searches to the end", file=sys.stderr)
     print(f"verdict: {diagnosis.verdict}")

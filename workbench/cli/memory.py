@@ -25,8 +25,8 @@ STAYS = 16
 @contextmanager
 def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> Iterator[Path]:
     """A folder beside `out` for rollouts of this session, the same for the same files and versions; left where the block is
-    interrupted or fails, gone once it ends well, and with it what other versions left there. kept_in: a folder that stays,
-    in its place."""
+    interrupted or has a defect, gone once it ends well (with what other versions left there), or its input is refused. kept_in: a
+    folder that stays, in its place."""
     if kept_in is not None:
         try:
             Path(kept_in).mkdir(parents=True, exist_ok=True)
@@ -47,8 +47,11 @@ def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> I
             part.unlink(missing_ok=True)
     try:
         yield folder
+    except InputError:
+        shutil.rmtree(folder, ignore_errors=True)  # the same input would be refused again
+        raise
     except OSError as e:
-        if not isinstance(e, InputError) and e.filename is None and e.errno in (None, errno.ENOSPC, errno.EDQUOT):
+        if e.filename is None and e.errno in (None, errno.ENOSPC, errno.EDQUOT):
             shutil.rmtree(folder, ignore_errors=True)  # it would keep the disk full
             raise InputError(out, "the disk is full; what was worked out so far is cleared") from None
         raise

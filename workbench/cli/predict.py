@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
-from workbench.cli.check import add_yes, check_session
+from workbench.cli.check import add_yes, check_session, say_left_out
 from workbench.cli.options import add_out, add_packages, load_model, positive
 
 
@@ -37,11 +36,10 @@ def run(args: argparse.Namespace) -> int:
 
     session = load_session(args.session)
     model = session.model if args.model is None else load_model(args.model, args.packages)
-    check_session("predict", session, args.yes)
+    told = check_session("predict", session, args.yes)
     with output_directory(args.out) as folder, Progress("predict", stages=("finding", "simulating")) as progress:
         config = SimulationConfig(contact=args.contact, engine="drake")
         predicted = predict_session(session, model, folder, progress, config=config, n_jobs=args.jobs)
-    for name, reason in predicted.left_out:
-        print(f"workbench predict: warning: take '{name}' left out: {reason}", file=sys.stderr)
+    say_left_out("predict", predicted.left_out, told)
     print(f"wrote {args.out}: {', '.join(path.name for path in predicted.paths)}")
     return 0

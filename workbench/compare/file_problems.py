@@ -21,6 +21,7 @@ from workbench.recording.plausibility import beyond_range
 from workbench.recording.recording import Recording
 from workbench.recording.take_from import named_by_model
 from workbench.robot import InputError, RobotModel
+from workbench.robot.errors import MistypedError
 
 _ROUTINE = " unseen in "
 
@@ -29,7 +30,7 @@ _ROUTINE = " unseen in "
 class SessionCheck:
     """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
     damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves. refused: why no
-    verb can use the takes together."""
+    verb can use the takes, or not together, with the file's name."""
 
     problems: Mapping[str, Sequence[str]]
     longest: float
@@ -39,11 +40,14 @@ class SessionCheck:
 
     @property
     def warnings(self) -> list[str]:
-        """A line for each file with problems that are not routine, as gaps of cameras are."""
+        """A line for each file with problems that are not routine, as gaps of cameras are, damaged takes among them."""
         out = []
         for of, lines in self.problems.items():
-            bad = [] if of in self.damaged or (of == "takes" and self.refused) else serious(lines)
-            out += [f"{of}: {summed_up(bad)}"] if bad else []
+            bad = [] if of == "takes" and self.refused else serious(lines)
+            if of in self.damaged:
+                out += [f"{of} left out: {bad[0]}"] if of.startswith("take ") else []
+            elif bad:
+                out.append(f"{of}: {summed_up(bad)}")
         return out
 
 
@@ -57,7 +61,7 @@ def session_check(session: Session) -> SessionCheck:
     checked against the robot. A damaged take, which the verbs leave out, is one of them."""
     found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
     seconds = {"": 0.0}
-    damaged = set()
+    damaged, mistyped = set(), ""
     for of, entries in (("take", session.takes), ("predict", session.predict)):
         for entry in entries:
             name = f"{of} '{entry.name}'"
@@ -69,7 +73,10 @@ def session_check(session: Session) -> SessionCheck:
             except InputError as e:
                 found[name] = [str(e)]
                 damaged.add(name)
-    refused = _no_yaw(session) if any(f"take '{t.name}'" not in damaged for t in session.takes) else None
+                if isinstance(e, MistypedError):
+                    mistyped = mistyped or f"{session.path}: {name}: {e}"
+    usable = not mistyped and any(f"take '{t.name}'" not in damaged for t in session.takes)
+    refused = _no_yaw(session) if usable else None
     if refused:
         found["takes"] = [refused]
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
@@ -77,7 +84,7 @@ def session_check(session: Session) -> SessionCheck:
                             "the start, to some degrees; give the session's `yaw` [deg], or a captured take"]
     longest = max(seconds, key=lambda name: seconds[name])
     doubtful = {of: lines for of, lines in found.items() if lines}
-    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), refused)
+    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), mistyped or refused)
 
 
 def _no_yaw(session: Session) -> str | None:

@@ -16,7 +16,7 @@ from workbench.recording.formats.read import recording_of_take
 from workbench.robot import InputError, RobotModel
 from workbench.robot.robot_section import read_model
 from workbench.robot.servo_registers import ServoRegisters, load_registers
-from workbench.robot.yaml_file import Fields, read_yaml
+from workbench.robot.yaml_file import Fields, top_of
 
 Base = Literal["free", "fixed"]
 
@@ -94,9 +94,7 @@ def load_session(path: str | Path) -> Session:
         if not (path / "session.yaml").exists():
             raise InputError(path, "expected a session file; this folder holds no session.yaml")
         path /= "session.yaml"
-    top = Fields(path, read_yaml(path))
-    if top.raw("format") != 1:
-        raise top.error("format", "expected 1")
+    top = top_of(path, "robot", "ground", "takes", "predict", "registers", "yaw")
     model = read_model(top)
     takes = tuple(_take(f, model) for f in top.sequence("takes"))
     predict = tuple(_predict(f, model) for f in top.sequence("predict"))
@@ -116,6 +114,7 @@ def load_session(path: str | Path) -> Session:
 
 
 def _take(f: Fields, model: RobotModel) -> TakeSpec:
+    f.only("name", "recording", "motion", "cycles", "base", "starts_at", "servos", "use")
     name = _entry_name(f)
     use = f.text("use", choices=("fit", "validate"))
     take = TakeSpec(
@@ -138,6 +137,7 @@ def _recording(f: Fields, take: str) -> Path:
 
 
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:
+    f.only("name", "motion", "cycles", "commands", "start", "starts_at", "frames", "base", "servos")
     spec = PredictSpec(
         name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1,
         commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),

@@ -25,6 +25,7 @@ from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
 from workbench.robot import InputError, RobotModel
+from workbench.robot.errors import MistypedError
 from workbench.simulation import Start
 
 Progress = Callable[[str, float | None], None]
@@ -84,13 +85,15 @@ class RegisteredTake(ReadTake):
 
 def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
     """All recordings of a session, and those left out with the reason. InputError where none remains, or where a recording has
-    an asset to which the session gives no link: that is the session's error, not a damaged take."""
+    an asset to which the session gives no link, or something was mistyped: that is an error, not a damaged take."""
     read: list[ReadTake] = []
     left: list[tuple[str, str]] = []
     for spec in session.takes:
         model = session.model_of(spec)
         try:
             recording = readable(spec.recording, model)
+        except MistypedError as e:
+            raise MistypedError(session.path, f"take '{spec.name}': {e}") from None
         except InputError as e:
             left.append((spec.name, str(e)))
             continue

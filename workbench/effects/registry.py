@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from workbench.effects.base import Effect, Estimator
+from workbench.effects.foreign import answering_for, check_effect
 from workbench.robot import InputError
 from workbench.robot.plug_ins import of_folder, with_plug_ins
 
@@ -17,7 +18,12 @@ def known_effects() -> dict[str, Effect]:
     import workbench.effects.library as room
 
     own = {effect.name: effect for effect in of_folder(room, "EFFECT", Effect)}
-    return with_plug_ins(own, ENTRY_POINT_GROUP, Effect, "effect", lambda effect: (effect.name, effect))
+    return with_plug_ins(own, ENTRY_POINT_GROUP, Effect, "effect", _checked)
+
+
+def _checked(effect: Effect, at: str) -> tuple[str, Effect]:
+    check_effect(effect)
+    return effect.name, answering_for(effect, at)
 
 
 def estimated_by(estimator: Estimator) -> tuple[Effect, ...]:
@@ -29,5 +35,6 @@ def effect_named(name: str) -> Effect:
     """The effect of that name; InputError lists the known ones."""
     effects = known_effects()
     if name not in effects:
-        raise InputError(None, f"effect '{name}' is not known; known: {', '.join(sorted(effects))}")
+        raise InputError(None, f"effect '{name}' is not known, or its package is not installed; known: "
+                               f"{', '.join(sorted(effects))}")
     return effects[name]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from workbench.recording.recording import Recording
 from workbench.robot import InputError, RobotModel
+from workbench.robot.errors import MistypedError
 
 SO101_JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
 """Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""
@@ -26,7 +27,7 @@ def named_by_model(recording: Recording, model: RobotModel) -> Recording:
         return _renamed(recording, recording.aliases)
     unknown = [j for j in joints if j not in model.joints]
     if unknown:
-        raise InputError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
+        raise MistypedError(recording.source, f"unknown joint '{unknown[0]}'; the model's are {', '.join(model.joints)}")
     return recording
 
 

@@ -23,3 +23,8 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str | None, str]]:
         return type(self), (self.source, self.problem)  # so that it comes back whole from another process
+
+
+class MistypedError(InputError):
+    """What a person wrote wrongly (an unknown joint, a word where a number belongs): a file with it is refused, not left out as
+    damaged."""

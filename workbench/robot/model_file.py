@@ -18,7 +18,7 @@ from workbench.robot.errors import InputError
 from workbench.robot.files import write_whole
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.robot_section import read_model, read_servos
-from workbench.robot.yaml_file import Fields, read_yaml, yaml_text
+from workbench.robot.yaml_file import Fields, top_of, yaml_text
 
 Array = NDArray[np.float64]
 
@@ -124,9 +124,7 @@ def load_model_file(path: str | Path) -> ModelFile:
     lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects package to say.
     """
     path = Path(path)
-    top = Fields(path, read_yaml(path))
-    if top.raw("format") != 1:
-        raise top.error("format", "expected 1")
+    top = top_of(path, "robot", "ground", "servos", "effects", "posterior", "provenance")
     model = read_model(top)
     model = replace(model, servos={**model.servos, **read_servos(top, model.joints)},
                     effects=tuple(_effect(f, model) for f in top.sequence("effects")))
@@ -138,6 +136,7 @@ def load_model_file(path: str | Path) -> ModelFile:
 
 
 def _effect(f: Fields, model: RobotModel) -> EffectSpec:
+    f.only("effect", "where", "parameters")
     name = str(f.required("effect", f.text("effect")))
     where = f.raw("where") or []
     places = {*model.joints, *model.kinematics.links, *model.rigid_bodies}
@@ -164,6 +163,7 @@ def _value(f: Fields, key: str, value: Any) -> float | tuple[float, float, float
 def _posterior(f: Fields | None, model: RobotModel) -> Posterior:
     if f is None:
         return Posterior()
+    f.only("names", "mean", "covariance")
     names, mean, covariance = (f.raw(key) for key in ("names", "mean", "covariance"))
     f.done()
     expected = list(parameter_names(model.effects))

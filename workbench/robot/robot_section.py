@@ -19,6 +19,7 @@ def read_model(top: Fields) -> RobotModel:
     """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected."""
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
+    f.only("model", "base", "servos", "rigid_bodies", "bus_ids", "feet", "held", "packages")
     packages = _packages(f)
     description = f.text("model", PUPPY) or PUPPY
     if not description.startswith("package://"):

@@ -133,6 +133,9 @@ class ServoConstants:
             v = getattr(self, name)
             if v is not None and v > likely:
                 out.append(f"{name}: {v:g} {unit} is more than any hobby servo has ({likely:g} {unit}); is it in {other}?")
+        if (power := self.stall_torque * self.no_load_speed) > STRONGEST:
+            out.append(f"stall_torque times no_load_speed: {power:.0f} W is more than any hobby servo "
+                       f"has ({STRONGEST:g} W); is the torque in kg cm (0.098 N m), or the speed in another unit than rad/s?")
         for name, (least, unit) in _LEAST.items():
             if (v := getattr(self, name)) < least:
                 out.append(f"{name}: {v:g} {unit} is less than any hobby servo has ({least:g} {unit}); is it in another unit?")
@@ -159,6 +162,8 @@ _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/
 _LEAST = {"stall_torque": (0.02, "N m"), "no_load_speed": (0.5, "rad/s"), "rated_voltage": (2.0, "V"),
           "supply_voltage": (2.0, "V")}
 """Servos of 2 g (0.05 N m), geared down to a turn in ten seconds, one cell."""
+STRONGEST = 75.0
+"""Stall torque times speed without load [W]: XH540 52, the strongest servos of model cars 66."""
 _POSITIVE = {"stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "compliance_slope", "proportional_gain"}
 
 

@@ -13,7 +13,7 @@ from workbench.robot.errors import InputError
 from workbench.robot.plug_ins import with_plug_ins
 from workbench.robot.resources import resource_dir
 from workbench.robot.servo_profile import LAW_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
-from workbench.robot.yaml_file import Fields, read_yaml
+from workbench.robot.yaml_file import Fields, top_of
 
 ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
@@ -26,9 +26,9 @@ _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_lim
 def load_profile(path: str | PurePath) -> ServoProfile:
     """Reads a profile; InputError names the file, the key and what was expected."""
     path = Path(path)
-    top = Fields(path, read_yaml(path))
-    if top.raw("format") != 1:
-        raise top.error("format", "expected 1")
+    top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
+                 "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
+                 "unlock", "watchdog", "marker")
     position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
     registers = _registers(_needed(top, "registers"))
     profile = ServoProfile(
@@ -63,7 +63,7 @@ def servo_profiles() -> Mapping[str, ServoProfile]:
     `workbench.servos` names the path of a profile."""
     shipped = map(load_profile, sorted((resource_dir("data") / "servos").glob("*.yaml")))
 
-    def named(path: PurePath) -> tuple[str, ServoProfile]:
+    def named(path: PurePath, at: str) -> tuple[str, ServoProfile]:
         profile = load_profile(path)
         return profile.name, profile
 

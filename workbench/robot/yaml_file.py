@@ -219,6 +219,12 @@ class Fields:
             raise self.error(key, f"expected a list, got {_show(value)}")
         return [Fields(self.path, v, f"{self.at(key)}[{i}]") for i, v in enumerate(value)]
 
+    def only(self, *keys: str) -> None:
+        """InputError at a key that is none of these: a misspelled one is told as such, and not as another that is missing."""
+        for key in self._left:
+            if key not in keys:
+                raise self.error(str(key), f"unknown key; expected one of {', '.join(keys)}")
+
     def required(self, key: str, value: Any) -> Any:
         """`value`, as taken from `key`, unless it was absent."""
         if value is None:
@@ -247,3 +253,15 @@ def _short(text: str) -> str:
 _UNNAMED = ' in "<unicode string>"'
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
+
+
+def top_of(path: Path, *keys: str) -> Fields:
+    """The file's keys, of which none is unknown; its `format` is 1."""
+    top = Fields(path, read_yaml(path))
+    said = top.raw("format")
+    if said is None:
+        top.only("format", *keys)
+    if said != 1:
+        raise top.error("format", "expected 1")
+    top.only(*keys)
+    return top

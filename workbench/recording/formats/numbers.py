@@ -15,6 +15,7 @@ from pyarrow import compute as arrow_compute
 from pyarrow import csv as arrow_csv
 
 from workbench.robot import InputError
+from workbench.robot.errors import MistypedError
 from workbench.robot.files import MOST_TEXT, regular_file
 from workbench.robot.numerals import number_of
 from workbench.robot.tables import HEAD, plain_table, split_row
@@ -69,18 +70,20 @@ def read_columns(source: str, content: Bytes, offset: int, lines: int, width: in
             convert_options=arrow_csv.ConvertOptions(column_types=types, include_columns=kept, null_values=_BLANK,
                                                      strings_can_be_null=True))
     except pa.ArrowInvalid as e:
-        raise InputError(source, _where_broken(content, offset, lines, width, text) or f"after line {lines}: {e}") from None
+        where = _where_broken(source, content, offset, lines, width, text)
+        raise where or InputError(source, f"after line {lines}: {e}") from None
     if table.num_rows == 0:
         raise InputError(source, f"line {lines + 1}: expected at least one row of data")
     for name, kind in types.items():
         column_of = table.column(name)
         if kind == pa.float64() and arrow_compute.any(arrow_compute.is_inf(column_of)).as_py():
-            where = _where_broken(content, offset, lines, width, text)
-            raise InputError(source, where or f"column {int(name) + 1}: expected finite numbers")
+            where = _where_broken(source, content, offset, lines, width, text)
+            raise where or InputError(source, f"column {int(name) + 1}: expected finite numbers")
     return table
 
 
-def _where_broken(content: Bytes, offset: int, lines: int, width: int, text: Collection[int]) -> str | None:
+def _where_broken(source: str, content: Bytes, offset: int, lines: int, width: int, text: Collection[int]
+                  ) -> InputError | None:
     """The first row that is not as wide as the header or not of numbers; looked for only once the fast reader has failed."""
     n = lines
     while offset < len(content):
@@ -93,10 +96,11 @@ def _where_broken(content: Bytes, offset: int, lines: int, width: int, text: Col
             continue
         if len(row) != width:
             cut = "; the file is cut mid-row" if last and len(row) < width else ""
-            return f"line {n}: {len(row)} of {width} columns{cut}"
+            return InputError(source, f"line {n}: {len(row)} of {width} columns{cut}")
         for i, cell in enumerate(row):
             if i not in text and cell not in _BLANK and number_of(cell) is None:
-                return f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'"
+                told = MistypedError if cell.strip().isalpha() else InputError
+                return told(source, f"line {n}, column {i + 1}: expected a number, got '{cell[:40]}'")
     return None
 
 

@@ -40,7 +40,7 @@ def known_formats() -> tuple[RecordingFormat, ...]:
     import workbench.recording.formats as room
 
     own = {known.name: known for known in of_folder(room, "FORMAT", RecordingFormat)}
-    found = with_plug_ins(own, ENTRY_POINT_GROUP, RecordingFormat, "format", lambda known: (known.name, known))
+    found = with_plug_ins(own, ENTRY_POINT_GROUP, RecordingFormat, "format", lambda known, at: (known.name, known))
     return tuple(sorted(found.values(), key=lambda f: (f.priority, f.name)))
 
 

@@ -1,0 +1,61 @@
+"""Effects of other packages: what they say of themselves is checked as they load, and what their hooks raise names them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any, get_args
+
+from workbench.effects.base import Effect, Estimator, Family, Layer, Parameter, Place
+from workbench.robot import InputError
+
+_WORDS = {"layer": Layer, "family": Family, "estimator": Estimator}
+HOOKS = tuple(name for name, value in vars(Effect).items() if callable(value) and not name.startswith("_"))
+
+
+def check_effect(effect: Effect) -> None:
+    """InputError names the class variable that is missing or wrong, and what was expected."""
+    problem = next(_problems(effect), None)
+    if problem is not None:
+        raise InputError(None, f"effect '{getattr(effect, 'name', type(effect).__name__)}': {problem}")
+
+
+def _problems(effect: Effect) -> Iterator[str]:
+    for key in ("name", "layer", "places"):
+        if not hasattr(effect, key):
+            yield f"{key}: is missing"
+    if not isinstance(effect.name, str) or not effect.name.isidentifier():
+        yield f"name: expected letters, digits and underscores, got {effect.name!r}"
+    for key, words in _WORDS.items():
+        said = getattr(effect, key)
+        if said not in get_args(words) and not (said is None and key != "layer"):
+            yield f"{key}: expected one of {', '.join(get_args(words))}, got {said!r}"
+    if not isinstance(effect.places, tuple) or not effect.places or not set(effect.places) <= set(get_args(Place)):
+        yield f"places: expected a tuple of some of {', '.join(get_args(Place))}, got {effect.places!r}"
+    if type(effect).sentence is Effect.sentence:
+        yield "sentence: is missing; expected a method that says what is different about this robot"
+    if not isinstance(effect.parameters, tuple) or not all(isinstance(p, Parameter) for p in effect.parameters):
+        yield f"parameters: expected a tuple of Parameter, got {effect.parameters!r}"
+    for p in effect.parameters:
+        if not p.low <= p.typical <= p.high or p.low == p.high or not p.si:
+            yield (f"parameter '{p.name}': expected low <= typical <= high, low < high, si not 0; got low {p.low:g}, "
+                   f"typical {p.typical:g}, high {p.high:g}, si {p.si:g}")
+    if len({p.name for p in effect.parameters}) < len(effect.parameters):
+        yield "parameters: expected names that differ"
+
+
+def answering_for(effect: Effect, at: str) -> Effect:
+    """The same effect; what its own hooks raise becomes an InputError that names `at`, the effect and the hook."""
+    for hook in HOOKS:
+        if getattr(type(effect), hook) is not getattr(Effect, hook):
+            object.__setattr__(effect, hook, partial(_called, effect, hook, at))
+    return effect
+
+
+def _called(effect: Effect, hook: str, at: str, *args: Any, **named: Any) -> Any:
+    try:
+        return getattr(type(effect), hook)(effect, *args, **named)
+    except (InputError, MemoryError):
+        raise
+    except Exception as e:  # whatever another's code does
+        raise InputError(None, f"{at}: effect '{effect.name}', hook {hook}: {type(e).__name__}: {e}") from e
