@@ -53,5 +53,5 @@ def resolve_model(description: str | Path) -> Path:
     else:
         path = Path(text)
     if not path.is_file():
-        raise InputError(text, "model file not found")
+        raise InputError(text, f"model file not found; expected {', '.join(ROBOTS)}, or a file")
     return path.resolve()

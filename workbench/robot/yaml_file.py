@@ -257,7 +257,11 @@ _SHORT.maxlevel, _SHORT.maxstring, _SHORT.maxother = 2, 60, 60
 
 def top_of(path: Path, *keys: str) -> Fields:
     """The file's keys, of which none is unknown; its `format` is 1."""
-    top = Fields(path, read_yaml(path))
+    content = read_yaml(path)
+    if not isinstance(content, Mapping):
+        raise InputError(path, "top level: expected keys with values, as a session.yaml or a model.yaml has; this is none "
+                               "(`workbench inspect` says what it is)")
+    top = Fields(path, content)
     said = top.raw("format")
     if said is None:
         top.only("format", *keys)

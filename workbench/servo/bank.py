@@ -90,7 +90,9 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     and for a model with effects, which MakeStation takes.
     """
     if model.effects and law is None:
-        raise InputError(None, f"effect '{model.effects[0].effect}' is for MakeStation: it may change more than servos")
+        names = ", ".join(dict.fromkeys(e.effect for e in model.effects))
+        raise InputError(None, f"the model has effects ({names}), which may change more than servos: expected MakeStation(model)"
+                               ", which has them all, or the model without them, model.with_effects(())")
     if friction is None:
         friction = "implicit" if plant.time_step() > 0 else "bristle"
     if friction == "bristle" and plant.time_step() > 0:

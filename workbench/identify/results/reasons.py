@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -18,6 +19,10 @@ Signal = Literal["time", "angle", "size of the angle", "speed", "direction of mo
 def effect_at(effect: str, where: Sequence[str]) -> str:
     """As findings.json calls it: "backlash(flm)"."""
     return f"{effect}({','.join(where)})"
+
+
+MANY = math.log(1e6)
+"""Factors beyond a million are of no account [nats]."""
 
 
 class Statement(ABC):
@@ -100,7 +105,7 @@ class LessLikely(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the likeliest model with it is behind by {self.behind:.1f} nats (a factor of e each)"
+        return f"the likeliest model with it is {_times(self.behind)} less likely"
 
 
 @dataclass(frozen=True)
@@ -111,7 +116,7 @@ class SpokenAgainst(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"takes that were kept back are less likely with it, by {self.by:.0f} nats"
+        return f"takes that were kept back are {_times(self.by)} less likely with it"
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,13 @@ class AtItsEnd(Reason):
         """The reason in words, effects named by `naming`."""
         value = f"{self.value:.3g}{_behind_number(self.unit)}"
         return f"its {self.parameter} would have to be {value} or beyond, which is not plausible on this robot"
+
+
+def _times(nats: float) -> str:
+    """What a difference of log probability is as a factor."""
+    if nats > MANY:
+        return f"more than {math.exp(MANY):,.0f} times"
+    return f"{math.exp(max(nats, 0.0)):.2g} times" if nats < math.log(100) else f"{float(f'{math.exp(nats):.1g}'):,.0f} times"
 
 
 def _behind_number(unit: str) -> str:

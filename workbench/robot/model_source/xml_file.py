@@ -49,6 +49,8 @@ def read_xml(path: Path) -> Element:
             if depth > MOST_DEPTH:
                 raise InputError(path, f"nested deeper than {MOST_DEPTH} levels")
     except (ElementTree.ParseError, ValueError, LookupError) as e:  # LookupError: an unknown encoding
+        if not content.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<") and b"\0" not in content[:200]:
+            raise InputError(path, "no XML; expected a robot as SDF or URDF, or a model.yaml") from None
         raise InputError(path, f"not whole XML in UTF-8, or in the encoding that it says: {e}") from None
     if root is None or root.tag not in ("sdf", "robot"):
         found = "nothing" if root is None else f"<{root.tag[:40]}>"

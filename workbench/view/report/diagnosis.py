@@ -235,9 +235,10 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
 
 def _recalibrated(numbers: Sequence[Recalibrated]) -> Section:
     """Of the nominal law, within what was known of it."""
-    rows = [[r.number.replace("_", " "), listed(r.where), f"{r.nominal:.4g}", f"{r.value:.4g}", unbroken(r.unit),
-             f"{r.sigmas:+.1f}"] for r in numbers]
-    said = "Constants of the servo law that were adjusted within what is known of them. This is no finding."
+    shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
+    rows = [[r.number.replace("_", " "), listed(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}", unbroken(unit),
+             f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
+    said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
     return Section("What was recalibrated", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
 

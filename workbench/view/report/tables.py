@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from workbench.identify.results.findings import Finding, Rejected
+from workbench.identify.results.reasons import LessLikely
 from workbench.view.report.page import Details, Part, Table, Text
 from workbench.view.report.words import change, in_words, listed, name_of, unbroken
 
@@ -17,11 +19,16 @@ def tried(rejected: Sequence[Rejected], summary: str) -> list[Part]:
     measured = any(r.validation is not None for r in rejected)
     header = ["effect", "where", *(["error on unseen stretches"] if measured else []), "why not"]
     rows = [[unbroken(name_of(r.effect)), place_of(r.where), *([_left_by(r)] if measured else []), in_words(r.reason)]
-            for r in rejected]
+            for r in sorted(rejected, key=_unlikely)]
     parts = folded(header, rows, summary)
     if any(r.reason.of_chi_squared for r in rejected):
         parts.append(Text("Chi squared is the sum of squared errors over noise: the less, the better the model fits."))
     return parts
+
+
+def _unlikely(r: Rejected) -> float:
+    """The nearer to what was found, the earlier; what was judged otherwise keeps its order after that."""
+    return r.reason.behind if isinstance(r.reason, LessLikely) else math.inf
 
 
 def _left_by(r: Rejected) -> str:

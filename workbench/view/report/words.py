@@ -154,8 +154,9 @@ def layers_of(diagnosis: Diagnosis) -> str:
     for f in diagnosis.findings:
         causes.setdefault(effect_named(f.effect).layer, []).append(title_of(f.effect, f.where))
     if causes:
-        found = [f"{listed(names)}, which is {LAYERS[layer]} ({layer})" for layer, names in causes.items()]
-        said += f" The cause that was found is {listed(found)}; one cause may show as errors of several kinds."
+        found = [f"{listed(names)} ({LAYERS[layer]}: {layer})" for layer, names in causes.items()]
+        several = len(diagnosis.findings) > 1
+        said += f" The cause{'s' if several else ''} found: {listed(found)}; one cause may show as errors of several kinds."
     if any(not f.where or effect_named(f.effect).layer in ("inertia", "ground") for f in diagnosis.findings):
         said += " Such a cause is felt at many joints at once."
     return said

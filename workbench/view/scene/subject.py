@@ -12,7 +12,7 @@ from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.take import Take
-from workbench.robot import ROBOTS, RobotModel
+from workbench.robot import ROBOTS, InputError, RobotModel
 from workbench.robot.yaml_file import read_yaml
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
@@ -28,6 +28,8 @@ def subject_of(name: str) -> Literal["model", "session", "take"]:
     if path.suffix.lower() in (".yaml", ".yml"):
         content = read_yaml(path)
         return "session" if isinstance(content, dict) and "takes" in content else "model"
+    if not path.suffix and not path.exists():
+        raise InputError(name, f"not found; expected {', '.join(ROBOTS)}, or a file")
     return "take"
 
 
