@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,9 @@ class Linear(Rollouts):
     does: Mapping[str, np.ndarray] = field(default_factory=dict)
     sticks: float = 0.0
 
+    def around_here(self, step):
+        return replace(self, step=step)
+
     def answers(self, wants):
         return [self.left(h) for _, h in wants]
 
@@ -61,4 +64,4 @@ class Linear(Rollouts):
 
 
 def linear(of: Region, truth: np.ndarray, does: Mapping[str, np.ndarray]) -> Linear:
-    return Linear(None, None, (of,), (start(of.numbers),), truth=truth, does=does)  # type: ignore[arg-type]
+    return Linear(None, None, (of,), (start(of.numbers),), None, None, truth=truth, does=does)  # type: ignore[arg-type]

@@ -28,6 +28,9 @@ class Robot(Rollouts):
     truth: tuple[np.ndarray, ...] = ()
     does: Mapping[tuple[int, str], np.ndarray] = field(default_factory=dict)
 
+    def around_here(self, step):
+        return replace(self, step=step)
+
     def answers(self, wants):
         return [self.left(joint, h, self.shared) for joint, h in wants]
 
@@ -55,7 +58,7 @@ def robot(own: Mapping[tuple[int, str], float], of_all: Mapping[str, float], see
             r = r + size * does[joint, name]
         truth.append(r)
     starts = tuple(start(r.numbers) for r in regions)
-    return Robot(None, None, regions, starts, truth=tuple(truth), does=does)  # type: ignore[arg-type]
+    return Robot(None, None, regions, starts, None, None, truth=tuple(truth), does=does)  # type: ignore[arg-type]
 
 
 def found(rollouts: Robot) -> RobotFound:

@@ -8,7 +8,7 @@ import pytest
 from tests.evidence.linear import FRAME, Linear, candidate, linear, region
 from workbench.identify.evidence.fit import fitting, regressed
 from workbench.identify.evidence.holdout import vetoed
-from workbench.identify.evidence.hypothesis import start
+from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.posterior import posterior_of
 from workbench.identify.evidence.search import lockstep, search, without_names
@@ -75,7 +75,7 @@ def test_what_a_coarse_step_fitted_wrongly_is_fitted_anew_before_it_is_judged():
     for name, other in zip(names[1:], others):
         does[f"{name}.{candidate(name).parameters[0].name}"] = signal + 0.1 * other
     truth = 2.0 * signal + np.random.default_rng(0).normal(size=n) * 2e-3
-    rollouts = Coarse(None, None, (of,), (start(of.numbers),), truth=truth, does=does)
+    rollouts = Coarse(None, None, (of,), (start(of.numbers),), None, None, truth=truth, does=does)
     _, _, p = searched(rollouts)
     assert [c.name for c in p.best.hypothesis.effects] == ["coulomb_friction"]
     assert p.best.hypothesis.theta[-1] == pytest.approx(2.0, rel=0.05)
@@ -146,6 +146,23 @@ def test_two_numbers_that_do_the_same_are_not_told_apart_by_sticking():
     by_differences, by_moves = (np.sqrt(np.diag(f.covariance(of, OPTIONS)))[1] for f in (fit, again))
     assert by_moves == pytest.approx(0.5, rel=0.2)  # what is believed of the number, as the effect does twice as much
     assert by_differences < 0.5 * by_moves
+
+
+def test_an_effect_that_is_a_number_of_the_law_is_not_told_from_it_by_how_far_each_was_moved():
+    """Their sum alone is seen; slopes of a curve differ between long and short moves, which would tell them apart."""
+    rollouts = robot({"coulomb_friction": 2.0})
+    (of,) = rollouts.regions
+    does = rollouts.does["coulomb_friction.torque"]
+    bent = does + 0.2 * np.abs(does)
+    friction = Uncertain(of.joints[0], "coulomb_friction", 0.5)
+    rollouts = replace(rollouts, does={**rollouts.does, "coulomb_friction": 0.5 * bent})
+    of = replace(of, numbers=(friction,)).correlated(FRAME)
+    h = start(of.numbers).with_effect(candidate("coulomb_friction"), np.array([2.0]))
+    fit = lockstep(rollouts, {0: fitting(of, OPTIONS, h, 0.002, OPTIONS.iterations)})[0]
+    again = lockstep(rollouts, {0: regressed(of, OPTIONS, fit)})[0]
+    known = [np.sqrt(np.diag(f.covariance(of, OPTIONS)))[1] for f in (fit, again)]
+    assert known[1] == pytest.approx(0.5, rel=0.2)  # what is believed of the number, as the effect does twice as much
+    assert known[0] < 0.5 * known[1]
 
 
 def test_slopes_by_moves_are_those_by_differences_where_nothing_sticks():

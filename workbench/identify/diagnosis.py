@@ -27,6 +27,7 @@ from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explain, is_by_logs
 from workbench.identify.evidence.leftover import left_over
+from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
@@ -196,6 +197,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
     steps = (2 * PROBLEM.fine, PROBLEM.fine)
     longer, after = evaluator.residuals([RolloutRequest(fitted, everywhere, step) for step in steps])
     floors = {i: np.nan_to_num(rms((longer[i] - after[i])[evidence[i].moving])) for i in everywhere}
+    after = {i: extrapolated(longer[i], after[i]) for i in everywhere}
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in missed),
                 *explained.findings(evidence, nominal.residuals, after))

@@ -14,7 +14,6 @@ from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import Residuals, change, estimates, value_slopes
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
 from workbench.identify.evidence.holdout import folds_of, vetoed
-from workbench.identify.evidence.hypothesis import start
 from workbench.identify.evidence.nested import told_from_nothing
 from workbench.identify.evidence.nuisance import (
     UNITS,
@@ -32,7 +31,7 @@ from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
-from workbench.identify.evidence.rollouts import Rollouts
+from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
@@ -182,8 +181,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     asked, refuted = within_registers(felt, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 else []
-    robot, rejected = _searched(Rollouts(evaluator, nominal, regions, tuple(start(r.numbers) for r in regions)), shared, felt,
-                                options, progress)
+    robot, rejected = _searched(Rollouts.of(evaluator, nominal, regions), shared, felt, options, progress)
     rollouts, found, rejected = robot.rollouts, robot.found, [*refuted, *rejected]
     for _ in range(NUMERICS.rounds):
         said = [at_their_end(f.best.hypothesis, felt) for f in found]
@@ -203,7 +201,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
     finishing = {k: _finished(f, entire[k], options) for k, f in enumerate(found)}
-    fine = replace(rollouts, evaluator=whole, regions=entire, step=NUMERICS.fine)
+    fine = replace(rollouts.around_here(NUMERICS.fine), evaluator=whole, regions=entire, errors=step_errors(whole, entire))
     last = lockstep(fine, finishing)
     found = tuple(last[k] for k in range(len(found)))
     fine = standing(fine, found)

@@ -103,6 +103,8 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
     A joint that sticks answers a small move by chance, which differences of one number after the other take for slopes, and
     their square for information: two numbers that do the same would seem to be told apart, and both to be well known. What the
     moves leave unexplained says how much of it is chance, which is taken off (W. Fuller, Measurement error models, 1987).
+    An effect that adds to a number of the law which is recalibrated as well (dry friction) answers as that does: the recording
+    shows their sum alone.
     """
     h, k = f.hypothesis, len(f.hypothesis.theta)
     low, high = h.bounds()
@@ -114,8 +116,16 @@ def regressed(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[Fitte
     J = np.asarray(np.linalg.lstsq(moved, answer, rcond=None)[0].T, dtype=float)
     chance = np.square(answer - moved @ J.T).sum(axis=0) / (len(signs) - k)
     precision = region.likelihood.precision(f.r, f.discrepancy)
+    for pair in h.alike():
+        J[:, pair] = _of_rank_one(J[:, pair], precision)
     scatter = np.asarray(np.linalg.pinv(moved.T @ moved), dtype=float)
     return replace(f, J=J, too_much=float(precision @ chance) * scatter)
+
+
+def _of_rank_one(J: Array, precision: Array) -> Array:
+    """Slopes (n, 2) of two numbers that act alike: the nearest ones that are multiples of each other."""
+    along = np.linalg.svd(np.sqrt(precision)[:, None] * J, full_matrices=False)[2][0]
+    return np.asarray(np.outer(J @ along, along))
 
 
 def without(f: Fitted, gone: object) -> tuple[Hypothesis, Array]:

@@ -82,6 +82,12 @@ class Hypothesis:
         ends = np.cumsum([len(self.numbers), *(c.size for c in self.effects)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
+    def alike(self) -> list[list[int]]:
+        """Pairs of theta that stand for one number of the law: what is recalibrated, and the effect of that name there."""
+        at: dict[tuple[str, tuple[str, ...]], int] = {(n.name, (n.joint,)): k for k, n in enumerate(self.numbers)}
+        both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
+        return [[k, s.start] for k, s in both if k is not None]
+
     def sizes(self) -> list[tuple[Candidate, Array]]:
         """Each effect with its sizes."""
         return [(c, self.theta[s]) for c, s in zip(self.effects, self.slices())]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.nuisance import as_mapping, recalibrated
 from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
@@ -27,12 +29,20 @@ SETTLE = 0.02
 
 
 def residuals_of(evaluator: RolloutEvaluator, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-    """As `RolloutEvaluator.residuals`; of logs without shifting their start, which is known."""
+    """As `RolloutEvaluator.residuals`, as the rollouts are, whatever their step is wrong by; of logs without shifting their
+    start, which is known."""
     by_drake = evaluator.config.engine == "drake"
     if by_drake or not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
-        return evaluator.residuals(questions)
+        return [_uncorrected(evaluator, q, answer) for q, answer in zip(questions, evaluator.residuals(questions))]
     with ThreadPoolExecutor(evaluator.n_jobs) as pool:  # kernels hold no lock
         return list(pool.map(lambda q: _answer(evaluator, q), questions))
+
+
+def _uncorrected(evaluator: RolloutEvaluator, q: RolloutRequest, residuals: dict[int, Array]) -> dict[int, Array]:
+    """Without what `RolloutEvaluator` takes off for the search's step."""
+    if q.step < 1:
+        return residuals
+    return {i: r + e.offset / (e.sigma * e.rough) for i, r in residuals.items() for e in (evaluator.evidence[i],)}
 
 
 def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
@@ -47,7 +57,7 @@ def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
     try:
         angles = servo_angles(jobs)
     except NotCoveredError:
-        return evaluator.residuals([q])[0]
+        return _uncorrected(evaluator, q, evaluator.residuals([q])[0])
     evaluator.rollouts += len(jobs)
     out = {}
     for i, q_servo in zip(q.takes, angles):
@@ -55,7 +65,7 @@ def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
         columns = [q.model.joints.index(j) for j in e.joints]
         simulated = np.full(e.recorded.shape, np.nan)
         simulated[(e.since >= 0) & (e.since <= e.until)] = q_servo[:, columns]
-        out[i] = (e.recorded - simulated - (e.offset if q.step >= 1 else 0.0)) / (e.sigma * e.rough)
+        out[i] = (e.recorded - simulated) / (e.sigma * e.rough)
     return out
 
 
@@ -75,14 +85,23 @@ def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
 @dataclass(frozen=True)
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
-    step: in steps of the search. shared: effects of the whole robot, which act in all regions."""
+    errors: what steps are wrong by, which is taken off, as `reference` has it, a robot near those that are compared. step: in
+    steps of the search. shared: effects of the whole robot, which act in all regions."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
     regions: tuple[Region, ...]
     standing: tuple[Hypothesis, ...]
+    errors: StepErrors
+    reference: RobotModel
     step: float = 1.0
     shared: Hypothesis = field(default_factory=lambda: start(()))
+
+    @classmethod
+    def of(cls, evaluator: RolloutEvaluator, nominal: RobotModel, regions: Sequence[Region]) -> Rollouts:
+        """With the nominal law standing everywhere."""
+        return cls(evaluator, nominal, tuple(regions), tuple(start(r.numbers) for r in regions),
+                   step_errors(evaluator, regions), nominal)
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""
@@ -92,11 +111,15 @@ class Rollouts:
         model = recalibrated(self.nominal, z)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
+    def around_here(self, step: float) -> Rollouts:
+        """At another step, whose error the robot that stands tells from now on: what is compared has to be rolled out anew."""
+        return replace(self, step=step, reference=self.model(self.standing))
+
     def everywhere(self, states: Sequence[tuple[Hypothesis, Sequence[Hypothesis]]]) -> list[tuple[Array, ...]]:
         """Residuals (n,) of every region, of shared effects with a hypothesis for each region."""
         takes = tuple(sorted({p.take for region in self.regions for p in region.parts}))
         questions = [RolloutRequest(replace(self, shared=shared).model(each), takes, self.step) for shared, each in states]
-        return [tuple(region.vector(r) for region in self.regions) for r in residuals_of(self.evaluator, questions)]
+        return [tuple(region.vector(r) for region in self.regions) for r in self._residuals(questions)]
 
     def answers(self, wants: Sequence[Wants]) -> list[Array]:
         """Residuals (n,) of each want's region. Wants of different regions share rollouts."""
@@ -111,7 +134,18 @@ class Rollouts:
             questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
             shared.append(here)
         out: list[Array] = [np.empty(0)] * len(wants)
-        for here, residuals in zip(shared, residuals_of(self.evaluator, questions)):
+        for here, residuals in zip(shared, self._residuals(questions)):
             for region, k in here.items():
                 out[k] = self.regions[region].vector(residuals)
         return out
+
+    def _residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
+        """As a step of nothing would leave them."""
+        wrong = self.errors.at(self.reference, self.step) if questions else {}
+        return [{i: r - wrong[i] for i, r in answer.items()} for answer in residuals_of(self.evaluator, questions)]
+
+
+def step_errors(evaluator: RolloutEvaluator, regions: Sequence[Region]) -> StepErrors:
+    """Of the takes that regions look at."""
+    takes = tuple(sorted({p.take for region in regions for p in region.parts}))
+    return StepErrors(takes, partial(residuals_of, evaluator))

@@ -74,8 +74,8 @@ def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: E
     """
     states = list(found)
     for exploring in (True, False):
-        rollouts, states = _all_levels(replace(rollouts, step=PROBLEM.coarse if exploring else step), states, options, exploring,
-                                       report)
+        here = rollouts.around_here(PROBLEM.coarse if exploring else step)
+        rollouts, states = _all_levels(here, states, options, exploring, report)
     return rollouts, tuple(states)
 
 

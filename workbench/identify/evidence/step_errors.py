@@ -1,0 +1,50 @@
+"""What the step of a rollout is wrong by, taken off its residuals.
+
+A discrete step of a servo robot is of the first order: what is sent at an instant acts late by about half a step, in a joint that
+follows steps of its goal by more. At the steps of a search that is more than a log's noise, and a fit would book it as torque,
+friction or delay. Richardson's extrapolation gives it, from rollouts at half and at a quarter of the search's step
+(L. Richardson, Phil. Trans. A 226, 1927), of the best model so far; models near it are taken to have the same error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.identify.options import PROBLEM
+from workbench.identify.rollouts import RolloutRequest
+from workbench.robot import RobotModel
+
+Array = NDArray[np.float64]
+Residuals = Mapping[int, Array]
+Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
+
+
+def extrapolated(longer: Array, shorter: Array) -> Array:
+    """Residuals at a step of nothing, from those at one step and at half of it: alike in shape."""
+    return np.asarray(2.0 * shorter - longer)
+
+
+@dataclass
+class StepErrors:
+    """roll: rollouts of some takes as they are, whose residuals [sigma] these are. Each model is rolled out once at each step."""
+
+    takes: tuple[int, ...]
+    roll: Roll = field(repr=False)
+    _known: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
+    _ideal: dict[str, dict[int, Array]] = field(default_factory=dict, repr=False)
+
+    def at(self, model: RobotModel, step: float) -> Residuals:
+        """By take what a model's rollouts at a step, in steps of the search, add to residuals (N, c) [sigma]; 0 where unknown."""
+        key = model.sha256
+        if (key, step) not in self._known:
+            steps = (step,) if key in self._ideal else (step, 2 * PROBLEM.fine, PROBLEM.fine)
+            here, *finer = self.roll([RolloutRequest(model, self.takes, s) for s in steps])
+            if finer:
+                longer, shorter = finer
+                self._ideal[key] = {i: extrapolated(longer[i], shorter[i]) for i in self.takes}
+            self._known[key, step] = {i: np.nan_to_num(here[i] - self._ideal[key][i]) for i in self.takes}
+        return self._known[key, step]
