@@ -278,7 +278,7 @@ def test_what_is_not_a_servos_leaves_servos_alone(nominal):
 
 
 @pytest.mark.parametrize(("name", "where", "parameters", "problem"), [
-    ("gearbox_gremlin", "flm", {}, "'gearbox_gremlin' is not known; known: backlash"),
+    ("gearbox_gremlin", "flm", {}, "'gearbox_gremlin' is not known, or its package is not installed; known: backlash"),
     ("coulomb_friction", "flx", {"torque": 0.1}, "where: 'flx' is no joint of this robot"),
     ("coulomb_friction", (), {"torque": 0.1}, "where is empty; expected one joint"),
     ("coulomb_friction", "flm", {}, r"parameter 'torque' \[N m\] is missing"),

@@ -84,7 +84,7 @@ def test_another_drake_project_simulates_it_in_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("old", "new", "expected"), [
     ("format: 1", "format: 2", "format: expected 1"),
-    ("effect: backlash", "efect: backlash", "effects[0].effect: is missing"),
+    ("effect: backlash", "efect: backlash", "effects[0].efect: unknown key; expected one of effect, where, parameters"),
     ("gap: 3.1", "gap: wide", "effects[0].parameters.gap: expected a number"),
     ("gap: 3.1", "gap: .inf", "effects[0].parameters.gap: expected a number"),
     ("position: [0.01, 0.0, -0.02]", "position: [0.01, 0.0]", "effects[1].parameters.position: expected one number or three"),

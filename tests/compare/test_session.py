@@ -98,7 +98,7 @@ def test_base_left_out_follows_the_model(tmp_path):
 
 @pytest.mark.parametrize(("content", "words"), [
     (changed(format=2), ["format", "expected 1"]),
-    (changed(colour="red"), ["colour", "unknown key", "ground, robot, takes"]),
+    (changed(colour="red"), ["colour", "unknown key", "unknown key; expected one of robot, ground, takes"]),
     (changed(robot__sevos="servo.yaml"), ["robot.sevos", "unknown key"]),
     (changed(ground__grip=1), ["ground.grip", "unknown key"]),
     (changed(takes__0__cycle=2), ["takes[0].cycle", "unknown key"]),

@@ -76,7 +76,7 @@ def test_a_comparison_saves_and_shows_itself(session: workbench.Session, tmp_pat
 
 @pytest.mark.parametrize(("make", "said"), [
     (lambda: workbench.DiagnoseOptions(jobs=0), "jobs: expected 1 or more"),
-    (lambda: workbench.SimulationConfig(base="fly"), "base: expected one of free, fixed, path, got 'fly'"),
+    (lambda: workbench.SimulationConfig(base="fly"), "base: expected one of auto, free, fixed, path, got 'fly'"),
     (lambda: workbench.SimulationConfig(time_step=-1.0), "time_step: expected a non-negative number"),
     (lambda: workbench.SimulationConfig(time_step=0.0, drive="fast_servo"), "drive: fast_servo needs a discrete plant"),
     (lambda: workbench.Request(way="up"), "way: expected one of forward, backward, sideways, turn, arc, got 'up'"),
