@@ -165,7 +165,7 @@ def _extensible(name: str, group: str, known: Callable[[], Collection[str]]) -> 
     try:
         names = sorted(known())
     except InputError as e:
-        return Check(name, "broken", str(e), "mend that package, or uninstall it")
+        return Check(name, "broken", str(e), "repair that package, or uninstall it")
     return Check(name, "ok", f"{len(names)}: {', '.join(names)}; plug-ins: {', '.join(added) or 'none'}")
 
 

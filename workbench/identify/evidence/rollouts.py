@@ -85,8 +85,8 @@ def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
 @dataclass(frozen=True)
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
-    errors: what steps are wrong by, which is taken off, as `reference` has it, a robot near those that are compared. step: in
-    steps of the search. shared: effects of the whole robot, which act in all regions."""
+    errors: of the time step, which are subtracted; they are measured on `reference`, a model near those that are compared.
+    step: in steps of the search. shared: effects of the whole robot, which act in all regions."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -112,7 +112,8 @@ class Rollouts:
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
     def around_here(self, step: float) -> Rollouts:
-        """At another step, whose error the robot that stands tells from now on: what is compared has to be rolled out anew."""
+        """The same at another step, whose error is measured on the current best model from now on: fits that are compared have to
+        be rolled out again."""
         return replace(self, step=step, reference=self.model(self.standing))
 
     def everywhere(self, states: Sequence[tuple[Hypothesis, Sequence[Hypothesis]]]) -> list[tuple[Array, ...]]:
@@ -140,7 +141,7 @@ class Rollouts:
         return out
 
     def _residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-        """As a step of nothing would leave them."""
+        """In the limit of a step of zero."""
         wrong = self.errors.at(self.reference, self.step) if questions else {}
         return [{i: r - wrong[i] for i, r in answer.items()} for answer in residuals_of(self.evaluator, questions)]
 

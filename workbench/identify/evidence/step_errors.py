@@ -1,7 +1,7 @@
 """What the step of a rollout is wrong by, taken off its residuals.
 
 A discrete step of a servo robot is of the first order: what is sent at an instant acts late by about half a step, in a joint that
-follows steps of its goal by more. At the steps of a search that is more than a log's noise, and a fit would book it as torque,
+follows steps of its goal by more. At the steps of a search that is more than a log's noise, and a fit would take it for torque,
 friction or delay. Richardson's extrapolation gives it, from rollouts at half and at a quarter of the search's step
 (L. Richardson, Phil. Trans. A 226, 1927), of the best model so far; models near it are taken to have the same error.
 """
@@ -24,7 +24,7 @@ Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
 
 
 def extrapolated(longer: Array, shorter: Array) -> Array:
-    """Residuals at a step of nothing, from those at one step and at half of it: alike in shape."""
+    """Residuals in the limit of a step of zero, from those at one step and at half of it: alike in shape."""
     return np.asarray(2.0 * shorter - longer)
 
 
