@@ -10,8 +10,9 @@ from workbench.cli.check import add_yes, check_model, check_motion
 from workbench.cli.options import add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
+    from workbench.files import InputError
     from workbench.motion import Motion
-    from workbench.robot import InputError, RobotModel
+    from workbench.robot import RobotModel
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -66,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
 
 def uncertified_by(path: str, motion: Motion, model: RobotModel) -> InputError | None:
     """What is wrong with the certificate of a motion that `optimize` made."""
+    from workbench.files import InputError
     from workbench.gait.certificate import check_certificate, has_mark
-    from workbench.robot import InputError
 
     if not has_mark(path):
         return None
