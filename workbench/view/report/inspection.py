@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from workbench.robot import ROBOTS, InputError, RobotModel, load_servo_constants
 from workbench.robot.files import read_json, read_text, regular_file
 from workbench.robot.tables import is_binary, plain_head
 from workbench.robot.yaml_file import read_yaml
+
+if TYPE_CHECKING:
+    from workbench.motion import Motion
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
@@ -178,9 +181,17 @@ def _motion(path: Path) -> Inspection:
     motion = load_motion(path)
     degrees = np.rad2deg(motion.angles)
     return Inspection(
-        str(path), "motion", units="deg, s", duration=motion.duration, joints=motion.joints,
-        details={"poses": len(motion.times) - 1, "largest angle": f"{np.abs(degrees).max():.1f} deg"},
+        str(path), "motion", units="deg, s", duration=motion.seconds(1), joints=motion.joints,
+        details={"poses": len(motion.times) - 1, **_sections(motion), "largest angle": f"{np.abs(degrees).max():.1f} deg"},
         problems=tuple(motion_problems(motion)))
+
+
+def _sections(motion: Motion) -> dict[str, object]:
+    out: dict[str, object] = {}
+    if motion.start or motion.stop:
+        loop = len(motion.times) - 1 - motion.start - motion.stop
+        out["sections"] = f"start {motion.start}, loop {loop}, stop {motion.stop} poses"
+    return out | ({} if motion.cycles is None else {"cycles": motion.cycles})
 
 
 def _motion_file(path: Path) -> Inspection:
