@@ -175,8 +175,11 @@ def test_a_diagnosed_models_posterior_is_drawn(machine, tmp_path):
     model = machine.model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.0}))
     posterior = Posterior(("backlash(flm).gap",), np.array([3.0]), np.array([[0.04]]))
     draws = load_ensemble(posterior=posterior).draws(model, 30, 1, tmp_path)
-    gaps = [e.parameters["gap"] for d in draws for e in d.effects if e.effect == "backlash"]
-    assert len(gaps) == 30  # what the diagnosis found stands for the file's play
+    played = [(e.where, e.parameters["gap"]) for d in draws for e in d.effects if e.effect == "backlash"]
+    gaps = [gap for where, gap in played if where == ("flm",)]
+    assert len(gaps) == 30  # what the diagnosis found replaces the file's play in this joint
+    assert len(played) == 30 * 12  # and in no other
+    assert all(gap <= 1.0 for where, gap in played if where != ("flm",))
     assert np.mean(gaps) == pytest.approx(3.0, abs=0.15)
     assert 0.1 < np.std(gaps) < 0.3
 

@@ -29,8 +29,8 @@ def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress
     return session.model_of(chosen[0]), _of_recording(session, chosen[0], progress)
 
 
-def forces_of_file(path: str | Path, model: RobotModel, base: Base = "free", cycles: int = 1, commanded: str | Path | None = None,
-                   progress: Progress = no_progress) -> InverseDynamicsResult:
+def forces_of_file(path: str | Path, model: RobotModel, base: Base = "free", cycles: int | None = None,
+                   commanded: str | Path | None = None, progress: Progress = no_progress) -> InverseDynamicsResult:
     """Of a rollout, on the base it says; of a motion played `cycles` times on the base given; or of a recording, whose
     `commanded` motion was played so often. On a free base a motion does not say how the body moves: it is simulated with
     ideal joints first."""

@@ -50,7 +50,7 @@ def check_model(verb: str, model: RobotModel) -> None:
     warn(verb, [f"{model.description}: {summed_up(problems)}"] if problems else [])
 
 
-def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -> None:
+def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import motion_problems, slow_poses, summed_up
@@ -59,10 +59,10 @@ def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -
     warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
         raise InputError(motion.source, f"{text} Say --yes if it is meant")
-    _ask(motion.source, cycles * motion.duration, yes)
+    _ask(motion.source, motion.seconds(cycles), yes)
 
 
-def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int = 1, yes: bool = True) -> None:
+def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
     from workbench.inspect.problems import recording_problems, serious, summed_up
     from workbench.motion import load_motion

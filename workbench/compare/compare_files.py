@@ -23,7 +23,8 @@ from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
 
-def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *, cycles: int = 1,
+def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *,
+                  cycles: int | None = None,
                   base: Base = "free", progress: Progress = no_progress, n_jobs: int = 2) -> Comparison:
     """Compares two files; a motion is first played `cycles` times on `model`, its base free or fixed.
 
@@ -110,7 +111,7 @@ def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
     return ReadTake(TakeSpec(path.stem, path, base=base), model, recording, recording.commands)
 
 
-def _run(path: Path, model: RobotModel, cycles: int, base: Base, beside: ReadTake | None) -> Run:
+def _run(path: Path, model: RobotModel, cycles: int | None, base: Base, beside: ReadTake | None) -> Run:
     """A motion's run, as long as the recording beside it."""
     commands = load_motion(path, model).commands(cycles)
     return Run(path.stem, model, commands, commands.end if beside is None else beside.duration, base)

@@ -84,14 +84,14 @@ class InverseDynamics:
         none = np.zeros((N, n))
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
-    def of_motion(self, motion: Motion, cycles: int = 1, step: float = 1 / 240) -> InverseDynamicsResult:
+    def of_motion(self, motion: Motion, cycles: int | None = None, step: float = 1 / 240) -> InverseDynamicsResult:
         """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled every `step` s) on a fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
         if self.base != "fixed":
             raise InputError(motion.source, "a motion does not say how a free base moves; expected a take of it, ideal drive")
-        path = interpolate_motion(motion, cycles, step)
+        path = interpolate_motion(motion, motion.often(cycles), step)
         N = len(path.time)
         place, turn = np.tile(self.machine.mount[0], (N, 1)), np.tile(self.machine.mount[1], (N, 1))
         still = np.zeros((N, 6))

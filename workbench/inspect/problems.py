@@ -129,11 +129,11 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
     return sorted(dict.fromkeys(out), key=lambda text: _ROUTINE in text)
 
 
-def motion_problems(motion: Motion, cycles: int = 2) -> list[str]:
-    """What is doubtful in a motion that is played `cycles` times, a line each."""
-    jumps = cycles > 1 and not motion.closes
+def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:
+    """What is doubtful in a motion that is played `cycles` times (None: as often as it says itself), a line each."""
+    jumps = motion.often(cycles) > 1 and not motion.closes
     out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
-    if (text := slow_poses(motion) or long_work(motion.duration)) is not None:
+    if (text := slow_poses(motion) or long_work(motion.seconds(1))) is not None:
         out.append(text)
     if np.abs(motion.angles).max() < FILES.smallest_motion and np.ptp(motion.angles) > 0:
         most = np.rad2deg(np.abs(motion.angles).max())
@@ -160,7 +160,7 @@ def slow_poses(motion: Motion) -> str | None:
     apart = float(np.median(np.diff(motion.times)))
     if apart <= FILES.slowest_pose:
         return None
-    return (f"a pose every {apart:.4g} s, {motion.duration:.6g} s in all: are the times in milliseconds, a slip? "
+    return (f"a pose every {apart:.4g} s, {motion.seconds(1):.6g} s in all: are the times in milliseconds, a slip? "
             "(a table has seconds)")
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
 from workbench.robot import ROBOTS, RobotModel, load_servo_constants
+
+if TYPE_CHECKING:
+    from workbench.motion import Motion
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
@@ -179,9 +182,17 @@ def _motion(path: Path) -> Inspection:
     motion = load_motion(path)
     degrees = np.rad2deg(motion.angles)
     return Inspection(
-        str(path), "motion", units="deg, s", duration=motion.duration, joints=motion.joints,
-        details={"poses": len(motion.times) - 1, "largest angle": f"{np.abs(degrees).max():.1f} deg"},
+        str(path), "motion", units="deg, s", duration=motion.seconds(1), joints=motion.joints,
+        details={"poses": len(motion.times) - 1, **_sections(motion), "largest angle": f"{np.abs(degrees).max():.1f} deg"},
         problems=tuple(motion_problems(motion)))
+
+
+def _sections(motion: Motion) -> dict[str, object]:
+    out: dict[str, object] = {}
+    if motion.start or motion.stop:
+        loop = len(motion.times) - 1 - motion.start - motion.stop
+        out["sections"] = f"start {motion.start}, loop {loop}, stop {motion.stop} poses"
+    return out | ({} if motion.cycles is None else {"cycles": motion.cycles})
 
 
 def _motion_file(path: Path) -> Inspection:

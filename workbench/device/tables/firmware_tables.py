@@ -25,7 +25,7 @@ from workbench.robot.servo_units import AX12A, ServoUnits
 Counts = NDArray[np.int64]
 
 GOALS, SPEEDS, DWELLS, HEADER, BINARY = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h", "motion.table"
-ORDER, FAMILIES = "# joints:", "# servos:"
+ORDER, FAMILIES, SECTIONS = "# joints:", "# servos:", "# sections:"
 _MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the table
 
 
@@ -62,7 +62,8 @@ def write_tables(
 
     The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
     line that says the order of joints, the same in all files; where servos are none of the AX-12A's family, a second line says
-    which they are, as counts are theirs. InputError for a joint without a bus ID.
+    which they are, as counts are theirs; where there are poses of a start or a stop, a line says how many (SECTIONS). InputError
+    for a joint without a bus ID.
     """
     for joint in table.joints:
         if joint not in ids:
@@ -73,6 +74,8 @@ def write_tables(
     order = f"{ORDER} {' '.join(table.joints)}"
     if any(u != AX12A for u in table.units):
         order += f"\n{FAMILIES} {', '.join(u.family for u in table.units)}"
+    if table.start or table.stop:
+        order += f"\n{SECTIONS} start {table.start} loop {table.loop} stop {table.stop}"
 
     def text(rows: Counts) -> str:
         return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
@@ -90,22 +93,28 @@ def write_tables(
 def read_tables(folder: str | Path) -> PoseTable:
     """Reads the three text files back; InputError where they disagree, or lack the line that says the order of joints."""
     folder = Path(folder)
-    joints, units, goals = _read(folder / GOALS)
+    (joints, units, sections), goals = _read(folder / GOALS)
     columns = {SPEEDS: len(joints), DWELLS: 1}
     counts = {}
     for name, width in columns.items():
-        order, families, counts[name] = _read(folder / name, width)
+        (order, families, again), counts[name] = _read(folder / name, width)
         if order != joints:
             raise InputError(folder / name, f"line 1: joints are not in the order of {GOALS}")
         if families != units:
             raise InputError(folder / name, f"line 2: servos are not those of {GOALS}")
+        if again != sections:
+            raise InputError(folder / name, f"line '{SECTIONS} …': not that of {GOALS}")
         if len(counts[name]) != len(goals):
             raise InputError(folder / name, f"{len(counts[name])} poses, but {len(goals)} in {GOALS}")
-    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder), units)
+    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder), units, *sections)
 
 
-def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], tuple[ServoUnits, ...], Counts]:
-    """Order of the joints, units of their servos, and a row of `width` counts (default: one for each joint) for each pose."""
+Order = tuple[tuple[str, ...], tuple[ServoUnits, ...], tuple[int, int]]
+"""The joints, the units of their servos, and how many poses are of the start and of the stop."""
+
+
+def _read(path: Path, width: int | None = None) -> tuple[Order, Counts]:
+    """What the first lines say, and a row of `width` counts (default: one for each joint) for each pose."""
     lines = [line.strip() for line in read_text(path).splitlines() if line.strip()]
     if not lines or not lines[0].startswith(ORDER):
         raise InputError(path, f"line 1: expected '{ORDER} …', the order of joints")
@@ -113,6 +122,9 @@ def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], tuple[
     units, first = (AX12A,) * len(joints), 1
     if lines[1:] and lines[1].startswith(FAMILIES):
         units, first = _units(path, re.split(r",\s*", lines[1].removeprefix(FAMILIES).strip()), len(joints)), 2
+    sections = (0, 0, 0)
+    if lines[first:] and lines[first].startswith(SECTIONS):
+        sections, first = _sections(path, lines[first], first + 1), first + 1
     rows: list[list[int]] = []
     for n, line in enumerate(lines[first:], start=first + 1):
         rows.append([])
@@ -126,7 +138,17 @@ def _read(path: Path, width: int | None = None) -> tuple[tuple[str, ...], tuple[
     for k, row in enumerate(rows[1:], start=1):
         if len(row) != (width or len(joints)):
             raise InputError(path, f"pose {k}: expected {width or len(joints)} numbers, found {len(row)}")
-    return joints, units, np.array(rows[1:], dtype=np.int64)
+    if any(sections) and sum(sections) != len(rows) - 1:
+        raise InputError(path, f"line '{SECTIONS} …': says {sum(sections)} poses, and {len(rows) - 1} follow")
+    return (joints, units, (sections[0], sections[2])), np.array(rows[1:], dtype=np.int64)
+
+
+def _sections(path: Path, line: str, n: int) -> tuple[int, int, int]:
+    found = re.fullmatch(r"start (\d{1,9}) loop (\d{1,9}) stop (\d{1,9})", line.removeprefix(SECTIONS).strip())
+    if found is None:
+        raise InputError(path, f"line {n}: expected '{SECTIONS} start A loop B stop C', found '{line[:60]}'")
+    start, loop, stop = map(int, found.groups())
+    return start, loop, stop
 
 
 def _units(path: Path, families: list[str], n: int) -> tuple[ServoUnits, ...]:
@@ -149,7 +171,8 @@ def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
         return ",\n".join(f"    {{{_listed(row, ', ')}}}" for row in counts)
 
     return f"""\
-/* {len(table)} poses of {len(table.joints)} joints, for a program that sends each pose and then waits for its dwell.
+/* {len(table)} poses of {len(table.joints)} joints, for a program that sends each pose and then waits for its dwell: the start
+   once, the loop again and again, the stop once.
    Written by the workbench; do not edit. Columns: {' '.join(table.joints)} */
 #ifndef WORKBENCH_MOTION_H
 #define WORKBENCH_MOTION_H
@@ -157,6 +180,9 @@ def _c_header(table: PoseTable, numbers: Mapping[str, int]) -> str:
 #include <stdint.h>
 
 #define MOTION_POSES {len(table)}
+#define MOTION_START_POSES {table.start}
+#define MOTION_LOOP_POSES {table.loop}
+#define MOTION_STOP_POSES {table.stop}
 #define MOTION_JOINTS {len(table.joints)}
 
 static const char *const motion_joints[MOTION_JOINTS] = {{{names}}};

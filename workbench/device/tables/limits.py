@@ -89,7 +89,10 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     """Moving speeds beyond the no-load speed at the supply voltage; a warning from the speed on at which full duty only just
     overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell."""
     angles = table.angles()
-    travel = np.abs(angles - np.roll(angles, 1, axis=0)) / (table.dwells_ms[:, None] / 1000)
+    before = np.vstack([np.zeros((1, len(table.joints))), angles[:-1]]) if table.start else np.roll(angles, 1, axis=0)
+    if not table.start:
+        before[0] = angles[table.loop - 1]  # where the loop closes
+    travel = np.abs(angles - before) / (table.dwells_ms[:, None] / 1000)
     asked = np.where(table.speeds > 0, table.rates(), travel) / RPM
     for i, joint in enumerate(table.joints):
         servo = model.servo(joint)

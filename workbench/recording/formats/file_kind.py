@@ -31,6 +31,6 @@ def file_kind(path: str | Path) -> Kind:
         return "rollout"
     first = next((line for line in lines if line and not line.startswith("#")), "")
     cells = split_row(first)
-    plain = "time" in cells and not any(mark in c for c in cells for mark in "./[")
+    plain = "time" in cells and not any(mark in c.removeprefix("speed.") for c in cells for mark in "./[")
     numbers = bool(cells) and all(number_of(c) is not None for c in cells)
     return "motion" if plain or numbers else "recording"
