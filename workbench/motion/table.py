@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.motion.lead_in import paced
 from workbench.robot import InputError
 from workbench.robot.servo_units import AX12A, ServoUnits
 
@@ -100,12 +101,13 @@ class PoseTable:
         return np.asarray(self.speeds * self._of(lambda u: u.table_unit), dtype=float)
 
     def commands(self, cycles: int = 1) -> Commands:
-        """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
+        """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle; no joint at once
+        (`paced`)."""
         if not 1 <= cycles <= MOST_CYCLES:
             raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         ends = np.cumsum(np.tile(self.dwells_ms, cycles)) / 1000
         goals = np.tile(self.angles(), (cycles, 1))
-        return Commands(
+        return paced(Commands(
             times=np.concatenate([[0.0], ends[:-1]]),
             joints=self.joints,
             goals=goals,
@@ -113,7 +115,7 @@ class PoseTable:
             enabled=np.ones(goals.shape, dtype=bool),
             end=float(ends[-1]),
             poses=np.tile(np.arange(len(self)), cycles),
-        )
+        ), self.count, self._of(lambda u: u.speed_unit))
 
     def _of(self, what: Callable[[ServoUnits], float]) -> Array:
         return np.array([what(u) for u in self.units], dtype=float)
