@@ -8,9 +8,9 @@ import pytest
 from tests.device.servos import arm, robot
 from tests.device.test_play import START, limp
 from workbench.device.bus.survey import survey
-from workbench.device.limits import check_limits
 from workbench.device.play import PlayOptions, perform
 from workbench.device.stop import Stop
+from workbench.device.tables.limits import check_limits
 from workbench.device.virtual import seconds
 from workbench.motion import Motion
 from workbench.recording.formats.read import read_recording
