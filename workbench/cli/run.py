@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
         if done.played.stopped:
-            return 130 if done.played.stopped == "Ctrl-C" else 2
+            return 130 if done.played.stopped.startswith("Ctrl-C") else 2
         session = load_session(done.session)
         comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
         write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)

@@ -87,7 +87,8 @@ def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
 
 def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     """Moving speeds beyond the no-load speed at the supply voltage; a warning from the speed on at which full duty only just
-    overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell."""
+    overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell; in the first pose, from neutral, a
+    warning, as the workbench's own programs do not send it."""
     angles = table.angles()
     before = np.vstack([np.zeros((1, len(table.joints))), angles[:-1]]) if table.start else np.roll(angles, 1, axis=0)
     if not table.start:
@@ -106,6 +107,11 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
             text = (f"moving speed {table.speeds[k, i]} is {asked[k, i]:.1f} rpm, beyond {what}, "
                     f"{limit:.1f} rpm at {servo.supply_voltage:g} V")
             yield Violation("speed", joint, float(asked[k, i]), limit, "rpm", text, pose=int(k) + 1, warning=not broken)
+        away, dwell = abs(float(angles[0, i])), float(table.dwells_ms[0]) / 1000
+        if table.speeds[0, i] == 0 and away / dwell > no_load * RPM:
+            text = (f"moving speed 0, but {math.degrees(away):.1f} deg from neutral: play, run and flash go there slowly first; "
+                    "a program of your own has to do so, too")
+            yield Violation("speed", joint, away / dwell / RPM, no_load, "rpm", text, pose=1, warning=True)
 
 
 def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violation]:
