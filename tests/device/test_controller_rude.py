@@ -11,9 +11,9 @@ import pytest
 from tests.firmware.native import Sim, walk
 from tests.rude.core_port import CorePort
 from workbench.device.bus import BusError
-from workbench.device.controller import ControllerRun, play_by_controller
+from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.link import FrameType, frame
-from workbench.device.table_file import JointBounds, TableFile, bounds_of
+from workbench.device.tables.table_file import JointBounds, TableFile, bounds_of
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 from workbench.robot.servo_profile_file import servo_profile

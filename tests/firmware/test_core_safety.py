@@ -8,7 +8,7 @@ import pytest
 from tests.firmware.native import Sim, until, walk
 from tests.firmware.test_core_play import changed
 from workbench.device.link import REASONS, FrameType, frame
-from workbench.device.table_file import TableFile, decode_table, encode_table
+from workbench.device.tables.table_file import TableFile, decode_table, encode_table
 from workbench.motion import PoseTable
 
 TABLE = walk()
