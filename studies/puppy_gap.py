@@ -167,9 +167,9 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
             f"halved): {floor[0]:.1f} cm, {floor[1]:.1f} cm, {floor[2]:.1f} deg. {len(tied)} of {len(every)} variants lie within "
             f"{TIED:g} of the best and cannot be told apart by this measurement.")
     settle = ("A recording settles it. On a stand, servo law, supply and joint friction show in the angles "
-              f"(last column; the cameras' noise is {POSE_NOISE} deg), and the floor cannot. So record the same six seconds on a stand "
-              "first, then on the floor, with the battery's voltage read before and after: the stand fixes the joints, and "
-              "what the walk still lacks is then the floor's.")
+              f"(last column; the cameras' noise is {POSE_NOISE} deg), and the floor cannot. So record the same six seconds on "
+              "a stand first, then on the floor, with the battery's voltage read before and after: the stand identifies the "
+              "joints, and the remaining difference of the walk is the floor's.")
     headline = (f"{tied[0].variant.name} comes closest to the real robot's 37 cm; {len(tied) - 1} other variants cannot be told "
                 "from it.")
     report = Report("The puppy's own gap", headline,
