@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_yes(parser)
     add_out(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
-    parser.add_argument("--memory", metavar="DIR", help="directory for cached rollouts, shared by diagnoses of the same recordings "
+    parser.add_argument("--memory", metavar="DIR", help="directory for cached rollouts, shared by diagnoses of the same takes "
                         "(default: next to --out, deleted on success)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
