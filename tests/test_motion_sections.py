@@ -5,12 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workbench.compare.file_problems import motion_problems
-from workbench.device.firmware_tables import GOALS, read_tables, write_tables
-from workbench.device.limits import check_limits
+from workbench.device.tables.firmware_tables import GOALS, read_tables, write_tables
+from workbench.device.tables.limits import check_limits
+from workbench.files import InputError
+from workbench.inspect.problems import motion_problems
 from workbench.motion import Motion, interpolate_motion, load_motion, save_motion
 from workbench.recording.formats.file_kind import file_kind
-from workbench.robot import InputError, puppy_model
+from workbench.robot import puppy_model
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 

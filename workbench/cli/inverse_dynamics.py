@@ -31,9 +31,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Computes, writes the table and the figures, and prints the margins."""
+    from workbench.api.forces import forces_of_file, forces_of_take
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.compare.forces import forces_of_file, forces_of_take
     from workbench.compare.session import load_session
     from workbench.dynamics import save_inverse_dynamics
     from workbench.view.figures import save_figure

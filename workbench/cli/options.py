@@ -62,7 +62,7 @@ def load_model(name: str, packages: Sequence[tuple[str, str]] = ()) -> RobotMode
 
 def positive(text: str) -> int:
     """A whole number of at least 1, for argparse."""
-    from workbench.robot.numerals import whole_of
+    from workbench.files.numerals import whole_of
 
     value = whole_of(text)
     if value is None or not 1 <= value <= MOST:
@@ -72,7 +72,7 @@ def positive(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A positive finite number, for argparse."""
-    from workbench.robot.numerals import number_of
+    from workbench.files.numerals import number_of
 
     value = number_of(text)
     if value is None or not value > 0:

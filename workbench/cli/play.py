@@ -34,11 +34,11 @@ def run(args: argparse.Namespace) -> int:
     """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.survey import survey
-    from workbench.device.limits import refuse_broken_limits
     from workbench.device.play import PlayOptions, finish_log, perform, preflight
     from workbench.device.stop import stop_on_signals
+    from workbench.device.tables.limits import refuse_broken_limits
+    from workbench.files import InputError
     from workbench.motion import load_motion
-    from workbench.robot import InputError
     from workbench.robot.servo_registers import save_registers
 
     if (args.motion is None) == (args.finish is None):

@@ -37,13 +37,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Plays, records, compares and says what came of it."""
+    from workbench.api.robot_run import run_by_controller, run_on_robot
+    from workbench.cli.diagnose import diagnose_and_report
     from workbench.cli.progress import Progress
     from workbench.compare.compare_session import compare_session
-    from workbench.compare.robot_run import run_by_controller, run_on_robot
     from workbench.compare.session import load_session
     from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.limits import refuse_broken_limits
     from workbench.device.stop import stop_on_signals
+    from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
     from workbench.view.report.comparison import write_comparison
 
@@ -74,7 +75,5 @@ def run(args: argparse.Namespace) -> int:
     print(comparison.table())
     print(f"wrote {args.out / 'comparison'}: comparison.json, report.html")
     if args.diagnose:
-        from workbench.cli.main import main
-
-        return main(["diagnose", str(args.out), "--out", str(args.out / "diagnosis"), "--jobs", str(args.jobs)])
+        return diagnose_and_report(args.out, args.out / "diagnosis", args.jobs)
     return 0

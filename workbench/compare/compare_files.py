@@ -13,12 +13,13 @@ from workbench.compare.comparison import compare_takes
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
 from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, readable, register_take
+from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
 

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Literal
 
 from workbench.compare.options import FILES
+from workbench.files import InputError
+from workbench.files.yaml_file import Fields, top_of
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.motion.table import MOST_CYCLES
 from workbench.recording.formats.read import recording_of_take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.robot.robot_section import read_model
 from workbench.robot.servo_registers import ServoRegisters, load_registers
-from workbench.robot.yaml_file import Fields, top_of
 
 Base = Literal["free", "fixed"]
 

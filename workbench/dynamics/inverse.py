@@ -16,10 +16,11 @@ from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, t
 from workbench.dynamics.result import InverseDynamicsResult
 from workbench.dynamics.stance import dearness, floor_under
 from workbench.dynamics.trajectory import RobotTrajectory, smoothed
+from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
-from workbench.robot import GRAVITY, InputError, RobotModel
+from workbench.robot import GRAVITY, RobotModel
 
 Array = NDArray[np.float64]
 Stance = Mapping[str, NDArray[np.bool_]]

@@ -9,14 +9,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.numerals import number_of, whole_of
+from workbench.files.reading import write_whole
+from workbench.files.tables import plain_text
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
 from workbench.motion.table import MOST_CYCLES, SECTIONS
-from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel, bus_ids
-from workbench.robot.files import write_whole
-from workbench.robot.numerals import number_of, whole_of
+from workbench.robot import BUS_IDS, JOINTS, RobotModel, bus_ids
 from workbench.robot.servo_units import units_of
-from workbench.robot.tables import plain_text
 
 MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
 """Beyond an hour, or ten turns, a table is in another unit."""

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import InputError
 from workbench.robot.servo_units import AX12A, ServoUnits
 
 Array = NDArray[np.float64]

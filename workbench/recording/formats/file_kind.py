@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from workbench.files.numerals import number_of
+from workbench.files.tables import is_binary, plain_head, split_row
 from workbench.recording.formats.registry import format_of
 from workbench.recording.formats.rollout_table import is_rollout
-from workbench.robot.numerals import number_of
-from workbench.robot.tables import is_binary, plain_head, split_row
 
 Kind = Literal["recording", "motion", "rollout"]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.footfalls import foot_phases
+from workbench.files import InputError
 from workbench.gait.certificate import CLAIM, PUPPY_CLAIM, Certificate
 from workbench.gait.limits import each
 from workbench.gait.measure import GaitMeasure, measure
@@ -17,7 +18,7 @@ from workbench.gait.optimize import WALK, Optimized
 from workbench.gait.table import GaitTable
 from workbench.motion import load_motion
 from workbench.recording.take import Take
-from workbench.robot import PUPPY, InputError, RobotModel, data_file
+from workbench.robot import PUPPY, RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import (
     body_attitude,
@@ -171,8 +172,8 @@ def _table_section(table: GaitTable) -> Section:
     speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
     return Section("The table", [
-        Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that file, "
-             "and all but the first need `certificate.json` beside it."),
+        Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that "
+             "file, and all but the first ask for `certificate.json` beside it."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 

@@ -8,12 +8,13 @@ from typing import Literal
 
 from workbench.compare.compare_files import recorded_take
 from workbench.compare.session import Base
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.take import Take
-from workbench.robot import ROBOTS, InputError, RobotModel
-from workbench.robot.yaml_file import read_yaml
+from workbench.robot import ROBOTS, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 
