@@ -21,7 +21,7 @@ from workbench.robot import puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,
-                         variants=("2 ms", "1 ms"))
+                         variants=("2 ms", "1 ms"), n_jobs=1)
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +102,14 @@ def test_export_refuses_what_has_no_valid_certificate_unless_forced(made, tmp_pa
     assert not (tmp_path / "out").exists()
     succeeds(capsys, "export", str(path), "--out", str(tmp_path / "out"), "--cycles", "1", "--force")
     assert (tmp_path / "out/pos.txt").is_file()
+
+
+@pytest.mark.parametrize("verb", [("run",), ("run", "--upload"), ("play", "--port", "virtual"), ("flash", "--dry-run")])
+def test_no_verb_moves_a_robot_by_what_lacks_its_certificate(made, tmp_path, capsys, verb):
+    path = tampered(made[0], tmp_path, lambda f: (f / NAME).unlink())
+    said = refused(capsys, verb[0], str(path), *verb[1:], "--out", str(tmp_path / "out"))
+    assert "the certificate is missing; --force goes on all the same" in said
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_broken_limit_is_named(made, tmp_path):

@@ -65,8 +65,8 @@ def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool
 def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
     """Of a motion that `optimize` made, whether its certificate speaks for it on this robot; InputError where it does not, unless
     `force`, which warns. Every verb that moves a robot, or writes what moves one, asks this first."""
-    from workbench.gait.certificate import check_certificate, has_mark
     from workbench.files import InputError
+    from workbench.gait.certificate import check_certificate, has_mark
 
     if not has_mark(path):
         return
