@@ -33,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.device import export
+    from workbench.device.tables.firmware_tables import check_servos
     from workbench.motion import load_motion
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
@@ -42,7 +43,8 @@ def run(args: argparse.Namespace) -> int:
     cycles = motion.often(args.cycles, 3)
     check_model("export", model)
     check_motion("export", motion, cycles, args.yes)
-    motion.as_table()  # refused before the simulation
+    check_servos(motion, model)  # refused before the simulation
+    motion.as_table()
     check_certificate_of("export", args.motion, motion, model, args.force)
     base = "fixed" if model.kinematics.fixed_to_world else "free"
     with output_directory(args.out) as folder, Progress("export", stages=("simulating", "writing")) as progress:
