@@ -13,8 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from workbench.compare.session import Session
+from workbench.files import InputError
 from workbench.identify.rollouts.key import rollout_code
-from workbench.robot import InputError
 
 STAYS = 16
 """Letters of the digest in the folder's name."""

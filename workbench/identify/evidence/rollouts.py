@@ -25,8 +25,8 @@ Wants = tuple[int, Hypothesis]
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
     errors: of the time step, which are subtracted; they are measured on `reference`, a model near those that are compared.
-    step: in steps of the search. shared: effects of the whole robot, which act in all regions. most_work: after which nothing more
-    is tried, as `RolloutEvaluator.work` counts it."""
+    step: in steps of the search. shared: effects of the whole robot, which act in all regions. most_work: after
+    which nothing more is tried, as `RolloutEvaluator.work` counts it."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel

@@ -10,15 +10,18 @@ import hashlib
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import joblib
 import numpy as np
 
-from workbench.identify.problem import TakeEvidence
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
-_ROOMS = ("robot", "motion", "servo", "recording", "effects", "simulation", "identify/rollouts")
+if TYPE_CHECKING:
+    from workbench.identify.problem import TakeEvidence
+
+_ROOMS = ("files", "robot", "motion", "servo", "recording", "effects", "simulation", "identify/rollouts")
 _FILES = ("compare/channels.py", "compare/comparison.py", "compare/session_takes.py", "identify/problem.py")
 
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.problem import TakeEvidence
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
+
+if TYPE_CHECKING:
+    from workbench.identify.problem import TakeEvidence
 
 Array = NDArray[np.float64]
 SETTLE = 0.02
