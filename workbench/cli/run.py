@@ -45,11 +45,13 @@ def run(args: argparse.Namespace) -> int:
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
+    from workbench.robot.servo_units import known_units
     from workbench.view.report.comparison import write_comparison
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     cycles = motion.often(args.cycles, 10)
+    known_units(model, motion.joints)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
@@ -66,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
         if done.played.stopped:
-            return 130 if done.played.stopped == "Ctrl-C" else 2
+            return 130 if done.played.stopped.startswith("Ctrl-C") else 2
         session = load_session(done.session)
         comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
         write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)
