@@ -1,1 +1,1 @@
-"""What servo logs get wrong: units, leaps, readings that stand, zeros that shift, goals that are none."""
+"""Checks of servo logs: units, state, leaps, lead over the goal, plausibility against the robot."""
