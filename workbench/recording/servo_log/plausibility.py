@@ -13,15 +13,10 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording.recording import Recording
-<<<<<<< HEAD:workbench/recording/plausibility.py
-from workbench.recording.servo_log.faults import without_faults
-from workbench.robot import InputError
-=======
 from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.units import UNITS, unit_problems
->>>>>>> main:workbench/recording/servo_log/plausibility.py
 
 Array = NDArray[np.float64]
 
