@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RelativeChecks:
-    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal. later: rows
+    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal (which then gives `from_place` of its variance). later: rows
     by which it may come later. explained: share of the way's variance that the goals give. alike: of 1, how far the ratio of
-    the two may be. absolute: share of the position's variance that the goals give as angles, from which they are angles, if the
+    the two may be, for steps from row to row; from where the joint is, a servo makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they are angles, if the
     joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period later. smaller: the
     goals' range is at most so much of the position's. fewest: rows that tell."""
 
@@ -24,6 +24,9 @@ class RelativeChecks:
     later: int = 6
     explained: float = 0.85
     alike: float = 0.4
+    from_place: float = 0.7
+    least: float = 0.25
+    largest: float = 4.0
     absolute: float = 0.6
     beyond: float = 2.0
     smaller: float = 0.6
@@ -61,6 +64,8 @@ def _best(goal: Array, position: Array, c: RelativeChecks, summed: bool) -> bool
                 continue
             r = float(np.corrcoef(way, asked)[0, 1])
             slope = r * float(np.std(way) / np.std(asked))
-            if r > 0 and r * r > c.explained and abs(slope - 1) < c.alike:
+            right = (r * r > c.explained and abs(slope - 1) < c.alike) if summed else \
+                (r * r > c.from_place and c.least < slope < c.largest)
+            if r > 0 and right:
                 return True
     return False

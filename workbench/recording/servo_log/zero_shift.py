@@ -14,7 +14,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ShiftChecks:
-    """least: of a step between two rows [deg], and by `times` more than the joint's steps in the `near` rows on each side.
+    """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the `near` rows
+    on each side.
     alike: how far, in shares of the step, the level of the readings against the goals may differ from it. goal: a goal that steps
     by that share of it within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart tell
     nothing [s]. explained: share of the position's variance that the goals have to give. doubt: of two levels, the one nearer
@@ -42,11 +43,11 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
         return none, []
     steps = np.diff(log.position)
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
-    at = [int(k) for k in large if 2 <= k < len(steps) - 2 and _stands_out(steps, k, c) and not _asked(log, k, steps[k], c)]
+    at = [int(k) for k in large if 2 <= k < len(steps) - 2 and _stands_out(steps, k, c) and not _asked(log, k, float(steps[k]) - _usual(steps, k), c)]
     if not at:
         return none, []
     edges = [0, *(k + 1 for k in at), len(log.rows)]
-    jumps = np.array([steps[k] - _usual(steps, k, c) for k in at])
+    jumps = np.array([steps[k] - _usual(steps, k) for k in at])
     level = np.concatenate([[0.0], np.cumsum(jumps)])
     undone = log.position - np.repeat(level, np.diff(edges))
     fit = followed(log.time, log.goal, undone)
@@ -65,23 +66,25 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
 
 
 def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:
-    around = np.concatenate([steps[max(k - c.near, 0):k], steps[k + 1:k + 1 + c.near]])
-    usual = _usual(steps, k, c)
-    others = float(np.max(np.abs(around - usual)))
-    return bool(abs(steps[k] - usual) > max(np.deg2rad(c.least), c.times * others, c.times / 2 * abs(usual)))
+    """Whether step `k` differs from those beside it, which are alike, by more than steps differ nearby."""
+    bend = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2)  # of step i + 1
+    around = np.concatenate([bend[max(k - 2 - c.near, 0):max(k - 2, 0)], bend[k + 1:k + 1 + c.near]])
+    jump = abs(steps[k] - _usual(steps, k))
+    return bool(jump > max(np.deg2rad(c.least), c.times * float(np.max(around, initial=0.0)))
+                and abs(steps[k + 1] - steps[k - 1]) < jump / 3)
 
 
-def _usual(steps: Array, k: int, c: ShiftChecks) -> float:
+def _usual(steps: Array, k: int) -> float:
     """What the joint moves between the rows beside step `k` [rad]."""
-    beside = max(c.near // 4, 1)
-    return float(np.median(np.concatenate([steps[max(k - beside, 0):k], steps[k + 1:k + 1 + beside]])))
+    return float(steps[k - 1] + steps[k + 1]) / 2
 
 
 def _asked(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     """Whether a goal stepped the same way shortly before."""
     before = (log.time >= log.time[k] - c.before) & (log.time <= log.time[k + 1])
     goals = np.diff(log.goal[before])
-    return bool(len(goals) and np.max(goals * np.sign(step)) > c.goal * abs(step))
+    bend = goals[1:-1] - (goals[:-2] + goals[2:]) / 2
+    return bool(len(bend) and np.max(bend * np.sign(step)) > c.goal * abs(step))
 
 
 def _true_level(level: Array, edges: list[int], middle: list[float], offset: float, c: ShiftChecks) -> int:
