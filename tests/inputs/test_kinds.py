@@ -42,7 +42,8 @@ def test_a_take_of_motive_is_named_by_its_suffix() -> None:
 
 
 @pytest.mark.parametrize(("header", "said"), [
-    ("time_s (s),command (rad),motor_position (rad),motor_velocity (rad/s)", r"command \(rad\) to goal\.J .*motor_position \(rad\) to "
+    ("time_s (s),command (rad),motor_position (rad),motor_velocity (rad/s)", r"command \(rad\) to goal\.J .*motor_position "
+                                                                             r"\(rad\) to "
      r"position\.J, .*turn radians into degrees"),
     ("stamp,target_hip,actual_hip [deg]", r"stamp to time, target_hip to goal\.hip, actual_hip \[deg\] to position\.hip"),
     ("t,cmd.knee,knee.torque,state.knee.pos", r"cmd\.knee to goal\.knee, state\.knee\.pos to position\.knee"),
@@ -88,7 +89,8 @@ def test_a_floating_joint_from_the_world_is_a_free_base(tmp_path: Path, root: st
 
 
 def test_a_floating_joint_within_a_robot_is_refused_by_name(tmp_path: Path) -> None:
-    path = _robot(tmp_path, '<link name="ball"/><joint name="loose" type="floating"><parent link="shank"/><child link="ball"/></joint>')
+    path = _robot(tmp_path, '<link name="ball"/><joint name="loose" type="floating"><parent link="shank"/>'
+                            '<child link="ball"/></joint>')
     with pytest.raises(InputError, match="joint 'loose' is floating"):
         inspect_file(path)
 
@@ -101,9 +103,9 @@ def test_an_axis_without_direction_is_told_with_its_joint(tmp_path: Path) -> Non
 
 
 def test_a_frame_of_a_billionth_kilogram_is_no_problem(tmp_path: Path) -> None:
-    path = _robot(tmp_path, '<link name="imu"><inertial><mass value="1e-9"/><inertia ixx="1e-9" iyy="1e-9" izz="1e-9" ixy="0" ixz="0" '
-                            'iyz="0"/></inertial></link><joint name="imu_joint" type="fixed"><parent link="trunk"/><child link="imu"/>'
-                            '</joint>')
+    path = _robot(tmp_path, '<link name="imu"><inertial><mass value="1e-9"/><inertia ixx="1e-9" iyy="1e-9" izz="1e-9" ixy="0" '
+                            'ixz="0" iyz="0"/></inertial></link><joint name="imu_joint" type="fixed"><parent link="trunk"/>'
+                            '<child link="imu"/></joint>')
     assert inspect_file(path).problems == ()
 
 
@@ -127,7 +129,9 @@ def test_two_rigid_bodies_of_one_name_are_told(tmp_path: Path) -> None:
             ["", "", *["Rigid Body"] * 14], ["", "", *["leg"] * 14], ["", "", *["1"] * 7, *["2"] * 7], ["", "", *kinds, *kinds],
             ["Frame", "Time", *"XYZWXYZ" * 2]]
     rng = np.random.default_rng(0)
-    rows += [[str(i), f"{i / 100:.2f}", *(f"{v:.6f}" for _ in "ab" for v in (0, 0, 0, 1, *rng.normal(0, 1e-4, 3)))] for i in range(40)]
+    for i in range(40):
+        values = [v for _ in "ab" for v in (0, 0, 0, 1, *rng.normal(0, 1e-4, 3))]
+        rows.append([str(i), f"{i / 100:.2f}", *(f"{v:.6f}" for v in values)])
     path = tmp_path / "take.csv"
     path.write_text("\n".join(",".join(row) for row in rows) + "\n")
     assert any("2 rigid bodies are called 'leg'" in p for p in inspect_file(path).problems)

@@ -164,7 +164,7 @@ def test_times_that_lost_their_digits_are_told_as_that(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = [f"{1757027640 + t:.9g},{g:.6g},{p:.6g}" for t, g, p in zip(time, goal, position)]
     path.write_text("\n".join(["time,goal.arm,position.arm", *rows]) + "\n")
-    with pytest.raises(ValueError, match="line 3: time 1757027640 does not follow 1757027640: .*digits were lost"):
+    with pytest.raises(ValueError, match=r"line 3: time 1757027640 does not follow 1757027640: .*digits were lost"):
         read_recording(path)
 
 

@@ -24,8 +24,10 @@ _VIDEO = Kind("a video or picture", "record the servos' positions, or rigid bodi
 _MAT = Kind("a MATLAB file (MAT)", f"write {_TABLE} with writetable(array2table(...), 'log.csv')")
 _BEGINNINGS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"\x89MCAP0\r\n", Kind("a bag of ROS 2 (MCAP)", "name its joint topics' table, made by PlotJuggler or `mcap cat`")),
-    (0, b"#ROSBAG V", Kind("a bag of ROS 1 (rosbag)", "make a table of its joint topics: rostopic echo -b BAG -p TOPIC > log.csv")),
-    (0, b"SQLite format 3\0", Kind("an SQLite database, as a bag of ROS 2 is (.db3)", "name the bag's folder with its metadata.yaml, or "
+    (0, b"#ROSBAG V", Kind("a bag of ROS 1 (rosbag)", "make a table of its joint topics: rostopic echo -b BAG -p TOPIC > "
+                                                      "log.csv")),
+    (0, b"SQLite format 3\0", Kind("an SQLite database, as a bag of ROS 2 is (.db3)", "name the bag's folder with its "
+                                                                                      "metadata.yaml, or "
                                    f"write {_TABLE}")),
     (0, b"\x89HDF\r\n\x1a\n", Kind("an HDF5 file (h5, MAT 7.3, LeRobot or robomimic episodes)", f"write {_TABLE}, with h5py and "
                                     "pandas")),
@@ -54,7 +56,8 @@ _BEGINNINGS: tuple[tuple[int, bytes, Kind], ...] = (
     (0, b"\x7fELF", Kind("a program", "name the recording itself")),
 )
 _SUFFIXES = {
-    ".tak": Kind("a take of Motive (.tak)", "export it in Motive: File, Export Tracking Data, CSV, with header, quaternions, Global"),
+    ".tak": Kind("a take of Motive (.tak)", "export it in Motive: File, Export Tracking Data, CSV, with header, quaternions, "
+                                            "Global"),
     ".c3d": Kind("a C3D file", "it is damaged, or no C3D: its second byte is not 0x50"),
     ".qtm": Kind("a capture of Qualisys (.qtm)", "export its 6D data in QTM: File, Export, TSV, with 6D and header"),
     ".x2d": Kind("a capture of Vicon (.x2d)", "reconstruct it and export trajectories or C3D in Nexus or Tracker"),

@@ -75,7 +75,8 @@ def _supply_problems(said: Any, measured: Array) -> list[str]:
     volts = float(np.median(seen))
     if abs(said - volts) <= max(_SUPPLY * volts, _LEAST_VOLTS):
         return []
-    return [f"vin says {said:g} V, but the servo measured {volts:.4g} V (input_volts, {seen.min():.4g} to {seen.max():.4g}): give the "
+    return [f"vin says {said:g} V, but the servo measured {volts:.4g} V (input_volts, {seen.min():.4g} to {seen.max():.4g}): "
+            f"give the "
             "supply that was there as the servo's supply_voltage"]
 
 

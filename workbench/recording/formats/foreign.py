@@ -15,12 +15,13 @@ from workbench.recording.formats.table_header import table_header
 
 _SHOWN = 6
 """Columns named in one line."""
-_UNIT = re.compile(r"(?i)[\s_./]*[\[(]\s*(rad|deg|degrees?|radians?|°|s|sec|seconds?|ms|us|ns|rad/s|deg/s|counts?|ticks?|v|a|nm|n m|%|c)"
+_UNIT = re.compile(r"(?i)[\s_./]*[\[(]\s*(rad|deg|degrees?|radians?|°|s|sec|seconds?|ms|us|ns|rad/s|deg/s|counts?|ticks?|v|a|nm)"
                    r"\s*[\])]$|[\s_]+(rad|deg|degrees|radians|counts|ticks|sec|secs|seconds|s|ms)$")
 """What stands after a column's name: its unit, in brackets or after a line."""
 _TIME = re.compile(r"(?i)%?_*(time|timestamp|t|stamp|secs?|seconds?|elapsed)(_?(since|from)_?(start|boot))?(_?stamp)?")
 _GOAL = r"(?:action|actions|command|commanded|cmd|target|goal|desired|reference|setpoint|set_point|ref|des)"
-_SEEN = r"(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|angle|q|meas|motor_position|/?joint_states)"
+_SEEN = (r"(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|angle|q|meas|motor_position|"
+         r"/?joint_states)")
 _PLACE = r"(?:[._/](?:pos|position|angle|q))?"
 _NAMED = (
     ("velocity", re.compile(r"(?i)(?:.*/)?(.+?)[._/ ](?:velocity|vel|speed)")),
@@ -63,8 +64,8 @@ def refusal(path: Path, head: bytes) -> InputError:
         return InputError(path, f"line 1: {len(cells)} columns of numbers without names; expected a header (of a joint log: "
                                 "time, goal.J and position.J of each joint J in degrees; of a Motive export: its own)")
     more = f" and {len(cells) - _SHOWN} more" if len(cells) > _SHOWN else ""
-    text = f"line {header.lines}: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected time [s], " \
-           f"goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
+    text = f"line {header.lines}: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected " \
+           f"time [s], goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
     return InputError(path, text + _hint([_column(c) for c in cells]))
 
 
@@ -92,8 +93,9 @@ def _hint(columns: list[_Column]) -> str:
     if time is None or not others or any(_marked(c) == "goal" for c in others):
         return ""
     joints = ", ".join(_joint_of(c)[:30] for c in others[:3])
-    return (f"; a column for each joint and no goals is nearly a motion table: to play it as a motion, rename the columns to time, {joints}"
-            f"{' and so on' if len(others) > 3 else ''}, poses in degrees{into}; as a recording it lacks the goals")
+    more = " and so on" if len(others) > 3 else ""
+    return ("; a column for each joint and no goals is nearly a motion table: to play it as a motion, rename them to time, "
+            f"{joints}{more}, poses in degrees{into}; as a recording it lacks the goals")
 
 
 def _marked(column: _Column) -> str | None:

@@ -44,7 +44,7 @@ def order_problem(time: Array) -> OrderProblem | None:
     steps = np.diff(np.unique(known))
     coarse = float(steps.min()) if len(steps) else 0.0
     if len(known) > 2 and np.all(np.diff(known) >= 0) and (coarse >= 1 or (not coarse and known[0] > _EPOCH)):
-        lost = "the same time stands in several rows: its digits were lost when it was written (rounded to fewer than tell rows apart)"
+        lost = "the same time stands in several rows: its digits were lost when it was written (rounded)"
         return OrderProblem(row, f"{text}: {lost}; write seconds since the first row, or with all digits")
     return OrderProblem(row, f"{text}; expected increasing times")
 

@@ -16,8 +16,7 @@ _MOST = 200
 
 @dataclass(frozen=True)
 class TableHeader:
-    """names: of the columns. end: bytes before the first row of data. lines: rows of the file before it. index: whether the first
-    column is a nameless count of rows, as pandas writes it."""
+    """names: of the columns. end: bytes before the first row of data. lines: rows of the file before it."""
 
     names: tuple[str, ...]
     end: int
@@ -25,6 +24,7 @@ class TableHeader:
 
     @property
     def index(self) -> bool:
+        """Whether the first column is a nameless count of rows, as pandas writes it."""
         return len(self.names) > 1 and self.names[0] in ("", "Unnamed: 0")
 
 

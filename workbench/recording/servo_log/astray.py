@@ -12,10 +12,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AstrayChecks:
-    """rows: a reading may be off for so many rows. times: off the line between its neighbours by more than so many times what `share`
-    of the readings nearby are, and `way` of what the joint moves in a row there, and at least `least` [deg]; again: by so many of the steps of
-    the two rows beside it where its value comes several times. near: rows on each side that count. slowest: rows further apart
-    tell nothing [s]. most: share of a log's rows beyond which they are no exception."""
+    """rows: a reading may be off for so many rows. times: off the line between its neighbours by more than so many times what
+    `share` of the readings nearby are, and `way` of what the joint moves in a row there, and at least `least` [deg]; again: by
+    so many of the steps of the two rows beside it where its value comes several times. near: rows on each side that count.
+    slowest: rows further apart tell nothing [s]. most: share of a log's rows beyond which they are no exception."""
 
     rows: int = 2
     times: float = 4.0
@@ -46,8 +46,9 @@ def without_astray(time: Array, position: Array, c: AstrayChecks = ASTRAY) -> tu
     out = position.copy()
     out[seen[off]] = np.nan
     first = int(np.flatnonzero(off)[0])
-    value = f"all of exactly {np.rad2deg(returning[0]):.4g} deg" if len(returning) == 1 and np.isin(values[off], returning).all() \
-        else f"the first of {np.rad2deg(values[first]):.4g} deg"
+    one = len(returning) == 1 and bool(np.isin(values[off], returning).all())
+    value = f"all of exactly {np.rad2deg(returning[0]):.4g} deg" if one else \
+        f"the first of {np.rad2deg(values[first]):.4g} deg"
     return out, [f"{int(off.sum())} single reading(s) lie off the joint's way, {value}, the first at {time[seen[first]]:.3f} s "
                  f"(row {seen[first] + 1}): as a bus writes when a servo does not answer; taken out"]
 

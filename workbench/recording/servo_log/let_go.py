@@ -49,7 +49,8 @@ def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> int | None:
         if until.sum() < FOLLOW.fewest:
             continue
         fit = followed(time[until], goal[until], position[until])
-        if fit.explained >= c.before and fit.gain >= c.firm and _goes_back(goal[until], c) and _free(time, goal, position, start, fit, c):
+        follows = fit.explained >= c.before and fit.gain >= c.firm and _goes_back(goal[until], c)
+        if follows and _free(time, goal, position, start, fit, c):
             left = np.abs(position - fit.predicted(time, goal))
             usual = float(np.sqrt(np.mean(left[until] ** 2)))
             gone = np.flatnonzero((left > c.leaves * usual) & (time >= start - 2 * (last - first) / c.tries))

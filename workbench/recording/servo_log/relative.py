@@ -14,11 +14,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class RelativeChecks:
-    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal (which then gives `from_place` of its variance). later: rows
-    by which it may come later. explained: share of the way's variance that the goals give. alike: of 1, how far the ratio of
-    the two may be, for steps from row to row; from where the joint is, a servo makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they are angles, if the
-    joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period later. smaller: the
-    goals' range is at most so much of the position's. fewest: rows that tell."""
+    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal (which then
+    gives `from_place` of its variance). later: rows by which it may come later. explained: share of the way's variance that the
+    goals give. alike: of 1, how far the ratio of the two may be, for steps from row to row; from where the joint is, a servo
+    makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they
+    are angles, if the joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period
+    later. smaller: the goals' range is at most so much of the position's. fewest: rows that tell."""
 
     spans: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
     later: int = 6
@@ -48,7 +49,8 @@ def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
         return ("looks like the change of the position from row to row: relative actions (deltas); add them up to angles before "
                 "use")
     if _best(goal, position, c, summed=False):
-        return ("looks like the way from the position to the goal: relative actions; add each row's position to get angles before "
+        return ("looks like the way from the position to the goal: relative actions; add each row's position to get angles "
+                "before "
                 "use")
     return None
 

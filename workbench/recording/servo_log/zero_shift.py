@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ShiftChecks:
-    """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the `near` rows
-    on each side.
-    alike: how far, in shares of the step, the level of the readings against the goals may differ from it. goal: a goal that steps
-    by that share of it within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart tell
-    nothing [s]. explained: share of the position's variance that the goals have to give. doubt: of two levels, the one nearer
-    to the goals counts as the right one, the first where they are alike to that share."""
+    """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the
+    `near` rows on each side. alike: how far, in shares of the step, the level of the readings against the goals may differ from
+    it. goal: a goal that steps by that share of it within `before` explains it [s]. rows: of a stretch, at least. slowest: rows
+    further apart tell nothing [s]. explained: share of the position's variance that the goals have to give. doubt: of two
+    levels, the one nearer to the goals counts as the right one, the first where they are alike to that share."""
 
     least: float = 1.0
     times: float = 4.0
@@ -43,7 +43,8 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
         return none, []
     steps = np.diff(log.position)
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
-    at = [int(k) for k in large if 2 <= k < len(steps) - 2 and _stands_out(steps, k, c) and not _asked(log, k, float(steps[k]) - _usual(steps, k), c)]
+    inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
+    at = [k for k in inside if _stands_out(steps, k, c) and not _asked(log, k, float(steps[k]) - _usual(steps, k), c)]
     if not at:
         return none, []
     edges = [0, *(k + 1 for k in at), len(log.rows)]
@@ -54,7 +55,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     if fit.explained < c.explained:
         return none, []
     away = log.position - fit.predicted(log.time, log.goal)
-    middle = [float(np.median(away[a:b])) for a, b in zip(edges, edges[1:])]
+    middle = [float(np.median(away[a:b])) for a, b in pairwise(edges)]
     for i, jump in enumerate(jumps):
         if min(edges[i + 1] - edges[i], edges[i + 2] - edges[i + 1]) < c.rows:
             return none, []
@@ -96,7 +97,7 @@ def _true_level(level: Array, edges: list[int], middle: list[float], offset: flo
 
 
 def _line(log: JointLog, off: Array, edges: list[int]) -> str:
-    shifted = [(a, b) for a, b in zip(edges, edges[1:]) if abs(off[a]) > 0]
+    shifted = [(a, b) for a, b in pairwise(edges) if abs(off[a]) > 0]
     a, b = shifted[0]
     size = f"{np.rad2deg(off[a]):+.2f} deg"
     if len(shifted) == 1 and b == len(off):
@@ -105,5 +106,6 @@ def _line(log: JointLog, off: Array, edges: list[int]) -> str:
         where = f"from {log.time[a]:.3f} to {log.time[b - 1]:.3f} s (rows {log.rows[a] + 1} to {log.rows[b - 1] + 1})"
     else:
         where = f"in {len(shifted)} stretches, the first from {log.time[a]:.3f} s (row {log.rows[a] + 1})"
-    return (f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or homing offset, a "
+    return (f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or homing "
+            f"offset, a "
             "slipped horn or sensor); set right by that much")

@@ -23,8 +23,9 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class ModelChecks:
     """dummy: a link that weighs no more than that stands for a frame; nothing of its inertia matters [kg]. outside: how far a
-    centre of mass may lie outside the box about its link's shapes and joints, in diagonals of that. gyration: of a link's radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m].
-    dense: no link of its reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
+    centre of mass may lie outside the box about its link's shapes and joints, in diagonals of that. gyration: of a link's
+    radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m]. dense: no link of its
+    reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
 
     dummy: float = 1e-5
     outside: float = 1.0
@@ -180,7 +181,8 @@ def _centre_outside(plant: Any, scene_graph: Any, body: Any) -> Iterator[str]:
     away = float(np.linalg.norm(c - np.clip(c, lower, upper)))
     if away > CHECKS.outside * size:
         x, y, z = c
-        yield (f"link '{body.name()}': its centre of mass at {x:.3g} {y:.3g} {z:.3g} m lies {away:.2g} m outside its shapes and joints, "
+        yield (f"link '{body.name()}': its centre of mass at {x:.3g} {y:.3g} {z:.3g} m lies {away:.2g} m outside its shapes "
+               f"and joints, "
                f"which are {size:.2g} m across: is its origin in millimetres, or in another frame?")
 
 

@@ -64,7 +64,8 @@ def _free_bases(joints: list[Element], links: list[Element], path: Path) -> tupl
         if joint.get("type") == _FREE:
             parent, child = _end(joint, "parent", path), _end(joint, "child", path)
             if parent in weigh or any(_end(j, "child", path) == parent for j in joints):
-                raise InputError(path, f"joint '{joint.get('name')}' is floating, from '{parent}' to '{child}', within the robot; "
+                raise InputError(path, f"joint '{joint.get('name')}' is floating, from '{parent}' to '{child}', within the "
+                                       f"robot; "
                                        "expected revolute, continuous, prismatic or fixed there")
             free.add(child)
             roots.add(parent)
