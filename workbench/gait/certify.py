@@ -69,8 +69,8 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     floor = _floor(request, dict(zip(variants, _taken(results, len(variants)))))
     elsewhere = {} if other is None else _elsewhere(request, other[0], nominal, next(results))
     checks = _taken(results, len(robots[:options.checked]))
-    measured = [m for group in results for m in group]
     cycle: LimitCycle | None = next(results) if options.watched else None
+    measured = [m for group in results for m in group]
     told, on_draws = _on_draws(request, machine, measured)
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
