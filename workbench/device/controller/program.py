@@ -9,7 +9,7 @@ from pathlib import Path
 
 from workbench.device.controller.loader import LoaderProfile, check_image
 from workbench.device.tables.limits import Violation, refuse_broken_limits
-from workbench.device.tables.table_file import TableFile, bounds_of, encode_table, read_table_file, too_long
+from workbench.device.tables.table_file import TableFile, encode_table, read_table_file, table_file, too_long
 from workbench.files import InputError
 from workbench.files.resources import resource_dir
 from workbench.motion import load_motion
@@ -37,7 +37,7 @@ def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: b
     loaded = load_motion(motion, model)
     table = loaded.as_table()
     violations = refuse_broken_limits(table, model, force, None, "not loaded")
-    return TableFile(table, bounds_of(table, model), cycles or 0, cycles is not None), tuple(violations)
+    return table_file(table, model, cycles or 0, cycles is not None), tuple(violations)
 
 
 def build_program(motion: str | Path, model: RobotModel, profile: LoaderProfile, folder: Path, cycles: int | None = None,
