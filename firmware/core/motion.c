@@ -59,12 +59,12 @@ static uint32_t speed_of_way(uint32_t way, uint32_t dwell_ms) {
 }
 
 /* What is sent where the table says 0, "at once": a servo that is told so and is not there goes as fast as it can. Instead its way
-   from the last goal takes the pose's dwell; without one it holds, and comes back from wherever it is pushed at the ramp's speed. */
+   from the last goal takes the pose's dwell; without one it goes on at the speed that it had, as it may still be under way. */
 static uint16_t speed_to_send(const struct robot *r, uint32_t pose, uint32_t j, uint16_t from) {
     const uint8_t *t = playing(r);
     uint32_t speed = table_speed(t, pose, j), way = distance(table_goal(t, pose, j), from);
     if (speed) return (uint16_t)speed;
-    speed = way ? speed_of_way(way, table_dwell(t, pose)) : RAMP_SPEED;
+    speed = way ? speed_of_way(way, table_dwell(t, pose)) : r->speeds[j];
     if (way && speed < RAMP_SLOWEST) speed = RAMP_SLOWEST;
     return (uint16_t)(speed < table_fastest(t, j) ? speed : table_fastest(t, j));
 }

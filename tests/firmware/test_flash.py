@@ -40,8 +40,8 @@ def test_a_program_is_loaded_and_started_and_the_transcript_tells_all() -> None:
     transcript = load(line)
     assert (line.controller.runs, line.controller.program, line.stays) == ("new", IMAGE, True)
     text = transcript.text
-    for said in ("we send: '#'", "CM530 Boot loader", "we send: 'LOAD\\r'", "'APP\\r'", "Ready", "the image, 3009 bytes", "Success",
-                 "'GO\\r'"):
+    for said in ("we send: '#'", "CM530 Boot loader", "we send: 'LOAD\\r'", "'APP\\r'", "Ready", "the image, 3009 bytes",
+                 "Success", "'GO\\r'"):
         assert said in text
 
 

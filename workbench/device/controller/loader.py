@@ -15,8 +15,8 @@ FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that b
 PROMPT_WAIT, ANSWER_WAIT, START_WAIT = 20.0, 5.0, 2.0
 """How long the user has to switch on, the loader to answer, and the program to speak [s]."""
 DEAF, QUIET, PROMPT_AGAIN = 3.0, 0.2, 2.0
-"""Silence after which the port is opened anew while the key is held; silence after which the loader has said all; how long it has to
-answer an empty line [s]. A USB adapter may keep bytes for 16 ms."""
+"""Silence after which the port is opened anew while the key is held; silence after which the loader has said all; how long it has
+to answer an empty line [s]. A USB adapter may keep bytes for 16 ms."""
 CHUNK = 256
 
 
@@ -121,8 +121,8 @@ class Loading:
                             f"{_listed(profile.identity)})", self._state, "check which controller this is")
 
     def _fresh_prompt(self) -> bytes:
-        """Has it forget what is left in its line, as the last keys, which came after it had begun to listen: lines are ended until one
-        is answered by nothing but a prompt. All that it said."""
+        """Has it forget what is left in its line, as keys that came after it had begun to listen: lines are ended until one is
+        answered by nothing but a prompt. All that it said."""
         heard = self._until_quiet()
         for _ in range(5):
             self._write(self._profile.line_end)
@@ -189,7 +189,7 @@ class Loading:
         self._write(profile.keep + profile.line_end)
         said = self._until_prompt(PROMPT_AGAIN)
         if any(text in said for text in profile.refused):
-            self._transcript.note("we note", f"{profile.keep.decode()} is unknown to it: after a reset it may wait in its console")
+            self._transcript.note("we note", f"{profile.keep.decode()} is unknown to it: it may wait for commands after a reset")
         self._fresh_prompt()
         self._write(profile.start + profile.line_end)
         for again in (False, True):

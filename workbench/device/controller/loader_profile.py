@@ -75,8 +75,8 @@ def load_loader_profile(path: str | Path | None = None) -> LoaderProfile:
     return LoaderProfile(
         content["name"], bool(content["confirmed"]), content["rate"], content["key"].encode(), content["key_every"],
         content["line_end"].encode(), content["byte_sum"], texts("prompt"), texts("identity"), commands["load"].encode(),
-        commands["keep"].encode(), commands["start"].encode(), texts("ready"), texts("success"), texts("refused"), texts("failure"),
-        texts("started"), address("application"), address("flash_end"), str(path))
+        commands["keep"].encode(), commands["start"].encode(), texts("ready"), texts("success"), texts("refused"),
+        texts("failure"), texts("started"), address("application"), address("flash_end"), str(path))
 
 
 def check_image(image: bytes, profile: LoaderProfile, source: str) -> None:

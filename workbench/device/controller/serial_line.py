@@ -36,7 +36,7 @@ class SerialLine:
             time.sleep(0.002)
 
     def reopen(self) -> None:
-        """Closes and opens it again, with DTR and RTS low: some boards reset at them, or hear nothing after a reset until then."""
+        """Closes and opens it again, with DTR and RTS low, which reset some boards; a board may be deaf until then."""
         self._guard(self._port.close)
         self._guard(self._port.open)
         self.lines_low()

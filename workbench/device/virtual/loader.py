@@ -1,7 +1,7 @@
 """An emulated loader at the other end of a line, in virtual time: what a controller is after each thing that can go wrong.
 
-Its texts are those of data/loaders, so it is a witness of the conversation's order and of every cut, not of the texts themselves. It is
-no more polite than a console: it keeps every character that is typed, echoes it, and refuses what it does not know.
+Its texts are those of data/loaders, so it is a witness of the conversation's order and of every cut, not of the texts themselves.
+Like a console it keeps every character that is typed, echoes it, and refuses what it does not know.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class EmulatedLoader:
     """A line to a controller that is being switched on with the key held.
 
     cut_after: bytes over the line, both ways together, after which it is gone. says: replaces a text of the profile, by name.
-    mute: never says anything. starts: what the program says when it is started (default: a STATE frame as ours). late: how long each of
-    its texts takes to come [s], as over a USB adapter. deaf: hears nothing until the port has been closed and opened again. drops: the
-    first of so many characters of each command is lost.
+    mute: never says anything. starts: what the program says when it is started (default: our STATE frame). late: how long each
+    text takes to come [s], as over a USB adapter. deaf: hears nothing until the port has been closed and opened again. drops: how
+    often the first character of LOAD is lost.
     """
 
     def __init__(
@@ -71,8 +71,8 @@ class EmulatedLoader:
         if name in self._says:
             return self._says[name]
         profile = self._profile
-        name = profile.identity[0]
-        banner = b"\r\nSYSTEM O.K. (" + name + b" Boot loader V1.04)\r\nRead Protection: OFF\r\n" + profile.prompt[0]
+        who = profile.identity[0]
+        banner = b"\r\nSYSTEM O.K. (" + who + b" Boot loader V1.04)\r\nRead Protection: OFF\r\n" + profile.prompt[0]
         return {"banner": banner, "prompt": profile.prompt[0], "ready": profile.ready[0], "success": profile.success[0],
                 "refused": profile.refused[0], "started": profile.started[0] + b"3845"}[name]
 
