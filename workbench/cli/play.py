@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_cycles, add_model, add_out, load_model
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser)
     add_cycles(parser, 3)
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
@@ -45,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.files import InputError
     from workbench.motion import load_motion
     from workbench.robot.servo_registers import save_registers
+    from workbench.robot.servo_units import known_units
 
     if (args.motion is None) == (args.finish is None):
         raise InputError(None, "expected either MOTION or --finish JOURNAL")
@@ -54,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    known_units(model, motion.joints)
+    check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)
