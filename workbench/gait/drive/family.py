@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 
+from workbench.files import InputError
+from workbench.gait.certificate import NAME, read_certificate
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import GaitTable, gait_table
 from workbench.motion import Commands, PoseTable
+from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
 """Turns are rounded to this [rad per stance], an eighth of the scatter of one cycle's heading: tables are made once for each."""
@@ -59,3 +63,17 @@ class GaitFamily:
         goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
         first = parts[0]
         return PoseTable(first.joints, goals, speeds, dwells, "drive", first.units).commands(1)
+
+
+def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
+    """The family of a gait that `optimize` wrote: its shape stands in the certificate beside `motion`. InputError where there is
+    none, or it is of another robot."""
+    at = Path(motion).parent / NAME
+    certificate = read_certificate(at)
+    if certificate.model_sha256 != model.sha256:
+        raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
+    known = {f.name for f in fields(GaitShape)}
+    if not set(certificate.shape) <= known or "family" not in certificate.shape:
+        raise InputError(at, "shape: expected the shape of a gait that was searched for; this one cannot be steered")
+    shape = dict(certificate.shape)
+    return GaitFamily(GaitMachine(model), GaitShape(**{**shape, "knees": tuple(shape["knees"])}))

@@ -103,7 +103,8 @@ def drive(family: GaitFamily, robot: RobotModel, path: WayPath, controller: Cycl
         run.send(family.stop)
         run.advance(family.stop.end)
     columns = np.array(rows).T
-    return Driven(path, columns[:3].T, columns[3:6].T, *columns[6:], reason, run.take("driven"))
+    turns, left, off, along, bias = columns[6:]
+    return Driven(path, columns[:3].T, columns[3:6].T, turns, left, off, along, bias, reason, run.take("driven"))
 
 
 def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[float, float, bool]:
