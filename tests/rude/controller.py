@@ -1,4 +1,4 @@
-"""Rude partners of the controller's core: one session, one fault, one place, and what the monitor says (firmware/tests/rude.c)."""
+"""Rude partners of the controller's core: one session, one fault, one place, and the monitor's word (firmware/tests/rude.c)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from tests.firmware.native import core
 FAULTS = (
     "nothing", "answer lost", "stray bytes", "first byte lost", "answer flipped", "answer cut", "packet lost", "packet flipped",
     "late answer", "ten answers lost", "unplugged", "half unplugged", "servo restarted", "supply dip", "supply gone",
-    "return level 1", "two of one ID", "hot", "overload", "low battery", "babble", "watchdog", "MODE", "brown-out", "blocked", "slow answers",
+    "return level 1",
+    "two of one ID", "hot", "overload", "low battery", "babble", "watchdog", "MODE", "brown-out", "blocked", "slow answers",
     "link flipped", "link cut", "STOP", "RELEASE", "PLAY", "remote 1", "remote 6", "START", "START held", "late boot",
 )
 MODES = ("at", "from", "now and then from")

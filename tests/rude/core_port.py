@@ -14,8 +14,8 @@ BYTES_A_MS = 5.76
 class CorePort:
     """What `Controller` wants of a port; waiting lets the robot's milliseconds go by. each_ms: called after every one of them.
 
-    unplugged: nothing goes through any more. flips: share of bytes in which a bit flips, both ways. sent: types of the frames that
-    the host wrote."""
+    unplugged: nothing goes through any more. flips: share of bytes in which a bit flips, both ways. sent: types of the frames
+    that the host wrote."""
 
     def __init__(self, sim: Sim, each_ms: Callable[[], None] = lambda: None, seed: int = 0) -> None:
         self.sim, self.each_ms = sim, each_ms

@@ -103,8 +103,8 @@ class Trouble:
     servo: int
 
 
-KINDS = ("nothing", "mute", "hot", "overload", "twin", "babble", "START held", "remote 1", "remote 6", "link cut", "watchdog", "flips",
-         "Ctrl-C", "Ctrl-C, twice", "supply")
+KINDS = ("nothing", "mute", "hot", "overload", "twin", "babble", "START held", "remote 1", "remote 6", "link cut", "watchdog",
+         "flips", "Ctrl-C", "Ctrl-C, twice", "supply")
 
 
 def make(trouble: Trouble, sim: Sim, port: CorePort) -> None:
