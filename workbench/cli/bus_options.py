@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from workbench.cli.options import load_model
@@ -103,6 +104,8 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
         image = Path(args.image).read_bytes()
     except OSError as e:
         raise InputError(args.image, f"cannot be read ({e.strerror})") from None
+    if find_spec("unicorn") is None:
+        raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     from workbench.device.virtual.cm530 import Board
     from workbench.device.virtual.cm530.port import PcLinkPort
 
