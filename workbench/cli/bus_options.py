@@ -100,12 +100,12 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
         return
     if args.image is None:
         raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+    if find_spec("unicorn") is None:
+        raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     try:
         image = Path(args.image).read_bytes()
     except OSError as e:
         raise InputError(args.image, f"cannot be read ({e.strerror})") from None
-    if find_spec("unicorn") is None:
-        raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     from workbench.device.virtual.cm530 import Board
     from workbench.device.virtual.cm530.port import PcLinkPort
 
