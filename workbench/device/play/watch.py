@@ -71,6 +71,10 @@ class Watch:
         self._only_release, self.reaction = True, None
         self._seen.clear()
 
+    def failed(self, servo: int) -> int:
+        """How many questions in a row a servo has left unanswered."""
+        return self._failed[servo]
+
     def heard(self, servo: int) -> float:
         """When a servo last answered [s]."""
         return self._answered.get(servo, -math.inf)
