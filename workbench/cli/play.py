@@ -88,9 +88,14 @@ def _tell(log: Path, played: Played) -> int:
     else:
         read = f"; each joint read {min(played.rates.values()):.0f} times a second or more" if played.rates else ""
         print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late{read}")
+    if played.repaired:
+        print(f"workbench play: warning: {played.repaired} goals did not arrive and were sent again", file=sys.stderr)
+    if played.missed:
+        print(f"workbench play: problem: {played.missed} goals did not reach their servos in time; this was not the motion "
+              "asked for", file=sys.stderr)
     print(f"torque is {'off' if played.released else 'on'}" if not played.unknown else
           f"workbench play: torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off",
           file=sys.stderr if played.unknown else sys.stdout)
     if played.stopped.startswith(CTRL_C):
         return 130
-    return 2 if played.stopped or played.unknown else 0
+    return 2 if played.stopped or played.unknown or played.missed else 0

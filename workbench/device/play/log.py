@@ -23,9 +23,9 @@ HOLE = 0.05
 """Readings farther apart than this say nothing of the speed between them [s]."""
 STILL = math.radians(0.5)
 """Two readings that differ by less say where a joint was between them, as long as no goal moves it [rad]."""
-LATE = 4.0
+LATE = 2.0
 """An answer that took so many times as long as usual, and DELAY longer, has an unknown time, as the computer stood still."""
-DELAY = 0.005
+DELAY = 0.002
 
 
 class NothingPlayedError(InputError):
@@ -52,7 +52,7 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     if not content.sent or not all(len(content.read.get(j, ())) > 1 for j in content.joints):
         raise NothingPlayedError(journal, "no goals, or a joint that was not read twice; expected a motion that was played")
     start = _rest_begins(content)
-    readings = {j: _trusted(np.array(content.read[j], dtype=float)) for j in content.joints}
+    readings = _trusted({j: np.array(content.read[j], dtype=float) for j in content.joints})
     end = max(rows[-1, 0] for rows in readings.values())
     poses = np.array([t for t, _ in content.sent if t >= start])
     moved = poses[0] if len(poses) else end
@@ -91,11 +91,17 @@ def _rows(start: float, poses: Array, read: Array) -> Array:
     return rows[np.append(True, np.diff(rows) > 1e-5)]
 
 
-def _trusted(rows: Array) -> Array:
-    """Readings without those whose answer was so late that the question may not have gone out when it should have."""
-    took = rows[:, 4]
+def _trusted(readings: Mapping[str, Array]) -> dict[str, Array]:
+    """Readings without those whose answer was so late that the question may not have gone out when it should have; the first and
+    the last of a joint stay."""
+    took = np.concatenate([rows[:, 4] for rows in readings.values()])
     usual = np.nanmedian(took) if np.isfinite(took).any() else 0.0
-    return rows[~(took > max(LATE * usual, usual + DELAY))]
+    out = {}
+    for joint, rows in readings.items():
+        late = rows[:, 4] > max(LATE * usual, usual + DELAY)
+        late[[0, -1]] = False
+        out[joint] = rows[~late]
+    return out
 
 
 def _position(time: Array, known: Array, values: Array, moved: float) -> Array:

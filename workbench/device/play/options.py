@@ -40,7 +40,8 @@ class Played:
     """How it went. started: when the first pose was sent, ended: when the last one's dwell was over or the motion was stopped,
     on the bus's clock [s]. worst_late: by which a pose was late [s]. stopped: why it ended early, "" where it did not. released:
     whether torque is off. unknown: joints that did not say so when they were asked. rates: readings of each joint in the motion,
-    a second. log_problem: why there is no joint log, "" where there is one."""
+    a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time, and poses
+    sent only when the next one was due. log_problem: why there is no joint log, "" where there is one."""
 
     journal: Path
     started: float
@@ -51,4 +52,6 @@ class Played:
     released: bool
     unknown: tuple[str, ...] = ()
     rates: Mapping[str, float] = field(default_factory=dict)
+    repaired: int = 0
+    missed: int = 0
     log_problem: str = ""

@@ -49,6 +49,7 @@ class _Performance:
         self._asked = ""
         self.read_before: Counter[str] = Counter()
         self.read: Counter[str] = Counter()
+        self.overtaken, self.missed_before = 0, 0
         self._energised = False
 
     def run(self, commands: Commands) -> Played:
@@ -83,7 +84,7 @@ class _Performance:
         finally:
             bus.options = kept
         return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown,
-                      self._rates())
+                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before)
 
     def _rates(self) -> dict[str, float]:
         """Readings of each joint in the motion, a second."""
@@ -185,7 +186,8 @@ class _Performance:
         """Each pose at its time after the first, however late the one before it was; its time is that of its packet's end."""
         rig, bus = self.rig, self.rig.bus
         self.started, self.read_before = bus.now(), Counter(self.rig.readings)
-        packet = 0.0
+        packet, self.missed_before = 0.0, rig.missed
+        ends = [*commands.times.tolist()[1:], commands.end]
         for k, time in enumerate(commands.times.tolist()):
             self._read_until(self.started + time - packet)
             begun = bus.now()
@@ -196,6 +198,7 @@ class _Performance:
             self.poses += 1
             if not k:
                 self.started, packet = sent, sent - begun
+            self.overtaken += sent - self.started > ends[k]
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
         self.ended, self.read = bus.now(), rig.readings - self.read_before

@@ -16,6 +16,8 @@ from workbench.motion.lead_in import SLOW
 
 STATE = ("present_position", "present_load", "present_voltage", "present_temperature")
 POSITION = ("present_position",)
+GOAL = "goal_position"
+"""Read back with every second reading of a servo: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
 ROUND, ROUND_AT_ONCE = 0.018, 0.003
 """Shortest time in which all servos are read once [s], one after the other, and by one question: more would show nothing new of a
 joint that swings a few times a second."""
@@ -38,7 +40,9 @@ LIMP_EVERY = 5
 @dataclass
 class Rig:
     """ids: by joint. Reads in turn whenever there is time, and writes down everything. torque_limits: of each joint's servo, in
-    counts, as it was found. readings: of each joint's position, so far."""
+    counts, as it was found. readings: of each joint's position, so far. repaired: goals that
+    had to be sent again. missed: goals
+    that had not arrived when the next one was sent."""
 
     bus: Bus
     ids: Mapping[str, int]
@@ -57,7 +61,10 @@ class Rig:
         ends = [profile.registers[name] for name in (*STATE, *self._limp)]
         self._together = max(r.address + r.size for r in ends) - min(r.address for r in ends) <= SPAN
         self._told: dict[str, tuple[int, int]] = {}
+        self._goals: dict[str, float] = {}
         self._suspects: list[str] = []
+        self._open: set[str] = set()
+        self.repaired, self.missed = 0, 0
         self.readings: Counter[str] = Counter()
         self.angles: dict[str, float] = {}
 
@@ -84,17 +91,35 @@ class Rig:
 
         Speed 0, at once, is never sent: a joint that was told this goal before keeps the speed at which it goes there, any other
         gets the slow one."""
+        self.missed += len(self._open & goals.keys())
+        self._open -= goals.keys()
+        return self._send(goals, speeds)
+
+    def _send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
         profile = self.bus.profile
         time = "goal_time" in profile.registers
         packet = {}
         for joint, goal in goals.items():
             count, kept = profile.position(goal), self._told.get(joint, (-1, 0))
             speed = profile.speed(speeds[joint]) if speeds[joint] else kept[1] if kept[0] == count else profile.speed(SLOW)
-            self._told[joint] = count, speed
+            self._told[joint], self._goals[joint] = (count, speed), goal
             packet[self.ids[joint]] = {"goal_position": count, "moving_speed": speed, **({"goal_time": 0} if time else {})}
         sent = self.bus.sync_write(packet)
         self.journal.write(t=sent, goal={j: [round(goals[j], 6), round(self._told[j][1] * profile.speed_unit, 6)] for j in goals})
         return sent
+
+    def _repair(self, joint: str) -> None:
+        """A goal that did not arrive is sent again, unless the servo has lost its torque, which a goal might switch on."""
+        servo = self.ids[joint]
+        try:
+            found = self.bus.read(servo, *self._limp)
+        except NoAnswerError:
+            return
+        self.watch.answered(servo, self.bus.now(), found, self.bus.alarms.get(servo, ()))
+        marker = self.bus.profile.marker
+        if found["torque_enable"] and (not marker or found[marker]):
+            self._send({joint: self._goals[joint]}, {joint: 0.0})
+            self.repaired += 1
 
     def torque(self, on: bool) -> None:
         """Of all joints at once, and it is read back."""
@@ -166,8 +191,9 @@ class Rig:
         """What is read next."""
         if at_once:
             turn = self._turn % (4 * STATE_EVERY)
-            return self._limp if turn == 1 else STATE if turn % STATE_EVERY == 0 else POSITION
-        return (*STATE, *self._limp) if self._turn // turns % LIMP_EVERY == 0 else STATE
+            return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
+        turn = self._turn // turns
+        return (*STATE, *self._limp) if turn % LIMP_EVERY == 0 else (GOAL, *STATE) if turn % 2 else STATE
 
     def _read_all(self, names: tuple[str, ...]) -> None:
         """One question to all; whoever did not answer is asked alone first next time: it may keep others silent."""
@@ -185,7 +211,7 @@ class Rig:
             if values is None:
                 self._suspects += [joint] * (joint not in self._suspects and not self._suspects)
                 continue
-            self._take(joint, values, begun + k * each)
+            self._take(joint, values, begun + k * each, bus.now() - begun)
 
     def _answer_seconds(self, names: tuple[str, ...]) -> float:
         """How long one of many answers takes [s]."""
@@ -196,7 +222,7 @@ class Rig:
 
     def _read_one(self, joint: str, names: tuple[str, ...]) -> None:
         servo, bus = self.ids[joint], self.bus
-        apart = names != STATE and not self._together
+        apart = self._limp[0] in names and not self._together
         try:
             values = bus.read(servo, *(STATE if apart else names))
             asked = bus.asked
@@ -216,6 +242,12 @@ class Rig:
             return
         angle = bus.profile.angle(values["present_position"])
         self.angles[joint] = angle
+        if GOAL in values and joint in self._told:
+            if values[GOAL] == self._told[joint][0]:
+                self._open.discard(joint)
+            else:
+                self._open.add(joint)
+                self._repair(joint)
         self.readings[joint] += 1
         more = {"took": round(took, 6)} if took else {}
         if "present_voltage" in values:

@@ -44,6 +44,7 @@ class WatchOptions:
 
 TRIPPED = 255
 """What the register of a bus watchdog holds once it has stopped the servo, which then refuses goals."""
+HELD_UP = "could not be read for {:.1f} s, as the computer or the adapter was held up"
 SUDDEN = ("electrical shock", "current")
 """Alarms of a servo that burns what it gets: torque goes at once."""
 
@@ -81,8 +82,10 @@ class Watch:
 
     def answered(self, servo: int, time: float, values: Mapping[str, int], alarms: tuple[str, ...]) -> None:
         """A whole answer at a time [s]: registers in counts, and the alarms of its error byte."""
+        since, self._failed[servo] = time - self._answered.get(servo, time), 0
+        if since >= self._options.silent:
+            self._react("neutral", servo, HELD_UP.format(since))
         self._answered[servo] = time
-        self._failed[servo] = 0
         low = self._profile.supply[0]
         volts = values["present_voltage"] / 10 if "present_voltage" in values else None
         heat, limit = values.get("present_temperature"), self._limits.get(servo, 70)
@@ -121,7 +124,7 @@ class Watch:
             if self._failed[servo] >= self._options.confirm:
                 self._react("neutral", servo, f"silent for {since:.1f} s")
             else:
-                self._react("neutral", servo, f"could not be read for {since:.1f} s, as the computer or the adapter was held up")
+                self._react("neutral", servo, HELD_UP.format(since))
             return
 
     def _judge(self, servo: int, what: str, bad: bool, how: Literal["neutral", "release"], reason: str) -> None:
