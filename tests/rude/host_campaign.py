@@ -290,12 +290,3 @@ def campaign(faults: int, seed: int = 0) -> tuple[int, list[tuple[Run, str]]]:
         struck += max(len(run.struck), 1)
         n += 1
     return struck, out
-
-
-if __name__ == "__main__":
-    import sys
-
-    count, violated = campaign(int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0)
-    print(f"{count} faults, {len(violated)} violations")
-    for run, line in violated:
-        print(f"Run({run.family!r}, {run.fault!r}, {run.k}, {run.seed}): {line}")

@@ -1,4 +1,4 @@
-"""Every k-th event of a playing fails, for every kind of fault; a monitor that shares no code with the player finds nothing wrong."""
+"""Every k-th event of a playing fails, for every kind of fault; a monitor that shares no code with the player judges."""
 
 import pytest
 
@@ -13,8 +13,8 @@ FOUND = [
     ("AX-12A", "short stall", 3, 93),
     ("STS3215", "long stall", 544, 255),
 ]
-"""Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got lost
-on the wire, or were sent in a bunch after a stall, and exit code 0."""
+"""Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
+lost on the wire, or were sent in a bunch after a stall, and exit code 0."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])
