@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
+from workbench.gait.draws import Drawn, drawn
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
+from workbench.gait.second_engine import Condition, Pair
 from workbench.gait.table import GaitTable
 from workbench.motion import Commands
 from workbench.recording.take import Take
@@ -41,11 +43,13 @@ LEAD = 0.3
 class CertifyOptions:
     """How a gait is examined for its certificate. InputError for a number out of range or a variant that is not known.
 
-    seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots of
-    the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too, beside
-    the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the same discrete
-    step is compared. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s].
-    n_jobs: processes."""
+    seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots
+    of the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too,
+    beside the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the
+    same discrete step is compared. compared_seconds: of walking in each condition in which another engine plays the table too
+    [s]; compared: by which share of the nominal speed the two may differ there: contact models differ by a tenth where feet
+    slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. n_jobs:
+    processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -54,13 +58,16 @@ class CertifyOptions:
     checked: int = 8
     checked_seconds: float = 1.0
     checked_step: float = 2e-3
+    compared_seconds: float = 2.0
+    compared: float = 0.15
     floor_seconds: float = 2.0
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
 
     def __post_init__(self) -> None:
         check_whole(self, draws=0, checked=0, n_jobs=1)
-        check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds")
+        check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds",
+                       "compared_seconds", "compared")
         for name in self.variants:
             check_choice("variants", name, VARIANTS)
 
@@ -104,11 +111,16 @@ class Examiner:
                                       <= 1.5 * told["gait"]["jerk of the base m/s^3"])
         return take, told
 
-    def robots(self, robots: Sequence[RobotModel]) -> list[Measured | None]:
-        """Robots of the ensemble, by the compiled station; None for one that lay on the floor or tripped over itself."""
+    def robots(self, robots: Sequence[RobotModel]) -> list[Drawn]:
+        """Robots of the ensemble, by the compiled station; where that gives up, because something other than a foot touched the
+        floor or two links each other, Drake says what came of it."""
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
-        takes = Rollouts(1).takes([self._job(r, config, self.options.draw_seconds) for r in robots])
-        return [None if take is None else self._measured(take, robot) for take, robot in zip(takes, robots)]
+        jobs = [self._job(r, config, self.options.draw_seconds) for r in robots]
+        out = []
+        for robot, job, take in zip(robots, jobs, Rollouts(1).takes(jobs)):
+            played = simulate_batch([replace(job, config=replace(config, engine="drake"))])[0] if take is None else take
+            out.append(drawn(robot, *self._measured(played, robot), gave_up=take is None))
+        return out
 
     def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
         """One of them by the compiled station and by Drake, at the same step."""
@@ -125,19 +137,27 @@ class Examiner:
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
         return self._measured(take, self.model)[0]
 
-    def elsewhere(self, engine: OtherEngine) -> Measured:
-        """The nominal robot in another engine."""
-        commands, end = self._commands(self.options.seconds)
-        return self._measured(engine(self.model, commands, end), self.model)
+    def elsewhere(self, engine: OtherEngine, condition: Condition) -> Pair:
+        """The robot under a condition, by this engine and by another."""
+        model, seconds = condition.of(self.model), self.options.compared_seconds
+        commands, end = self._commands(seconds, condition.at_once)
+        begin = self.table.period + (0.0 if condition.at_once else self.table.start_seconds)
+        config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
+        (ours,) = simulate_batch([Job(model, config, commands, end, LEAD, name="gait")])
+        takes = (ours, engine(model, commands, end))
+        a, b = (self._measured(take, model, begin)[0] for take in takes)
+        return a, b
 
-    def _measured(self, take: Take, model: RobotModel) -> Measured:
+    def _measured(self, take: Take, model: RobotModel, begin: float | None = None) -> Measured:
         period = self.table.period
-        begin = self.table.start_seconds + period  # as in the search, the heading settles in the first whole cycle
+        begin = self.table.start_seconds + period if begin is None else begin  # the heading settles in the first whole cycle
         feet = feet_measure(take, model, self.legs, begin, period)
-        return replace(measure(take, model, begin, period), clearance=feet.clearance), feet
+        return replace(measure(take, model, begin, period), clearance=feet.clearance, slip=feet.slip), feet
 
-    def _commands(self, seconds: float) -> tuple[Commands, float]:
+    def _commands(self, seconds: float, at_once: bool = False) -> tuple[Commands, float]:
         cycles = 1 + max(2, math.ceil(seconds / self.table.period))
+        if at_once:
+            return self.table.cycle.commands(cycles), cycles * self.table.period
         return self.table.commands(cycles), self.table.start_seconds + cycles * self.table.period
 
     def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, name: str = "gait") -> Job:

@@ -39,7 +39,8 @@ class GaitMeasure:
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
     electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
-    cycles of how high a foot comes [m]; NaN where nobody looked.
+    cycles of how high a foot comes [m]; slip: mean speed over the ground of feet that touch it [m/s]; both NaN where nobody
+    looked. touched: whether something other than a foot touched the floor, or links each other, in a run that was not a fall.
     """
 
     fell: bool
@@ -58,6 +59,8 @@ class GaitMeasure:
     mechanical: float
     jerk: float
     clearance: float = math.nan
+    slip: float = math.nan
+    touched: bool = False
 
     @property
     def speed(self) -> float:
