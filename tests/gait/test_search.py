@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.command import refused
+from workbench.files import InputError
 from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
@@ -19,7 +20,7 @@ from workbench.gait.search import Budget, Found, raced, search, steered
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import paths_of
-from workbench.robot import EffectSpec, InputError, data_file, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.robot.model_file import Posterior
 
 SMALL = Budget(seeds=6, starts=1, population=4, generations=1, robust=1, draws=1)

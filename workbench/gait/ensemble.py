@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
+from workbench.files import InputError
+from workbench.files.reading import write_whole
+from workbench.files.yaml_file import Fields, read_yaml
 from workbench.gait.legs import legs_of
-from workbench.robot import EffectSpec, InputError, RobotModel, data_file
-from workbench.robot.files import write_whole
+from workbench.robot import EffectSpec, RobotModel, data_file
 from workbench.robot.model_file import Posterior, parameter_names
-from workbench.robot.yaml_file import Fields, read_yaml
 
 Array = NDArray[np.float64]
 
