@@ -50,7 +50,7 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
         return _margin("torque-speed line", 100 * m.torque_use[j], 100 * limits.torque, "% of what it has", joint)
 
     def slip(m: GaitMeasure) -> Margin:
-        return slip_margin(machine, request, m)
+        return slip_margin(machine, request, m, limits.slip_on_draws)
 
     def clearance(m: GaitMeasure) -> Margin:
         return clearance_margin(limits, m)
@@ -67,9 +67,10 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
     return out
 
 
-def slip_margin(machine: GaitMachine, request: Request, m: GaitMeasure) -> Margin:
-    """Speed over the ground of feet that touch it, by the speed of the body, or of the feet around it in a turn."""
-    limit = 100 * request.limits.slip
+def slip_margin(machine: GaitMachine, request: Request, m: GaitMeasure, allowed: float | None = None) -> Margin:
+    """Speed over the ground of feet that touch it, by the speed of the body, or of the feet around it in a turn. allowed: None:
+    as on the nominal robot."""
+    limit = 100 * (request.limits.slip if allowed is None else allowed)
     if not np.isfinite(m.slip):
         return _margin("slip", 0.0, limit, "% of the speed")
     return _margin("slip", 100 * m.slip / max(foot_speed(machine, request, m), SLOWEST), limit, "% of the speed")

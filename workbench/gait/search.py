@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -47,7 +48,7 @@ class Budget:
     certificate.
     """
 
-    seeds: int = 90
+    seeds: int = 120
     screened: int = 14
     starts: int = 2
     population: int = 12
@@ -232,7 +233,9 @@ class _Refiner:
             at = run.space.names.index("turn")
             for x, c in zip(points, judged):
                 x[at] = run.space.point(c.shape)[at]
-        self._strategy.tell(points, cost.tolist())
+        with warnings.catch_warnings():  # steering moves points on purpose
+            warnings.simplefilter("ignore", cma.evolution_strategy.InjectionWarning)
+            self._strategy.tell(points, cost.tolist())
         run.note_generation([judged[k] for k in better] or judged)
         self.best = min(self.best, *(judged[k] for k in better), key=Candidate.rank) if better else self.best
 
