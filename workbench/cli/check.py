@@ -62,6 +62,22 @@ def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool
     _ask(motion.source, motion.seconds(cycles), yes)
 
 
+def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
+    """Of a motion that `optimize` made, whether its certificate speaks for it on this robot; InputError where it does not, unless
+    `force`, which warns. Every verb that moves a robot, or writes what moves one, asks this first."""
+    from workbench.files import InputError
+    from workbench.gait.certificate import check_certificate, has_mark
+
+    if not has_mark(path):
+        return
+    try:
+        check_certificate(path, motion, model)
+    except InputError as e:
+        if not force:
+            raise InputError(e.source, f"{e.problem}; --force goes on all the same") from None
+        warn(verb, [str(e)])
+
+
 def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
     from workbench.inspect.problems import recording_problems, serious, summed_up

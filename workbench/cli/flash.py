@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_model, load_model, positive
 
 
@@ -35,7 +36,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Builds, asks, loads, keeps the transcript."""
-    from workbench.cli.export import uncertified_by
     from workbench.cli.progress import Progress
     from workbench.device.controller.loader import FACTORY, LoadError, Loading, Transcript, load_loader_profile
     from workbench.device.controller.program import build_program
@@ -47,10 +47,8 @@ def run(args: argparse.Namespace) -> int:
     with Progress("flash") as progress:
         progress("building")
         model = load_model(args.model, args.packages)
-        if Path(args.motion).suffix != ".table" and not args.force:
-            uncertified = uncertified_by(args.motion, load_motion(args.motion, model), model)
-            if uncertified is not None:
-                raise uncertified
+        if Path(args.motion).suffix != ".table":
+            check_certificate_of("flash", args.motion, load_motion(args.motion, model), model, args.force)
         program = build_program(args.motion, model, profile, args.out, args.cycles, args.force)
     for violation in program.violations:
         print(f"workbench flash: warning: {violation}", file=sys.stderr)

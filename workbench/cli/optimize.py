@@ -21,9 +21,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "optimize",
         help="search for a gait that the servos can follow, as a certified table",
         description="Searches for a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
-        "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv, start.csv (from neutral into "
-        "it), stop.csv, certificate.json and a page. A request that cannot be met says which limit binds, and exits with 2. "
-        "A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
+        "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv (from neutral into the "
+        "gait, the cycle, and back), certificate.json and a page. A request that cannot be met says which limit binds, and exits "
+        "with 2. A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
     parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as can be (default: max)")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--backward", action="store_true", help="go backwards")

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_pc_link
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive
 
 
@@ -27,7 +28,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     add_cycles(parser, 10)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulated cameras")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--diagnose", action="store_true", help="search for the physics that is missing, too")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     add_out(parser, default="runs/run")
@@ -45,11 +46,14 @@ def run(args: argparse.Namespace) -> int:
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
+    from workbench.robot.servo_units import known_units
     from workbench.view.report.comparison import write_comparison
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     cycles = motion.often(args.cycles, 10)
+    known_units(model, motion.joints)
+    check_certificate_of("run", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
@@ -66,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
         if done.played.stopped:
-            return 130 if done.played.stopped == "Ctrl-C" else 2
+            return 130 if done.played.stopped.startswith("Ctrl-C") else 2
         session = load_session(done.session)
         comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
         write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from workbench.gait.certificate import Certificate, hashes
 from workbench.gait.draws import draw_margins, slip_margin
 from workbench.gait.draws import summary as draw_summary
-from workbench.gait.examine import CertifyOptions, Examiner, OtherEngine
+from workbench.gait.examine import CertifyOptions, Examiner, NominalRun, OtherEngine
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.limits import contact_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
@@ -43,11 +43,11 @@ TOGETHER = 4
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate and the take of the nominal robot that it speaks of; whole: the way in, some cycles, and the way out."""
+    """A certificate and the take of the nominal robot that it speaks of, from power-on to standstill, and its cycles."""
 
     certificate: Certificate
     take: Take
-    whole: Take
+    cycles: int
 
 
 def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel], options: CertifyOptions,
@@ -63,19 +63,18 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     conditioned = () if other is None else conditions()
     work += [] if other is None else [(f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned]
     work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
-    work += [("the way in and out", examiner.ways, ())]
     work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
     results = _all(work, options.n_jobs, progress)
-    take, nominal, feet = next(results)
+    run: NominalRun = next(results)
+    nominal = run.measure
     floor = _floor(request, dict(zip(variants, _taken(results, len(variants)))))
     pairs = {c.name: next(results) for c in conditioned}
     checks = _taken(results, len(robots[:options.checked]))
-    whole, ways = next(results)
     robots_drawn = [d for group in results for d in group]
     told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
-    margins = [*table_margins(machine, table, request.limits), contact_margin(machine, table, request.limits),
+    margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
                *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
                *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
                *draw_margins(machine, request, on_draws), *floor_margins(request, nominal, floor)]
@@ -83,11 +82,11 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     margins += [] if other is None else engine_margins(request, other[0], pairs, options.compared)
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
-        tables=hashes(gait=table.cycle, start=table.start, stop=table.stop), model_sha256=machine.model.sha256,
-        margins=tuple(margins), nominal=_numbers(machine, request, nominal, feet), draws=told, floor=floor,
-        other_engine=elsewhere, ways=ways, shape=asdict(table.shape),
+        tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
+        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=told, floor=floor,
+        other_engine=elsewhere, ways=run.ways, shape=asdict(table.shape),
         provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
-    return Certified(certificate, take, whole)
+    return Certified(certificate, run.take, run.cycles)
 
 
 def _taken(results: Iterator[Any], count: int) -> list[Any]:

@@ -18,6 +18,7 @@ from workbench.gait.legs import Leg
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.second_engine import Condition, Pair
+from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
 from workbench.motion import Commands
 from workbench.recording.take import Take
@@ -37,6 +38,11 @@ VARIANTS: dict[str, dict[str, Any]] = {
 at 2 ms, which is what the floor of the steps allows for."""
 LEAD = 0.3
 """At rest before the first command [s]."""
+REST, SHORT_REST = 1.0, 0.3
+"""At rest after the last one [s]: of the nominal robot, and of others, which have only to stay on their feet."""
+SELF_CONTACT_EVERY = 0.02
+"""How often links are looked at for contact with each other [s]: a joint at no-load speed turns by 6 deg meanwhile, and feet pass
+each other no faster."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,19 @@ class CertifyOptions:
 
 
 @dataclass(frozen=True)
+class NominalRun:
+    """The nominal robot from power-on to standstill. ways: of start, gait, stop and the rest after it, a few numbers each. near:
+    where links came closest. cycles: how often the loop was played."""
+
+    take: Take
+    measure: GaitMeasure
+    feet: FeetMeasure
+    ways: dict[str, Any]
+    near: Nearness
+    cycles: int
+
+
+@dataclass(frozen=True)
 class Examiner:
     """One table on one robot, on the required slope. Every method is one piece of work and can be sent to another process."""
 
@@ -81,21 +100,25 @@ class Examiner:
     table: GaitTable
     options: CertifyOptions
 
-    def nominal(self) -> tuple[Take, GaitMeasure, FeetMeasure]:
-        """The nominal robot in Drake, with contact forces."""
+    def nominal(self) -> NominalRun:
+        """The nominal robot in Drake, with contact forces, from power-on to a second after the stop."""
         config = SimulationConfig(base="free", time_step=self.options.step, engine="drake")
-        (take,) = simulate_batch([self._job(self.model, config, self.options.seconds, "optimised gait")])
-        return take, *self._measured(take, self.model)
+        seconds = self.options.seconds
+        (take,) = simulate_batch([self._job(self.model, config, seconds, REST, "optimised gait")])
+        rows = np.flatnonzero(take.time >= 0)[::max(1, round(SELF_CONTACT_EVERY / float(np.median(np.diff(take.time)))))]
+        order = [take.joints.index(j) for j in self.model.joints]
+        near = SelfContact(self.model).nearest(take.q[rows][:, order])
+        return NominalRun(take, *self._measured(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
 
-    def ways(self) -> tuple[Take, dict[str, Any]]:
-        """In and out: a run of start, some cycles, stop, and a second at rest."""
-        cycles = max(2, math.ceil(1.0 / self.table.period))
-        commands = self.table.commands(cycles, whole=True)
-        job = Job(self.model, SimulationConfig(base="free", time_step=self.options.step), commands, commands.end + 1.0, LEAD,
-                  name="in and out")
-        (take,) = simulate_batch([job])
+    def cycles(self, seconds: float) -> int:
+        """How many are played to walk for so long [s], after the first."""
+        return 1 + max(2, math.ceil(seconds / self.table.period))
+
+    def _ways(self, take: Take) -> dict[str, Any]:
+        """Of the parts of a whole run: start, gait, stop, and what follows."""
         assert take.p_WB is not None
-        begin, end = self.table.start_seconds, commands.end - float(self.table.stop.dwells_ms.sum()) / 1000
+        begin, end = self.table.start_seconds, self._walked_until(self.options.seconds)
+        over = end + float(self.table.stop.dwells_ms.sum()) / 1000
         parts = {"start": (take.time >= 0) & (take.time < begin), "gait": (take.time >= begin) & (take.time < end),
                  "stop": take.time >= end}
         told: dict[str, Any] = {}
@@ -103,23 +126,23 @@ class Examiner:
             told[name] = {"seconds": float(np.ptp(take.time[inside])), "peak torque N m": float(_lasting(take, inside)),
                           "tilt deg": float(np.degrees(_tilt(take)[inside].max())),
                           "jerk of the base m/s^3": _jerk(take, inside)}
-        rest = take.time > commands.end + 0.5
+        rest = take.time > over + REST / 2
         told["at rest"] = {"speed m/s": float(np.abs(np.gradient(take.p_WB[rest], take.time[rest], axis=0)).max()),
                            "tilt deg": float(np.degrees(_tilt(take)[rest].max())),
                            "largest angle off neutral deg": float(np.degrees(np.abs(take.q[rest]).max()))}
         told["without a jerk"] = bool(max(told[k]["jerk of the base m/s^3"] for k in ("start", "stop"))
                                       <= 1.5 * told["gait"]["jerk of the base m/s^3"])
-        return take, told
+        return told
 
     def robots(self, robots: Sequence[RobotModel]) -> list[Drawn]:
         """Robots of the ensemble, by the compiled station; where that gives up, because something other than a foot touched the
         floor or two links each other, Drake says what came of it."""
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
-        jobs = [self._job(r, config, self.options.draw_seconds) for r in robots]
-        out = []
+        seconds = self.options.draw_seconds
+        jobs, out = [self._job(r, config, seconds, SHORT_REST) for r in robots], []
         for robot, job, take in zip(robots, jobs, Rollouts(1).takes(jobs)):
             played = simulate_batch([replace(job, config=replace(config, engine="drake"))])[0] if take is None else take
-            out.append(drawn(robot, *self._measured(played, robot), gave_up=take is None))
+            out.append(drawn(robot, *self._measured(played, robot, seconds), gave_up=take is None))
         return out
 
     def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
@@ -128,40 +151,43 @@ class Examiner:
         config = SimulationConfig(base="free", time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
         (take,) = Rollouts(1).takes([self._job(robot, config, o.checked_seconds)])
         (again,) = simulate_batch([self._job(robot, replace(config, engine="drake"), o.checked_seconds)])
-        ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot)[0]
-        return ours, self._measured(again, robot)[0]
+        ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot, o.checked_seconds)[0]
+        return ours, self._measured(again, robot, o.checked_seconds)[0]
 
     def variant(self, name: str) -> GaitMeasure:
         """The nominal robot, computed in another way: one of VARIANTS."""
         config = replace(SimulationConfig(base="free", contact_period=0.0, log_period=0.01), **VARIANTS[name])
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
-        return self._measured(take, self.model)[0]
+        return self._measured(take, self.model, self.options.floor_seconds)[0]
 
     def elsewhere(self, engine: OtherEngine, condition: Condition) -> Pair:
-        """The robot under a condition, by this engine and by another."""
+        """The robot under a condition, by this engine and by another. A gait entered at once has as long as its start takes to
+        find its cycle."""
         model, seconds = condition.of(self.model), self.options.compared_seconds
-        commands, end = self._commands(seconds, condition.at_once)
-        begin = self.table.period + (0.0 if condition.at_once else self.table.start_seconds)
+        cycles, until = self.cycles(seconds), self._walked_until(seconds)
+        at_once = self.table.cycle.commands(math.ceil(until / self.table.period))
+        commands = at_once if condition.at_once else self.table.commands(cycles, whole=True)
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
-        (ours,) = simulate_batch([Job(model, config, commands, end, LEAD, name="gait")])
-        takes = (ours, engine(model, commands, end))
-        a, b = (self._measured(take, model, begin)[0] for take in takes)
+        (ours,) = simulate_batch([Job(model, config, commands, until, LEAD, name="gait")])
+        a, b = (self._measured(take, model, seconds)[0] for take in (ours, engine(model, commands, until)))
         return a, b
 
-    def _measured(self, take: Take, model: RobotModel, begin: float | None = None) -> Measured:
-        period = self.table.period
-        begin = self.table.start_seconds + period if begin is None else begin  # the heading settles in the first whole cycle
-        feet = feet_measure(take, model, self.legs, begin, period)
-        return replace(measure(take, model, begin, period), clearance=feet.clearance, slip=feet.slip), feet
+    def _measured(self, take: Take, model: RobotModel, seconds: float) -> Measured:
+        """As in the search, the heading settles in the first whole cycle; torque counts from power-on."""
+        period, end = self.table.period, self._walked_until(seconds)
+        begin = self.table.start_seconds + period
+        feet = feet_measure(take, model, self.legs, begin, period, end)
+        return replace(measure(take, model, begin, period, end=end, since=0.0), clearance=feet.clearance, slip=feet.slip), feet
 
-    def _commands(self, seconds: float, at_once: bool = False) -> tuple[Commands, float]:
-        cycles = 1 + max(2, math.ceil(seconds / self.table.period))
-        if at_once:
-            return self.table.cycle.commands(cycles), cycles * self.table.period
-        return self.table.commands(cycles), self.table.start_seconds + cycles * self.table.period
+    def _walked_until(self, seconds: float) -> float:
+        """When the last cycle ends [s]."""
+        return self.table.start_seconds + self.cycles(seconds) * self.table.period
 
-    def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, name: str = "gait") -> Job:
-        commands, end = self._commands(seconds)
+    def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, rest: float | None = None, name: str = "gait",
+             ) -> Job:
+        """The motion as every verb plays it. rest: how long after it [s]; None: only to the end of the last cycle."""
+        commands = self.table.commands(self.cycles(seconds), whole=True)
+        end = self._walked_until(seconds) if rest is None else commands.end + rest
         return Job(model, config, commands, end, LEAD, name=name)
 
 

@@ -12,6 +12,7 @@ from workbench.device.tables.table_file import most_poses, other_family
 from workbench.files.option_checks import check_positive
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
+from workbench.gait.self_contact import Nearness
 from workbench.gait.table import GaitTable
 
 
@@ -98,18 +99,17 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
     for i, leg in enumerate(machine.legs):
         out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))
     if not other_family(table.cycle):  # only the CM-530's program, which plays no other family, holds a table in its memory
-        poses = max(len(table.cycle), len(table.start), len(table.stop))  # each is a table of its own there
+        poses = len(table.whole)
         out.append(_of("poses", "table", poses, most_poses(len(model.joints)), "poses"))
     packet = 10 * (5 * len(model.joints) + 8) / limits.bus  # a Sync Write of goal and speed: ID and four bytes a servo
     out.append(_of("bus time", "robot", 1000 * packet, float(table.cycle.dwells_ms.min()), "ms of the shortest dwell"))
     return _worst(out)
 
 
-def contact_margin(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> Margin:
-    """Of links against each other, at the poses of the table, before rounding."""
-    near = machine.self_contact.nearest(table.asked)
+def contact_margin(near: Nearness, limits: GaitLimits) -> Margin:
+    """Of links against each other."""
     where = " and ".join(near.links) if near.links[0] else "robot"
-    return _of("self-contact", where, 1000 * limits.clearance, 1000 * max(near.distance, 1e-6), "mm of clearance")
+    return least("self-contact", where, 1000 * near.distance, 1000 * limits.clearance, "mm of clearance")
 
 
 def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) -> list[Margin]:
@@ -129,8 +129,7 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
 
 def clearance_margin(limits: GaitLimits, m: GaitMeasure) -> Margin:
     """How high the foot that is lifted least comes, at least once in each cycle."""
-    lifted, least = 1000 * max(m.clearance, 1e-6), 1000 * limits.lift
-    return _of("foot clearance", "robot", lifted, least, "mm, at least", max(2 - lifted / least, 0.0))
+    return least("foot clearance", "robot", 1000 * m.clearance, 1000 * limits.lift, "mm")
 
 
 def binding(margins: Iterable[Margin]) -> Margin | None:
@@ -147,6 +146,12 @@ def violation(margins: Iterable[Margin]) -> float:
 def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False) -> Margin:
     share = use if use is not None else value / limit if limit > 0 else np.inf
     return Margin(name, where, float(value), float(limit), unit, float(share), advice)
+
+
+def least(name: str, where: str, value: float, limit: float, unit: str) -> Margin:
+    """A limit from below: use is 1 where the value is just enough, and grows by what is missing, as a share of the limit; 0 from
+    twice the limit on."""
+    return Margin(name, where, float(value), float(limit), f"{unit}, at least", max(2.0 - float(value / limit), 0.0))
 
 
 def _worst(margins: Sequence[Margin]) -> list[Margin]:

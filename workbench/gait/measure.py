@@ -40,7 +40,8 @@ class GaitMeasure:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
     electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
     cycles of how high a foot comes [m]; slip: mean speed over the ground of feet that touch it [m/s]; both NaN where nobody
-    looked. touched: whether something other than a foot touched the floor, or links each other, in a run that was not a fall.
+    looked. peak: of each joint, the largest torque that lasts LASTING, over the same time as torque_use. touched: whether
+    something other than a foot touched the floor, or links each other, in a run that was not a fall.
     """
 
     fell: bool
@@ -60,6 +61,7 @@ class GaitMeasure:
     jerk: float
     clearance: float = math.nan
     slip: float = math.nan
+    peak: tuple[float, ...] = ()
     touched: bool = False
 
     @property
@@ -79,9 +81,12 @@ def fallen(joints: int) -> GaitMeasure:
     return GaitMeasure(True, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, math.pi / 2, nothing, nothing, nothing, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True) -> GaitMeasure:
+def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True, end: float = math.inf,
+            since: float | None = None) -> GaitMeasure:
     """Of a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s].
 
+    end: of the last cycle [s], where something follows it. since: from when on peak and torque_use count [s], to the take's end;
+    None: in those cycles alone. fell, tilt and peak_current are of the whole take.
     electrical: whether current and power are wanted, which take the commands that reached each servo; else they are NaN."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
@@ -92,7 +97,7 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     height = take.p_WB[:, 2] / take.p_WB[0, 2]
     fell = bool(up.min() < np.cos(FALLEN_TILT) or height.min() < FALLEN_HEIGHT or not np.isfinite(take.p_WB).all())
-    cycles = max(int((take.time[-1] - begin) / period + 1e-6), 1)
+    cycles = max(int((min(float(take.time[-1]), end) - begin) / period + 1e-6), 1)
     first, last = np.searchsorted(take.time, [begin - 1e-9, begin + cycles * period - 1e-9])
     last = min(int(last), len(take) - 1)
     inside = slice(int(first), last + 1)
@@ -109,15 +114,16 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     current, power = supply(take, model, law) if electrical else (unknown, unknown)
     every = float(np.median(np.diff(time)))
     smooth = uniform_filter1d(current, max(1, round(FUSE_WINDOW / every)))
+    counted = inside if since is None else slice(int(np.searchsorted(take.time, since - 1e-9)), len(take))
     return GaitMeasure(
         fell=fell, velocity=(forward, left), turn_rate=float((h[-1] - h[0]) / seconds), gone=float(np.hypot(*whole)),
         drift=float(h[-1] - h[0]), lateral=float(whole[1] * np.cos(heading[0]) - whole[0] * np.sin(heading[0])),
         tilt=float(np.arccos(np.clip(up.min(), -1, 1))), rms=_floats(np.sqrt((torque**2).mean(axis=0))),
-        torque_use=_floats(_torque_use(law, torque, v, every)),
+        torque_use=_floats(_torque_use(law, take.torque[counted], take.v[counted], every)),
         speed_use=_floats(np.quantile(np.abs(v), 0.995, axis=0) * law.back_emf / law.full_torque),
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
-        jerk=base_jerk(time, p))
+        jerk=base_jerk(time, p), peak=_floats(_lasting(np.abs(take.torque[counted]), every)))
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
@@ -157,7 +163,12 @@ def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
     along = v * np.sign(torque)
     line = law.full_torque - law.back_emf * along + np.where(along < 0, law.coulomb - law.viscous * along, 0.0)
     share = np.abs(torque) / np.maximum(line, 0.02 * law.full_torque)
-    return np.asarray(minimum_filter1d(share, max(1, round(LASTING / every)), axis=0).max(axis=0))
+    return _lasting(share, every)
+
+
+def _lasting(x: Array, every: float) -> Array:
+    """The largest value (n,) of each column that lasts LASTING, of samples `every` [s]."""
+    return np.asarray(minimum_filter1d(x, max(1, round(LASTING / every)), axis=0).max(axis=0))
 
 
 def base_jerk(time: Array, p: Array) -> float:

@@ -174,8 +174,8 @@ def _way_section(certificate: Certificate) -> Section:
     said = ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
             "The robot is jerked more than by the gait itself.")
     return Section("In and out", [
-        Text("`start.csv` leads from neutral through the gait's stance and one cycle of half its size into the gait, `stop.csv` "
-             "back to neutral. " + said),
+        Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
+             "to neutral; both are in `gait.csv`, and all that is said here is of the whole. " + said),
         Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows)])
 
 
@@ -185,8 +185,8 @@ def _table_section(table: GaitTable) -> Section:
     speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
     return Section("The table", [
-        Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it needs `certificate.json` beside "
-             "it."),
+        Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that "
+             "file, and all but the first ask for `certificate.json` beside it."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 
