@@ -12,6 +12,13 @@ static void start(struct robot *r, uint8_t reason) {
 static void stop(struct robot *r, uint8_t reason) {
     if (r->state == STATE_CHECK && r->check_for == STATE_RAMP)
         enter(r, r->came_from == STATE_STILL ? STATE_STILL : STATE_LIMP, reason, 0xFF);
+    bool sent = r->state == STATE_PLAY && (r->pose || r->cycle);
+    if (sent && table_stop(playing(r)) && !r->stop_asked) { /* it has an end of its own; asked a second time it ends at once */
+        r->stop_asked = true;
+        r->reason = reason;
+        r->state_told = false;
+        return;
+    }
     if (r->state != STATE_PLAY && !(r->state == STATE_RAMP && r->after == STATE_PLAY)) return;
     r->reason = reason;
     ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);

@@ -83,6 +83,7 @@ struct robot {
     bool state_told;
 
     uint32_t pose, cycle, next_pose; /* of the table that plays */
+    bool stop_asked, ending; /* it is to end with its stop; that plays */
     bool send_goals, send_release, send_limits, sending_read;
     bool gentle;       /* the first way to neutral: torque is limited */
     uint8_t came_from; /* the state before CHECK */
@@ -137,6 +138,7 @@ void commands_tick(struct robot *r);                                          /*
 void commands_bytes(struct robot *r);
 void tell_state(struct robot *r);                                             /* telemetry.c */
 void tell_log(struct robot *r);
+bool reason_light(uint8_t reason, uint32_t now, bool tens);
 void bridge_begin(struct robot *r);                                           /* bridge.c */
 void bridge_feed(struct robot *r, uint8_t byte);
 void bridge_send(struct robot *r);

@@ -40,8 +40,8 @@ def goals_of(data: bytes) -> list[tuple[int, int]]:
 
 
 def same(row: tuple[tuple[int, int], ...], sent: list[tuple[int, int]]) -> bool:
-    """Whether a table's (goals, speeds) are what was sent; for speed 0, "at once", one that takes the dwell or holds is sent."""
-    return all(goal == g and (s == speed or (speed == 0 < s <= 45)) for (goal, speed), (g, s) in zip(row, sent))
+    """Whether a table's (goals, speeds) are what was sent; for speed 0, "at once", another is sent."""
+    return all(goal == g and (s == speed or (speed == 0 < s <= 1023)) for (goal, speed), (g, s) in zip(row, sent))
 
 
 def play(poses: int, seed: int = 0) -> Robot:

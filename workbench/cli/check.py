@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def add_yes(parser: argparse.ArgumentParser) -> None:
     """--yes: long work is meant."""
     parser.add_argument("--yes", action="store_true",
-                        help="simulate that long (required beyond ten minutes of the robot's time)")
+                        help="allow simulations longer than ten minutes of robot time")
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
