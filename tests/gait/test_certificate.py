@@ -32,8 +32,8 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gait")
     machine = GaitMachine(puppy_model())
     request = Request()
-    request = replace(request, limits=replace(request.limits, drift=10.0, spread=10.0, aside=5.0, rms=1.3, torque=2.0, lift=1e-6, slip=5.0,
-                                                     slip_on_draws=9.0))  # any gait will do here
+    lax = replace(request.limits, drift=10.0, spread=10.0, aside=5.0, rms=1.3, torque=2.0, lift=1e-6, slip=5.0, slip_on_draws=9.0)
+    request = replace(request, limits=lax)  # any gait will do here
     table = gait_table(machine, SHAPE)
     draws = load_ensemble().draws(machine.model, 2, 7, folder)
     provenance = {"seed": 7, "rollouts": 0, "searched in": 0.0, "ensemble_sha256": "x"}
