@@ -15,12 +15,13 @@ from workbench.files.option_checks import check_choice, check_positive, check_wh
 from workbench.gait.draws import Drawn, drawn
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
+from workbench.gait.limit_cycle import LimitCycle, limit_cycle
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.second_engine import Condition, Pair
 from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
-from workbench.motion import Commands
+from workbench.motion import Commands, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -54,8 +55,8 @@ class CertifyOptions:
     beside the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the
     same discrete step is compared. compared_seconds: of walking in each condition in which another engine plays the table too
     [s]; compared: by which share of the nominal speed the two may differ there: contact models differ by a tenth where feet
-    slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. n_jobs:
-    processes."""
+    slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. watched:
+    cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -67,11 +68,12 @@ class CertifyOptions:
     compared_seconds: float = 2.0
     compared: float = 0.15
     floor_seconds: float = 2.0
+    watched: int = 12
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
 
     def __post_init__(self) -> None:
-        check_whole(self, draws=0, checked=0, n_jobs=1)
+        check_whole(self, draws=0, checked=0, watched=0, n_jobs=1)
         check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds",
                        "compared_seconds", "compared")
         for name in self.variants:
@@ -109,6 +111,10 @@ class Examiner:
         order = [take.joints.index(j) for j in self.model.joints]
         near = SelfContact(self.model).nearest(take.q[rows][:, order])
         return NominalRun(take, *self._measured(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
+
+    def limit_cycle(self, other: PoseTable | None) -> LimitCycle:
+        """The nominal robot again, entered and disturbed in other ways. other: another table, from which it comes."""
+        return limit_cycle(self.model, self.table, self.options.watched, self.options.step, other)
 
     def cycles(self, seconds: float) -> int:
         """How many are played to walk for so long [s], after the first."""
