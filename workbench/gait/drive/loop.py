@@ -41,7 +41,7 @@ class Cameras:
 class Driven:
     """What came of it. poses (K, 3): x, y [m], heading [rad] at the end of each cycle, true; seen (K, 3): as captured; turns (K,)
     played in the cycle that ends there [rad per stance]; left (K,) [m], off (K,) [rad], along (K,) [m]: true errors from the
-    path; bias (K,): estimated [rad per cycle]. reason: why it stopped. take: the whole run."""
+    path; bias (K,): estimated [rad per cycle], NaN if not steered. reason: why it stopped. take: the whole run."""
 
     path: WayPath
     poses: Array
@@ -90,7 +90,7 @@ def drive(family: GaitFamily, robot: RobotModel, path: WayPath, controller: Cycl
             break
         seen = _captured(pose, cameras, rng)
         near, left = path.project(pose[:2], near)
-        after, bias, ends = _decided(controller, context, seen)
+        after, bias, ends = _decided(controller, context, seen) if steer else (0.0, math.nan, False)
         rows.append([*pose, *seen, played, left, _wrapped(pose[2] - path.heading(near)), near, bias])
         progress(f"cycle {k + 1}", min(near / path.length, 1.0))
         if ends if steer else near + controller.map.ahead / 2 >= path.length:
@@ -98,7 +98,7 @@ def drive(family: GaitFamily, robot: RobotModel, path: WayPath, controller: Cycl
             break
         run.send(family.cycle(committed))
         run.advance(period_ms / 1000)
-        played, committed = committed, after if steer else 0.0
+        played, committed = committed, after
     if reason != "fell":
         run.send(family.stop)
         run.advance(family.stop.end)

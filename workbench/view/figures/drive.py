@@ -31,15 +31,16 @@ def driven_path(closed: Driven, straight: Driven | None = None) -> Figure:
 def driven_cycles(closed: Driven, most: float) -> Figure:
     """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, and the estimated
     turning bias [deg per cycle]. most: largest turn [rad per stance]."""
-    figure = new_figure(9, 6.4)
+    figure = new_figure(9, 8.0)
     rows = figure.subplots(4, 1, sharex=True)
     cycles = np.arange(len(closed.turns))
     for axes, values, label in zip(rows, (100 * closed.left, np.rad2deg(closed.off), closed.turns, np.rad2deg(closed.bias)),
-                                   ("left of path [cm]", "heading error [deg]", "turn [rad]", "bias [deg/cycle]")):
+                                   ("left [cm]", "heading [deg]", "turn [rad]", "bias [deg/cycle]")):
         axes.axhline(0, color="#999999", linewidth=0.8)
         axes.plot(cycles, values, ".-", color=ACCENT if label.startswith("bias") else SIMULATED)
         axes.set_ylabel(label)
     for limit in (-most, most):
         rows[2].axhline(limit, color=COMMAND, linestyle=":", linewidth=1)
     rows[-1].set_xlabel("cycle")
+    rows[-1].xaxis.get_major_locator().set_params(integer=True)
     return figure

@@ -23,7 +23,7 @@ def drive_numbers(driven: Driven) -> dict[str, object]:
             "end": {"x": float(end[0]), "y": float(end[1]), "heading_deg": float(np.rad2deg(end[2]))},
             "largest_lateral_error_m": float(np.abs(driven.left[s]).max()) if s.any() else None,
             "largest_heading_error_deg": float(np.rad2deg(np.abs(driven.off[s]).max())) if s.any() else None,
-            "missed_waypoints_m": [float(v) for v in driven.missed()], "bias_deg_per_cycle": float(np.rad2deg(driven.bias[-1]))}
+            "missed_waypoints_m": [float(v) for v in driven.missed()], "bias_deg_per_cycle": None if np.isnan(driven.bias[-1]) else float(np.rad2deg(driven.bias[-1]))}
 
 
 def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driven, straight: Driven | None, most: float
@@ -37,7 +37,7 @@ def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driv
                "poses": closed.poses.tolist(), "turns": closed.turns.tolist()}
     write_whole(folder / "drive.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
-    report = Report("Driven path", f"{closed.reason}; way-points passed at {misses} cm.", CLAIM,
+    report = Report("Driven path", f"Way-points passed at {misses} cm; stopped: {closed.reason}.", CLAIM,
                     provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
     report.add(Section("The path", [Picture(driven_path(closed, straight), "Both robots are the same, with the same gait.")]))
     cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
