@@ -23,7 +23,8 @@ def drive_numbers(driven: Driven) -> dict[str, object]:
             "end": {"x": float(end[0]), "y": float(end[1]), "heading_deg": float(np.rad2deg(end[2]))},
             "largest_lateral_error_m": float(np.abs(driven.left[s]).max()) if s.any() else None,
             "largest_heading_error_deg": float(np.rad2deg(np.abs(driven.off[s]).max())) if s.any() else None,
-            "missed_waypoints_m": [float(v) for v in driven.missed()], "bias_deg_per_cycle": None if np.isnan(driven.bias[-1]) else float(np.rad2deg(driven.bias[-1]))}
+            "missed_waypoints_m": [float(v) for v in driven.missed()],
+            "bias_deg_per_cycle": None if np.isnan(driven.bias[-1]) else float(np.rad2deg(driven.bias[-1]))}
 
 
 def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driven, straight: Driven | None, most: float
