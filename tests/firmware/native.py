@@ -34,7 +34,7 @@ class CellRun(ctypes.Structure):
 def compile_core(flags: tuple[str, ...] = ("-O2",)) -> Path:
     """A shared library of core and tests, made anew where a source has changed."""
     source = FIRMWARE
-    tests = ("sim", "cells", "access", "rude", "monitor")
+    tests = ("sim", "cells", "access", "rude", "rude_people", "monitor")
     sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in tests)])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):
