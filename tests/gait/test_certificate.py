@@ -21,7 +21,7 @@ from workbench.robot import puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,
-                         variants=("2 ms", "1 ms"), n_jobs=1)
+                         variants=("2 ms", "1 ms"), n_jobs=1, watched=8)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +52,14 @@ def test_says_what_there_is_to_say(made):
     assert c.draws["count"] == 2
     assert {m.where for m in c.margins if m.name == "RMS torque"} == set(machine.model.joints)
     assert {m.name for m in c.margins} >= {"range", "moving speed", "reach", "self-contact", "RMS torque", "torque-speed line",
-                                           "supply current", "tilt", "falls", "bus time", "poses"}
+                                           "supply current", "tilt", "falls", "bus time", "poses",
+                                           "way back to its cycle"}
     assert set(c.floor["speed"]) == {"2 ms", "1 ms"}
     assert c.other_engine["speed kept"] == pytest.approx(1.0, abs=1e-9)  # the other engine is this one
+    back = c.cycle["cycles until it is back"]
+    assert {"from neutral", "at once", "a pose got lost", "a push to the left", "from another table"} <= set(back)
+    assert all(n is not None and n <= 5 for n in back.values())
+    assert c.cycle["heading deg, standard deviation"] < 1.0
     assert c.ways["at rest"]["largest angle off neutral deg"] < 6
     assert shape_from(json.loads((folder / NAME).read_text())["shape"]) == table.shape
     assert "a claim about the model" in json.loads((folder / NAME).read_text())["claim"]
@@ -130,5 +135,5 @@ def test_the_robotis_walk_needs_none(capsys, tmp_path):
 
 
 def test_nan_is_null():
-    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {})
+    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {}, {})
     assert json.loads(empty.as_text())["nominal"] == {"slip m/s": None, "rms": 0.5}

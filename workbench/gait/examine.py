@@ -14,11 +14,12 @@ from scipy.ndimage import minimum_filter1d
 from workbench.files.option_checks import check_choice, check_positive, check_whole
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
+from workbench.gait.limit_cycle import LimitCycle, limit_cycle
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
-from workbench.motion import Commands
+from workbench.motion import Commands, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -51,7 +52,7 @@ class CertifyOptions:
     the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too, beside
     the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the same discrete
     step is compared. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s].
-    n_jobs: processes."""
+    watched: cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -61,11 +62,12 @@ class CertifyOptions:
     checked_seconds: float = 1.0
     checked_step: float = 2e-3
     floor_seconds: float = 2.0
+    watched: int = 12
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
 
     def __post_init__(self) -> None:
-        check_whole(self, draws=0, checked=0, n_jobs=1)
+        check_whole(self, draws=0, checked=0, watched=0, n_jobs=1)
         check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds")
         for name in self.variants:
             check_choice("variants", name, VARIANTS)
@@ -102,6 +104,10 @@ class Examiner:
         order = [take.joints.index(j) for j in self.model.joints]
         near = SelfContact(self.model).nearest(take.q[rows][:, order])
         return NominalRun(take, *self._measured(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
+
+    def limit_cycle(self, other: PoseTable | None) -> LimitCycle:
+        """The nominal robot again, entered and disturbed in other ways. other: another table, from which it comes."""
+        return limit_cycle(self.model, self.table, self.options.watched, self.options.step, other)
 
     def cycles(self, seconds: float) -> int:
         """How many are played to walk for so long [s], after the first."""

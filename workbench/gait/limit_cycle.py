@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.gait.cycles import Scatter, cycles_of, scatter_of
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.table import GaitTable
 from workbench.motion import Commands, PoseTable
@@ -30,14 +31,6 @@ STAYS = 3
 """Cycles that have to be the gait's own at a run's end."""
 LEAD = 0.3
 """At rest before the first command [s]."""
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """From one cycle to the next of a settled gait, standard deviations: speed along the way it goes [m/s], and heading [rad]."""
-
-    speed: float
-    heading: float
 
 
 @dataclass(frozen=True)
@@ -75,30 +68,6 @@ class _Entry:
     start: Start | None = None
 
 
-def cycles_of(take: Take, begin: float, period: float, end: float = math.inf) -> Array:
-    """Forward and sideways velocity [m/s], in the base's heading, and turn [rad] of each whole cycle from `begin` to `end` [s]
-    or the take's end: (N, 3)."""
-    assert take.p_WB is not None
-    assert take.quat_WB is not None
-    w, x, y, z = take.quat_WB.T
-    heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
-    count = int((min(float(take.time[-1]), end) - begin) / period + 1e-6)
-    edges = begin + period * np.arange(count + 1)
-    p = np.stack([np.interp(edges, take.time, take.p_WB[:, i]) for i in range(2)], axis=1)
-    h = np.interp(edges, take.time, heading)
-    step, middle = np.diff(p, axis=0) / period, (h[1:] + h[:-1]) / 2
-    forward = step[:, 0] * np.cos(middle) + step[:, 1] * np.sin(middle)
-    left = step[:, 1] * np.cos(middle) - step[:, 0] * np.sin(middle)
-    return np.column_stack([forward, left, np.diff(h)])
-
-
-def scatter_of(cycles: Array) -> Scatter:
-    """Of cycles (N, 3) as `cycles_of` gives them."""
-    way = cycles[:, :2].mean(axis=0)
-    along = cycles[:, :2] @ (way / max(float(np.hypot(*way)), 1e-9))
-    return Scatter(float(along.std()), float(cycles[:, 2].std()))
-
-
 def limit_cycle(model: RobotModel, table: GaitTable, watched: int, step: float = 1e-3, other: PoseTable | None = None,
                 ) -> LimitCycle:
     """Plays the gait from neutral, and again disturbed, on one robot. watched: cycles of each run. step: of the simulation [s].
@@ -116,13 +85,14 @@ def limit_cycle(model: RobotModel, table: GaitTable, watched: int, step: float =
     own = cycles_of(first, neutral.begin, period)
     scatter = scatter_of(own[-SETTLED:])
     entries = [*_entries(table, watched, other), _pushed(first, table, watched, model)]
-    told = [_return(neutral.name, first, own, own)]
-    told += [_return(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
+    told = [came_back(neutral.name, first, own, own)]
+    told += [came_back(e.name, take, cycles_of(take, e.begin, period), own) for e, take in zip(entries, run(entries))]
     return LimitCycle(scatter, tuple(told), watched)
 
 
-def _return(name: str, take: Take, cycles: Array, own: Array) -> Return:
-    """cycles (N, 3) of a run, own (N, 3) of the one from neutral."""
+def came_back(name: str, take: Take, cycles: Array, own: Array) -> Return:
+    """After how many of its cycles (N, 3) a run is the gait that `own` (N, 3), the cycles from neutral, settles in; both as
+    `cycles_of` gives them."""
     assert take.quat_WB is not None
     settled = own[-SETTLED:]
     mean = settled.mean(axis=0)

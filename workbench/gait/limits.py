@@ -10,6 +10,7 @@ import numpy as np
 
 from workbench.device.tables.table_file import most_poses, other_family
 from workbench.files.option_checks import check_positive
+from workbench.gait.limit_cycle import LimitCycle
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.self_contact import Nearness
@@ -31,6 +32,7 @@ class GaitLimits:
     change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn
     that comes from a robot's own zero offsets and latency is seen on its first metre, and a table of another `turn` corrects it:
     0.06 rad a stance took 25 and 40 deg/m out of two gaits, one forward and one backward. aside: sideways speed by forward speed.
+    back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
     """
 
     rms: float | None = None
@@ -44,6 +46,7 @@ class GaitLimits:
     drift: float = float(np.radians(3))
     spread: float = float(np.radians(45))
     aside: float = 0.1
+    back: int = 8
 
     def __post_init__(self) -> None:
         check_positive(self, *(f.name for f in fields(self) if getattr(self, f.name) is not None))
@@ -120,6 +123,16 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
     out.append(_of("supply current", "robot", measure.peak_current, limits.fuse, "A"))
     out.append(_of("tilt", "robot", float(np.degrees(measure.tilt)), float(np.degrees(limits.tilt)), "deg"))
     return out
+
+
+def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:
+    """Of the way into the gait from which it takes longest to walk as it does after its own start."""
+    slowest = cycle.slowest
+    if slowest.cycles is None:
+        use = max(2.0, cycle.watched / limits.back)
+        said = "cycles, fell" if slowest.fell else "cycles, and not back"
+        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), said, use)
+    return _of("way back to its cycle", slowest.entry, slowest.cycles, limits.back, "cycles")
 
 
 def binding(margins: Iterable[Margin]) -> Margin | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from workbench.effects.apply import law_of, played
+from workbench.gait.cycles import cycles_of, scatter_of
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.servo import ServoLaw
@@ -40,7 +41,7 @@ class GaitMeasure:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
     electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
     cycles of how high a foot comes [m]; NaN where nobody looked. peak: of each joint, the largest torque that lasts LASTING, over
-    the same time as torque_use.
+    the same time as torque_use. scatter: from one of the cycles to the next, as `Scatter`.
     """
 
     fell: bool
@@ -60,6 +61,7 @@ class GaitMeasure:
     jerk: float
     clearance: float = math.nan
     peak: tuple[float, ...] = ()
+    scatter: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def speed(self) -> float:
@@ -108,6 +110,7 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     law = law_of(model)
     torque, v = take.torque[inside], take.v[inside]
     unknown = np.full(len(take), np.nan)
+    scatter = scatter_of(cycles_of(take, begin, period, end))
     current, power = supply(take, model, law) if electrical else (unknown, unknown)
     every = float(np.median(np.diff(time)))
     smooth = uniform_filter1d(current, max(1, round(FUSE_WINDOW / every)))
@@ -120,7 +123,8 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
         speed_use=_floats(np.quantile(np.abs(v), 0.995, axis=0) * law.back_emf / law.full_torque),
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
-        jerk=base_jerk(time, p), peak=_floats(_lasting(np.abs(take.torque[counted]), every)))
+        jerk=base_jerk(time, p), peak=_floats(_lasting(np.abs(take.torque[counted]), every)),
+        scatter=(scatter.speed, scatter.heading))
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
