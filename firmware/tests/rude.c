@@ -100,6 +100,10 @@ static void people_and_chip(uint32_t fault) {
     switch (fault) {
     case RUDE_WATCHDOG: reset(REASON_WATCHDOG); break;
     case RUDE_MODE: reset(REASON_RESET_PIN); break;
+    case RUDE_HOT_AFTER_RESET:
+        reset(REASON_WATCHDOG);
+        victim(0)->heat = 72;
+        break;
     case RUDE_BROWN_OUT: to_all(restart, 1); reset(REASON_BROWN_OUT); break;
     case RUDE_LINK_FLIPPED: rude.link_flip = true; break;
     case RUDE_LINK_CUT: rude.link_cut = true; break;
@@ -143,7 +147,7 @@ static void what_the_monitor_sees(void) {
         m->limit = get16(v->table + DXL_TORQUE_LIMIT);
     }
     monitor.deaf = rude.sim.babble || (spoiled && (rude.run->fault == RUDE_PACKET_LOST || rude.run->fault == RUDE_PACKET_FLIPPED));
-    if (rude.pressed && rude.press_counts && rude_ms() - rude.held_from == 1510u) rude.asked |= ASKED_RELEASE;
+    if (rude.pressed && rude.press_counts && rude_ms() - rude.held_from == 1500u) rude.asked |= ASKED_RELEASE;
     monitor_look(&monitor, rude_ms(), rude.asked);
     rude.asked = 0;
 }
