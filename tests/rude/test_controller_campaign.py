@@ -87,6 +87,7 @@ def test_every_fault_and_session_is_among_them() -> None:
 
 @pytest.mark.parametrize(("injection", "once_said"), [
     (Injection(1, FAULTS.index("packet lost"), 3040, 3434, 2), "torque off was told too seldom on a bad line"),
+    (Injection(3, FAULTS.index("packet flipped"), 800, 21080, 2), "torque off met every other packet, which was spoiled"),
     (Injection(4, FAULTS.index("late boot"), 743, 2064), "the bridge began while a servo had not heard that torque is off"),
     (Injection(1, FAULTS.index("late boot"), 814, 489), "a servo that started later kept its torque after a release"),
     (Injection(3, FAULTS.index("late boot"), 1623, 979), "rounds of many silent servos took too long"),
