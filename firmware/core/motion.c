@@ -9,6 +9,7 @@ static void new_goals(struct robot *r) {
 void release(struct robot *r) {
     r->send_goals = r->send_limits = false;
     r->send_release = true;
+    r->off_twice = false;
     for (uint32_t j = 0; j < r->joints; j++) r->servo[j].off = false;
 }
 
@@ -156,7 +157,8 @@ bool reserved(const struct robot *r, uint32_t ms) { return r->state == STATE_PLA
 bool motion_send(struct robot *r) {
     if (r->send_release) {
         static const uint8_t off = 0;
-        r->send_release = false; /* asked for again by whoever reads that a servo is still on */
+        r->off_twice = !r->off_twice;
+        r->send_release = r->off_twice; /* asked for again as long as some servo is not known to be off */
         bus_ask(&r->bus, dxl_write(r->bus.tx, DXL_BROADCAST, DXL_TORQUE, &off, 1), 0, BUS_TIMEOUT_MS, r->now);
         return true;
     }

@@ -83,8 +83,10 @@ static void look_for_what_is_wrong(struct monitor *m, uint32_t ms, bool any) {
         bool bad = !j->answers || j->hot || j->overloaded;
         if (!bad || !any) m->bad_since[k] = NEVER;
         else if (m->bad_since[k] == NEVER) m->bad_since[k] = ms;
-        if (m->deaf || ms - m->reset_at < STARTING) continue;
-        uint32_t since = m->bad_since[k] < m->reset_at + STARTING && m->bad_since[k] != NEVER ? m->reset_at + STARTING : m->bad_since[k];
+        if (m->deaf) continue;
+        uint32_t since = m->bad_since[k], started = m->reset_at + STARTING;
+        if (!j->answers && since != NEVER && since < started) since = started; /* it may still be starting */
+        if (since != NEVER && since > ms) continue;
         if ((moving && due(since, ms, FOUND)) || due(since, ms, LET_GO)) broken(m, RULE_NOT_FOUND, ms, k);
     }
 }

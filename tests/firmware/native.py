@@ -31,10 +31,9 @@ class CellRun(ctypes.Structure):
     ]
 
 
-def compile_core(flags: tuple[str, ...] = ("-O2",)) -> Path:
-    """A shared library of core and tests, made anew where a source has changed."""
-    source = FIRMWARE
-    tests = ("sim", "cells", "access", "rude", "monitor")
+def compile_core(flags: tuple[str, ...] = ("-O2",), source: Path = FIRMWARE) -> Path:
+    """A shared library of core and tests, made anew where a source has changed. source: another firmware folder."""
+    tests = ("sim", "cells", "access", "rude", "rude_people", "monitor")
     sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in tests)])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):

@@ -14,6 +14,7 @@ FAULTS = (
     "return level 1",
     "two of one ID", "hot", "overload", "low battery", "babble", "watchdog", "MODE", "brown-out", "blocked", "slow answers",
     "link flipped", "link cut", "STOP", "RELEASE", "PLAY", "remote 1", "remote 6", "START", "START held", "late boot",
+    "hot after a reset",
 )
 MODES = ("at", "from", "now and then from")
 WIRE = range(1, 9)
@@ -47,11 +48,11 @@ class Injection:
     seed: int = 1
     mode: int = 0
 
-    def run(self, tables: tuple[bytes, bytes]) -> Run:
-        """The session with it, and what came of it."""
+    def run(self, tables: tuple[bytes, bytes], library: ctypes.CDLL | None = None) -> Run:
+        """The session with it, and what came of it. library: another build of the core."""
         run = Run(table=tables[0], size=len(tables[0]), second=tables[1], second_size=len(tables[1]), session=self.session,
                   fault=self.fault, k=self.k, seed=self.seed, mode=self.mode)
-        core().rude_run(ctypes.byref(run))
+        (library or core()).rude_run(ctypes.byref(run))
         return run
 
     def __str__(self) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import random
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from tests.firmware.native import Sim, walk
+from tests.firmware.native import FIRMWARE, Sim, compile_core, walk
 from tests.firmware.test_core_sections import sections
 from tests.rude.controller import FAULTS, RULES, SESSIONS, Injection, complaint, core_monitor, injections
 from tests.rude.core_port import CorePort
@@ -48,6 +50,34 @@ def test_a_hundred_thousand_faults_break_nothing(part: int) -> None:
     assert campaign(100_000, part, 10) == []
 
 
+SENT = "    bool sent = r->state == STATE_PLAY"
+PLANTED = {
+    "a stop that starts": ("commands.c", SENT, "    if (r->state == STATE_LIMP) enter(r, STATE_CHECK, reason, 0xFF);\n" + SENT),
+    "START held does nothing where it stands still": ("reactions.c", "still || reason == REASON_HELD))", "still))"),
+    "no judgement after a reset": ("reactions.c", "if (!torque_on(r) && r->state != STATE_STILL) return;",
+                                   "if (!torque_on(r)) return;"),
+    "torque off is told once": ("commands.c", "if (!known) r->send_release = true;", "(void)known;"),
+    "speed 0 goes out": ("motion.c", "    if (speed) return (uint16_t)speed;", "    return (uint16_t)speed;"),
+    "the first ramp at full force": ("robot.c", "        r->gentle = true;", "        r->gentle = false;"),
+    "a silent servo is not found": ("reactions.c", "        if (silent) react", "        if (silent && s->missed > 200u) react"),
+    "a check goes on after a release": ("commands.c", "        enter(r, STATE_LIMP, REASON_LINK, 0xFF);",
+                                        "        if (torque_on(r)) enter(r, STATE_LIMP, REASON_LINK, 0xFF);"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANTED)
+def test_the_campaign_finds_a_planted_fault(name: str, tmp_path: Path) -> None:
+    file, was, instead = PLANTED[name]
+    shutil.copytree(FIRMWARE, tmp_path / "firmware", ignore=shutil.ignore_patterns("corpus*"))
+    text = (tmp_path / "firmware" / "core" / file).read_text()
+    assert text.count(was) == 1
+    (tmp_path / "firmware" / "core" / file).write_text(text.replace(was, instead))
+    library = ctypes.CDLL(str(compile_core(source=tmp_path / "firmware")))
+    lengths = whole_sessions()
+    assert any(complaint(i.run(TABLES, library)) for i in injections(3000, lengths))
+
+
 def test_every_fault_and_session_is_among_them() -> None:
     lengths = whole_sessions()
     chosen = list(injections(500, lengths))
@@ -57,6 +87,7 @@ def test_every_fault_and_session_is_among_them() -> None:
 
 @pytest.mark.parametrize(("injection", "once_said"), [
     (Injection(1, FAULTS.index("packet lost"), 3040, 3434, 2), "torque off was told too seldom on a bad line"),
+    (Injection(3, FAULTS.index("packet flipped"), 800, 21080, 2), "torque off met every other packet, which was spoiled"),
     (Injection(4, FAULTS.index("late boot"), 743, 2064), "the bridge began while a servo had not heard that torque is off"),
     (Injection(1, FAULTS.index("late boot"), 814, 489), "a servo that started later kept its torque after a release"),
     (Injection(3, FAULTS.index("late boot"), 1623, 979), "rounds of many silent servos took too long"),
