@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
 from workbench.cli.check import check_certificate_of
-from workbench.cli.options import add_cycles, add_model, add_out, load_model
+from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive
 
 if TYPE_CHECKING:
     from workbench.device.play import Played
@@ -29,11 +29,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_bus(parser)
     add_model(parser)
     add_cycles(parser, 3)
+    parser.add_argument("--slow", type=positive, default=1, metavar="N", help="play it N times as slowly (default: 1)")
+    parser.add_argument("--torque", type=_percent, default=100, metavar="PERCENT",
+                        help="share of the torque limit that the servos get, from 10 (default: 100)")
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
     parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
+
+
+def _percent(text: str) -> int:
+    """10 to 100, for argparse: with less no servo lifts its own leg."""
+    value = positive(text)
+    if not 10 <= value <= 100:
+        raise argparse.ArgumentTypeError(f"expected 10 to 100 percent, got {text[:40]}")
+    return value
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
     check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     commands = motion.commands(motion.often(args.cycles, 3))
+    commands, share = commands.slowed(args.slow), args.torque / 100
+    options = PlayOptions(hold=args.hold, torque=share, start_torque=min(share, PlayOptions().start_torque))
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)
     with Progress("play") as progress, open_bus(args, model, virtual) as bus, stop_on_signals() as stop:
@@ -71,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         registers = found.registers()
         save_registers(registers, args.out / "registers.yaml")
         played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
-                         PlayOptions(hold=args.hold), progress=progress)
+                         options, progress=progress)
     for departure in registers.departures(model):
         print(f"workbench play: warning: {departure}", file=sys.stderr)
     if bus.retries:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +12,9 @@ from workbench.cli.bus_options import add_bus, make_virtual, open_bus
 from workbench.cli.options import add_model, load_model
 
 if TYPE_CHECKING:
+    from workbench.device.bus import Bus
     from workbench.device.bus.survey import Survey
+    from workbench.robot import RobotModel
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -20,11 +23,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "servos",
         help="list the servos on the bus and every register that differs from the model",
         description="Looks for a servo at every ID, and reads all registers of each. Shows who answers, in what state, and what "
-        "differs from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing.")
+        "differs from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing "
+        "without --wiggle.")
     add_bus(parser)
     add_model(parser)
     parser.add_argument("--write", action="store_true", help="set return delay and angle limits as the model has them; read back")
     parser.add_argument("--set-id", metavar="JOINT", help="give the one servo on the bus the ID of this joint")
+    parser.add_argument("--wiggle", metavar="JOINT", help="move this joint, or `all` one after the other, by 3 deg and back, and "
+                        "ask which one moved and which way: finds swapped IDs and signs")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder for registers.yaml")
     parser.set_defaults(run=run)
 
@@ -43,6 +49,8 @@ def run(args: argparse.Namespace) -> int:
         if args.set_id:
             print(set_id(bus, model, found, args.set_id))
             return 0
+        if args.wiggle:
+            return _wiggle(bus, model, found, args.wiggle)
         if args.write:
             for line in set_up(bus, model, found):
                 print(line)
@@ -63,12 +71,40 @@ def run(args: argparse.Namespace) -> int:
     return 2 if found.problems() else 0
 
 
-def _show(found: Survey) -> None:
-    import math
+def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
+    """Moves joints a little and asks what was seen; 2 where something is wrong."""
+    from workbench.device.play.wiggle import Answers, wiggle
+    from workbench.files import InputError
+    from workbench.robot import bus_ids
 
+    servos = {s.joint: s for s in found.found.values() if s.joint is not None}
+    wanted = list(servos) if which == "all" else [which]
+    if wanted[0] not in servos:
+        raise InputError(None, f"joint '{wanted[0]}' is not on the bus; there are: {' '.join(servos)}")
+    for problem in found.problems():
+        raise InputError(None, f"{problem}; nothing was moved")
+    answers = Answers()
+    for joint in wanted:
+        done = wiggle(bus, servos[joint])
+        blocked = ": it went too little; what holds it?" if done.blocked else ""
+        print(f"servo {done.servo} ({joint}) went {math.degrees(done.went):+.1f} deg and back{blocked}; its torque is off")
+        print(f"which joint moved? Enter: {joint}, in the positive direction; -: {joint}, the other way; else its name")
+        line = sys.stdin.readline()
+        if not line:
+            raise InputError(None, "no answer; call it from a terminal")
+        answers.take(joint, line, model.joints)
+    for finding in answers.findings(bus_ids(model)):
+        print(f"workbench servos: problem: {finding}", file=sys.stderr)
+    return 2 if answers.findings(bus_ids(model)) else 0
+
+
+def _show(found: Survey) -> None:
+    rows = found.found.values()
+    joint, model = (max([8, *(len(text) + 2 for text in column)])
+                    for column in ((s.joint or "-" for s in rows), (s.model for s in rows)))
     print(f"{len(found.found)} servos at {found.rate} bit/s")
-    print(f"{'ID':>3}  {'joint':<8}{'model':<16}{'firmware':>8}{'deg':>8}{'V':>6}{'deg C':>6}  alarms")
+    print(f"{'ID':>3}  {'joint':<{joint}}{'model':<{model}}{'firmware':>8}{'deg':>8}{'V':>6}{'deg C':>6}  alarms")
     for s in found.found.values():
         firmware = s.registers.get("firmware_version", "")
-        print(f"{s.id:>3}  {s.joint or '-':<8}{s.model:<16}{firmware:>8}{math.degrees(s.angle):>8.1f}{s.voltage:>6.1f}"
+        print(f"{s.id:>3}  {s.joint or '-':<{joint}}{s.model:<{model}}{firmware:>8}{math.degrees(s.angle):>8.1f}{s.voltage:>6.1f}"
               f"{s.temperature:>6}  {', '.join(s.alarms) or 'none'}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,10 @@ class Commands:
         out = np.zeros((len(t), len(self.joints)))
         out[sent] = from_[at] + _ramp(self.goals[at] - from_[at], reach[at], (t[sent] - self.times[at])[:, None])
         return out
+
+    def slowed(self, factor: float) -> Commands:
+        """The same, so many times as slow."""
+        return replace(self, times=factor * self.times, speeds=self.speeds / factor, end=factor * self.end)
 
     def column(self, joint: str) -> int:
         """Index of a joint's column."""

@@ -10,6 +10,7 @@ from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.files import InputError
 from workbench.robot import RobotModel, bus_ids
+from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_profile import ServoProfile
 
 ROUNDING = 2
@@ -17,9 +18,10 @@ ROUNDING = 2
 
 
 def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> dict[str, int]:
-    """What `set_up` writes into a joint's servo: no return delay, and the model's range of the joint."""
-    frame = model.kinematics.frames[joint]
-    lowest, highest = _limit(frame.lower, profile), _limit(frame.upper, profile)
+    """What `set_up` writes into a joint's servo: no return delay, and the joint's range, by the model
+    and the table of ranges that the firmware's tables keep to."""
+    own = joint_ranges(model)[joint]
+    lowest, highest = _limit(own.lower, profile), _limit(own.upper, profile)
     return {"return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
 
 

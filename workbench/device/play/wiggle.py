@@ -1,0 +1,100 @@
+"""One joint moved a little and back, so that somebody sees which one it is and which way it turns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from workbench.device.bus.bus import Bus
+from workbench.device.bus.errors import BusError
+from workbench.device.bus.survey import FoundServo
+from workbench.files import InputError
+
+
+@dataclass(frozen=True)
+class WiggleOptions:
+    """by: how far it goes [rad]; seen from a metre, and less than a servo's gears take when the leg is held. speed: [rad/s].
+    torque: share of the torque limit. rest: at the far end, and back [s]. moved: share of the way that counts as having moved."""
+
+    by: float = math.radians(3)
+    speed: float = math.radians(12)
+    torque: float = 0.3
+    rest: float = 0.6
+    moved: float = 0.5
+
+
+@dataclass(frozen=True)
+class Wiggled:
+    """went: how far the joint went [rad], by its own sensor. blocked: whether that was too little."""
+
+    joint: str
+    servo: int
+    went: float
+    blocked: bool
+
+
+def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) -> Wiggled:
+    """Torque on where it stands, a little in the positive direction, back, and torque off, whatever happens. BusError where it
+    does not answer; InputError where it has no joint, or has torque already, as then something else moves it."""
+    o, profile = options or WiggleOptions(), bus.profile
+    if servo.joint is None:
+        raise InputError(None, f"servo {servo.id} is no joint of the model")
+    if bus.read(servo.id, "torque_enable")["torque_enable"]:
+        raise BusError("its torque is on; switch the robot off and on first", servo.id, servo.joint)
+    here = bus.read(servo.id, "present_position")["present_position"]
+    if abs(bus.read(servo.id, "present_position")["present_position"] - here) * profile.count > math.radians(2):
+        raise BusError("it moves; hold the robot still", servo.id, servo.joint)
+    there = min(here + round(o.by / profile.count), profile.largest_position)
+    time = {"goal_time": 0} if "goal_time" in profile.registers else {}
+
+    def go(count: int) -> None:
+        bus.sync_write({servo.id: {"goal_position": count, "moving_speed": profile.speed(o.speed), **time}})
+
+    limit = servo.registers["torque_limit"]
+    try:
+        bus.sync_write({servo.id: {"torque_limit": round(o.torque * limit)}})
+        go(here)
+        bus.write(servo.id, {"torque_enable": 1})
+        go(there)
+        bus.pause(o.by / o.speed + o.rest)
+        went = (bus.read(servo.id, "present_position")["present_position"] - here) * profile.count
+        go(here)
+        bus.pause(o.by / o.speed + o.rest)
+    finally:
+        bus.release([servo.id])
+        bus.sync_write({servo.id: {"torque_limit": limit}})
+        bus.pause(0.002)
+    return Wiggled(servo.joint, servo.id, went, went < o.moved * o.by)
+
+
+@dataclass
+class Answers:
+    """What somebody saw. moved: the joint that was seen to move, by the one that was told to. reversed: joints that turned the
+    other way."""
+
+    moved: dict[str, str] = field(default_factory=dict)
+    reversed: list[str] = field(default_factory=list)
+
+    def take(self, joint: str, answer: str, joints: Iterable[str]) -> None:
+        """"" or yes: this one, the positive way; `-`: this one, the other way; a joint's name, perhaps with `-` behind it: that
+        one. InputError for anything else."""
+        said = answer.strip()
+        other = said.removesuffix("-").strip()
+        if other.lower() in ("", "y", "yes"):
+            other = joint
+        if other not in joints:
+            raise InputError(None, f"'{answer.strip()}': expected Enter, -, or the joint that moved: {' '.join(joints)}")
+        self.moved[joint] = other
+        if said.endswith("-"):
+            self.reversed.append(other)
+
+    def findings(self, ids: Mapping[str, int]) -> list[str]:
+        """What is wrong with bus_ids and directions, a line each."""
+        out = [f"servo {ids[told]} is {seen}, not {told}: bus_ids should say {seen}: {ids[told]}"
+               for told, seen in self.moved.items() if told != seen]
+        seen = list(self.moved.values())
+        out += [f"joint {joint} moved for several servos: look again" for joint in sorted({j for j in seen if seen.count(j) > 1})]
+        out += [f"joint {joint} turns the other way than the model: its axis in the model has the wrong sign, or its servo is "
+                "mounted the other way round" for joint in self.reversed]
+        return out
