@@ -117,7 +117,9 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
     if recording.sensing == "mocap":
         if not recording.rigid_bodies:
             found = f"only {len(recording.markers)} markers" if recording.markers else "nothing solved"
-            out.append(f"no rigid bodies, {found}: no verb can use it; solve the robot's rigid bodies in Motive and export again")
+            out.append(f"no rigid bodies, {found}: no verb can use it; solve the robot's rigid bodies in the capture "
+                       "system (Motive: rigid bodies) and export again, or name three markers or more of each body alike, as "
+                       "leg_1")
         else:
             if model is not None:
                 check_assets(recording, model)

@@ -1,0 +1,67 @@
+"""Poses of rigid bodies as one plain table, for any capture system: time, BODY.x, BODY.y, BODY.z, BODY.qw, BODY.qx, BODY.qy,
+BODY.qz of each body. Seconds, metres (or BODY.x_mm), unit quaternions; z is up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from workbench.files import InputError
+from workbench.files.tables import is_binary
+from workbench.recording.formats.capture_table import Capture, recording_of
+from workbench.recording.formats.numbers import column, read_columns, table_bytes
+from workbench.recording.formats.registry import RecordingFormat
+from workbench.recording.formats.table_header import table_header
+from workbench.recording.recording import Recording
+
+PLACE, TURN = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+_MM = "_mm"
+
+
+def _bodies(names: tuple[str, ...]) -> dict[str, dict[str, int]]:
+    """Columns of each body by what they hold."""
+    out: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(names):
+        body, dot, what = name.rpartition(".")
+        if dot and body and what.removesuffix(_MM) in (*PLACE, *TURN):
+            out.setdefault(body, {})[what.removesuffix(_MM)] = i
+    return out
+
+
+def matches(head: bytes) -> bool:
+    """Whether the header has a time and, of a body at least, a place and a quaternion by these names."""
+    if is_binary(head):
+        return False
+    names = table_header(head).names
+    return "time" in names and any(set(of) == {*PLACE, *TURN} for of in _bodies(names).values())
+
+
+def read_body_poses(path: Path) -> Recording:
+    """Reads such a table; a blank cell is a gap. InputError where a body lacks a column, a column is unknown, or a cell is no
+    number."""
+    source = str(path)
+    content, _ = table_bytes(path)
+    header = table_header(content)
+    bodies = _bodies(header.names)
+    for body, of in bodies.items():
+        lacking = [w for w in (*PLACE, *TURN) if w not in of]
+        if lacking:
+            raise InputError(source, f"line {header.lines}: body '{body}' has no column '{body}.{lacking[0]}'")
+    known = {i for of in bodies.values() for i in of.values()} | {header.names.index("time")}
+    unknown = [n for i, n in enumerate(header.names) if i not in known and not (i == 0 and header.index)]
+    if unknown:
+        raise InputError(source, f"line {header.lines}: unknown column '{unknown[0][:40]}'; expected time and BODY.x, y, z, "
+                                 f"qw, qx, "
+                                 "qy, qz of each body")
+    table = read_columns(source, content, header.end, header.lines, len(header.names), wanted=known)
+
+    def stacked(of: dict[str, int], what: tuple[str, ...]) -> np.ndarray:
+        scale = [1e-3 if header.names[of[w]].endswith(_MM) else 1.0 for w in what]
+        return np.column_stack([column(table, of[w]) * s for w, s in zip(what, scale)])
+
+    poses = {body: (stacked(of, PLACE), stacked(of, TURN)) for body, of in bodies.items()}
+    return recording_of(source, "body_poses", Capture(column(table, header.names.index("time")), poses, {}))
+
+
+FORMAT = RecordingFormat("body_poses", "a table of body poses", matches, read_body_poses)

@@ -1,0 +1,121 @@
+"""What tables of motion capture systems have in common: axes, rotations, and rigid bodies formed of markers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.files import InputError
+from workbench.recording import quaternions as quat
+from workbench.recording.body_track import BodyTrack
+from workbench.recording.formats.log_commands import order_problem
+from workbench.recording.formats.numbers import rate_of
+from workbench.recording.recording import Recording
+
+Array = NDArray[np.float64]
+METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 1e-3, "millimeters": 1e-3, "millimetres": 1e-3}
+_FEWEST = 3
+"""Markers that a rigid body has at least."""
+_THIN = 0.05
+"""A body whose markers lie on a line, to this share of its length, has no rotation about it."""
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What a capture system's file holds. time: (N,) [s]. bodies: name -> (p (N, 3) [m], quat (N, 4) wxyz). markers: name ->
+    (N, 3) [m]. up: which axis of the file is up, "y" or "z"; with z up, x and y are level."""
+
+    time: Array
+    bodies: Mapping[str, tuple[Array, Array]]
+    markers: Mapping[str, Array]
+    up: str = "z"
+    version: str = ""
+    units: str = "m"
+    problems: tuple[str, ...] = ()
+
+
+def recording_of(source: str, kind: str, capture: Capture) -> Recording:
+    """The recording of a capture in the axes that recordings have (y up); where it has no rigid bodies, those that its markers'
+    names form. InputError where its times do not increase."""
+    time = capture.time
+    if len(time) < 2:
+        raise InputError(source, f"{len(time)} frame(s); expected two or more")
+    if (problem := order_problem(time)) is not None:
+        raise InputError(source, f"frame {problem.row + 1}: {problem.text}")
+    markers = {name: _y_up(p) if capture.up == "z" else p for name, p in capture.markers.items()}
+    bodies = {name: BodyTrack(p, q) for name, (p, q) in capture.bodies.items()}
+    if capture.up == "z":
+        bodies = {name: BodyTrack(_y_up(b.p), np.concatenate([b.quat[:, :1], _y_up(b.quat[:, 1:])], axis=1))
+                  for name, b in bodies.items()}
+    problems = list(capture.problems)
+    if not bodies and markers:
+        bodies = bodies_of_markers(markers)
+        if bodies:
+            problems.append(f"rigid bodies are formed of markers whose names begin alike: {', '.join(bodies)}; each is taken "
+                            f"to stand "
+                            "upright, without a rotation, in the first frame that shows all its markers")
+    return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=np.arange(len(time)),
+                     rate=rate_of(time), units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems),
+                     sensing="mocap")
+
+
+def _y_up(v: Array) -> Array:
+    """(N, 3) of x, y, z with z up as x, z, -y: y up."""
+    return np.stack([v[:, 0], v[:, 2], -v[:, 1]], axis=1)
+
+
+def bodies_of_markers(markers: Mapping[str, Array]) -> dict[str, BodyTrack]:
+    """Rigid bodies of markers (N, 3) [m] that are called BODY_1, BODY:top, BODY.front and so on, three of each at least and not
+    on a line. A body's pivot is the middle of its markers; its rotation is none in the first frame that shows them all."""
+    groups: dict[str, list[str]] = {}
+    for name in markers:
+        found = re.fullmatch(r"(.+?)(?:[:._\- ][^:._\- ]+|\d+)", name)
+        if found:
+            groups.setdefault(found.group(1), []).append(name)
+    out = {}
+    for body, names in groups.items():
+        at = np.stack([markers[n] for n in names], axis=1)  # (N, M, 3)
+        whole = np.flatnonzero(np.isfinite(at).all(axis=(1, 2)))
+        if len(names) < _FEWEST or not len(whole):
+            continue
+        shape = at[whole[0]] - at[whole[0]].mean(axis=0)
+        sizes = np.linalg.svd(shape, compute_uv=False)
+        if sizes[1] < _THIN * sizes[0]:
+            continue
+        out[body] = _fitted(at, shape)
+    return out
+
+
+def _fitted(at: Array, shape: Array) -> BodyTrack:
+    """The path of a body whose markers (M, 3) [m] about their middle are seen at (N, M, 3): least squares, in frames that show
+    three of them at least."""
+    p, q = np.full((len(at), 3), np.nan), np.full((len(at), 4), np.nan)
+    seen: NDArray[np.bool_] = np.asarray(np.isfinite(at).all(axis=2))
+    for k in np.flatnonzero(seen.sum(axis=1) >= _FEWEST):
+        a, b = shape[seen[k]], at[k][seen[k]]
+        u, _, vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
+        turn = (vt.T * np.array([1.0, 1.0, np.sign(np.linalg.det(vt.T @ u.T)) or 1.0])) @ u.T
+        p[k] = b.mean(axis=0) - turn @ a.mean(axis=0)
+        q[k] = quat.from_matrix(turn[None])[0]
+    good = np.isfinite(q).all(axis=1)
+    if good.any():
+        q[good] = quat.continuous(q[good])[0]
+    return BodyTrack(p, q)
+
+
+def rotations(source: str, body: str, R: Array, line: int) -> Array:
+    """Quaternions (N, 4) wxyz of rotation matrices (N, 3, 3), NaN where a matrix is zero or blank; InputError names the `body`
+    and the line of the first that is no rotation. line: of the file's first frame."""
+    seen = np.isfinite(R).all(axis=(1, 2)) & (np.abs(R).sum(axis=(1, 2)) > 0)
+    off = np.abs(np.einsum("nij,nkj->nik", R, R) - np.eye(3)).max(axis=(1, 2)) > 0.02
+    bad = np.flatnonzero(seen & (off | ~(np.linalg.det(np.where(seen[:, None, None], R, np.eye(3))) > 0)))
+    if len(bad):
+        raise InputError(source, f"line {bad[0] + line}: the nine numbers of '{body}' are no rotation matrix; expected 6D data "
+                                 "as the capture system exports it")
+    out = np.full((len(R), 4), np.nan)
+    out[seen] = quat.from_matrix(R[seen])
+    return out

@@ -1,0 +1,57 @@
+"""Excel workbooks (xlsx): the first sheet, read as the table that it would be as CSV."""
+
+from __future__ import annotations
+
+import tempfile
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+from workbench.files import InputError
+from workbench.files.reading import regular_file
+from workbench.files.tables import plain_head
+from workbench.recording.formats.registry import RecordingFormat, format_of
+from workbench.recording.recording import Recording
+
+_MOST = 64 << 20
+"""Of the file, and of what is packed in it [bytes]."""
+_DAMAGED = (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError, IndexError, TypeError, AttributeError)
+
+
+def matches(head: bytes) -> bool:
+    """Whether it is an archive that begins as Office's do."""
+    return head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head[:200] or b"xl/" in head[:2000])
+
+
+def read_excel(path: Path) -> Recording:
+    """Reads the first sheet by the format that its header says. InputError where the workbook is damaged or the sheet is of no
+    known format."""
+    import pandas as pd
+
+    source = str(path)
+    try:
+        with zipfile.ZipFile(regular_file(path, _MOST)) as packed:
+            if sum(entry.file_size for entry in packed.infolist()) > 8 * _MOST:
+                raise InputError(source, "an Excel workbook that is too large when unpacked; save the sheet as CSV")
+        sheet = pd.read_excel(path, sheet_name=0, header=None, engine="openpyxl")
+    except InputError:
+        raise
+    except _DAMAGED as e:
+        raise InputError(source, f"an Excel workbook that is damaged ({' '.join(str(e).split())[:120]}); save the sheet as "
+                                 f"CSV") from None
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / "sheet.csv"
+        sheet.to_csv(table, header=False, index=False)
+        known = format_of(plain_head(table))
+        if known is None:
+            from workbench.recording.formats.foreign import refusal
+
+            raise InputError(source, f"first sheet: {refusal(table, plain_head(table)).problem}")
+        try:
+            read = known.read(table)
+        except InputError as e:
+            raise InputError(source, f"first sheet: {e.problem}") from None
+    return replace(read, source=source, metadata={**read.metadata, "written with": "Excel, the first sheet"})
+
+
+FORMAT = RecordingFormat("excel", "an Excel workbook (xlsx)", matches, read_excel)
