@@ -180,3 +180,8 @@ def joint_error(evidence: Sequence[TakeEvidence], joints: Sequence[str], residua
     parts = [np.square((residuals[i] * e.sigma)[e.uses[use]][:, [e.channels.index(j) for j in joints if j in e.channels]]).ravel()
              for i, e in enumerate(evidence)]
     return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
+
+
+def in_file_units(value: float, channel: str) -> tuple[float, str]:
+    """A channel's value [m or rad] in the units of docs/formats.md."""
+    return (value, "m") if channel in ("forward", "left", "height") else (float(np.rad2deg(value)), "deg")
