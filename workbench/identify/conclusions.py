@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +26,13 @@ from workbench.identify.results.findings import (
 )
 from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
 from workbench.identify.results.ties import Tie
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.model_comparison import NamePosterior, Rival
-from workbench.identify.selection.record import SelectionStep
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
+
+if TYPE_CHECKING:
+    from workbench.identify.selection.candidate_fit import CandidateFit
+    from workbench.identify.selection.model_comparison import NamePosterior, Rival
+    from workbench.identify.selection.record import SelectionStep
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]

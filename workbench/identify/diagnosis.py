@@ -24,7 +24,7 @@ from workbench.identify.evidence.explain import explained_by_evidence, is_by_log
 from workbench.identify.explained import Explained, Problem
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
-from workbench.identify.judge import EnginesPartError, judged
+from workbench.identify.judge import COMPILED, EnginesPartError, judged
 from workbench.identify.ledger import ledger
 from workbench.identify.options import PROBLEM, READ_OFF
 from workbench.identify.preparation import check_duration, prepared
@@ -75,16 +75,19 @@ class _Settings:
 
 
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
-                     thorough: bool = False, without: Sequence[str] = ()) -> DiagnosisResult:
+                     thorough: bool = False, without: Sequence[str] = (), engine: str = "auto") -> DiagnosisResult:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
     effects that are known not to be there, and are not looked for; InputError where one is no effect. Rollouts are the compiled
-    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model."""
+    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model, or `engine` is
+    "drake"."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
     settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic())
+    if engine == "drake":
+        return _diagnosed(session, replace(config, engine="drake"), settings, {"rollouts by": "Drake"})
     try:
-        return _diagnosed(session, config, settings, {"rollouts by": "the compiled station"})
+        return _diagnosed(session, config, settings, {"rollouts by": COMPILED})
     except EnginesPartError as why:
         progress(f"{why}: again by Drake", None)
         by_drake = {"rollouts by": "Drake", "because": str(why)}

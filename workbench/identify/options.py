@@ -74,8 +74,12 @@ class ProblemOptions:
     """Rollouts that are held in memory [MiB], those used last; others are read again from disk, where a folder keeps them."""
     engines_apart: float = 0.1
     """Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
-    engines_compared: float = 20.0
-    """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all."""
+    engines_compared: float = 3.0
+    """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all. In fourteen
+    diagnoses they differed by 8e-7 sigma at most."""
+    engines_compared_whole: float = 20.0
+    """So much of one take is [s], of a walk where there is one, for what comes late, as a stop that is reached or a motor that
+    fades."""
     heavy_trunk: float = 0.09
     """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
 
