@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,16 @@ class TakeEvidence:
     def moving(self) -> Mask:
         """Frames after the first command."""
         return np.asarray(self.since >= 0.0)
+
+    def looked_at(self, until: float) -> TakeEvidence:
+        """The take of which models are asked until then [s after the first command], cropped to that, so that neither time nor
+        memory grows with what is not looked at; and to what a shifted start may need beyond."""
+        frames = int(np.searchsorted(self.since, until + max(PROBLEM.late, LOOP), side="right")) + 1
+        early = self.since[:frames] <= until
+        rough = self.rough[:frames] if isinstance(self.rough, np.ndarray) and self.rough.ndim == 2 else self.rough
+        return replace(self, take=replace(self.take, recorded=self.take.recorded.first(frames)), recorded=self.recorded[:frames],
+                       offset=self.offset[:frames], contact=self.contact[:frames], rough=rough, until=until,
+                       uses={use: mask[:frames] & early for use, mask in self.uses.items()})
 
     def zero(self, joint: str) -> float:
         """Where a joint's recorded angle is zero, on its servo's scale [rad]."""

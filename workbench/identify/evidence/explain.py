@@ -100,7 +100,11 @@ def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidenc
             until = left / (len(lengths) - k)
             break
         left -= length
-    return [replace(e, until=until) if any(e is t for t in told) else replace(e, until=0.0) for e in evidence]
+    return [_looked_at(e, until if any(e is t for t in told) else 0.0) for e in evidence]
+
+
+def _looked_at(e: TakeEvidence, until: float) -> TakeEvidence:
+    return e if math.isinf(until) else e.looked_at(until)
 
 
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions

@@ -96,7 +96,8 @@ class Selected:
 
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
         """Rivals that lost, and what was tried and not taken."""
-        return rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, before)
+        cropped = {i: before[i][:len(e.recorded)] for i, e in enumerate(self.looked_at)}
+        return rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
         """Of all numbers of the effects."""
