@@ -26,12 +26,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class RolloutRequest:
     """A model on some takes (indices). step: in search steps; coarse ones are good for differences alone. until: how long after
-    the first command [s]; frames after that are NaN."""
+    the first command [s]; frames after that are NaN. horizon [s]: servo logs are put back to the recorded state so often."""
 
     model: RobotModel
     takes: tuple[int, ...]
     step: float = 1.0
     until: float = np.inf
+    horizon: float = np.inf
 
 
 class RolloutEvaluator:

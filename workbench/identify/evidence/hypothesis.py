@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
-FAR = 2.0
+FAR = 3.0
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""

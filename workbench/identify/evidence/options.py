@@ -47,6 +47,7 @@ class EvidenceOptions:
     paired: int = 10
     most: int = 6
     explored: float = 0.15
+    horizon: float = 0.5
     seconds: float = 100.0
     occam: float = 7.0
     veto: float = 3.0

@@ -57,7 +57,7 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
 def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
-    rollouts = replace(rollouts, step=PROBLEM.coarse)
+    rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
     first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
     found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
     return standing(rollouts, found), found
@@ -74,7 +74,7 @@ def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: E
     """
     states = list(found)
     for exploring in (True, False):
-        here = rollouts.around_here(PROBLEM.coarse if exploring else step)
+        here = rollouts.around_here(PROBLEM.coarse if exploring else step, options.horizon)
         rollouts, states = _all_levels(here, states, options, exploring, report)
     return rollouts, tuple(states)
 

@@ -119,7 +119,8 @@ class Shapes(NamedTuple):
 class Schedule(NamedTuple):
     """What happens when. steps of length dt; log_every: steps between two rows of the log. begin [s]: the first command,
     on which terms count. command_step (K,): the step before which a command comes, late (K,) [s] how long before; goal (K, m),
-    speed (K, m), on (K, m). put_step (P,): the step before which the base is put; quat (P, 4), v, w (P, 3) as in BaseStates."""
+    speed (K, m), on (K, m). put_step (P,): the step before which the robot is put somewhere: a free base to quat (P, 4), v, w
+    (P, 3) as in BaseStates; the servos of a held one to q, qdot (P, m) as in JointStates."""
 
     dt: float
     steps: int
@@ -134,6 +135,8 @@ class Schedule(NamedTuple):
     put_quat: Array
     put_v: Array
     put_w: Array
+    put_q: Array
+    put_qdot: Array
 
 
 class State(NamedTuple):
