@@ -5,9 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_cycles, add_model, add_out, load_model
+
+if TYPE_CHECKING:
+    from workbench.device.play import Played
+
+CTRL_C = "Ctrl-C"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("motion", metavar="MOTION", nargs="?")
     add_bus(parser)
     add_model(parser)
-    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="how often the motion is played (default: 3)")
+    add_cycles(parser, 3)
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
     parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
@@ -33,11 +39,11 @@ def run(args: argparse.Namespace) -> int:
     """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.survey import survey
-    from workbench.device.limits import refuse_broken_limits
     from workbench.device.play import PlayOptions, finish_log, perform, preflight
     from workbench.device.stop import stop_on_signals
+    from workbench.device.tables.limits import refuse_broken_limits
+    from workbench.files import InputError
     from workbench.motion import load_motion
-    from workbench.robot import InputError
     from workbench.robot.servo_registers import save_registers
 
     if (args.motion is None) == (args.finish is None):
@@ -56,15 +62,27 @@ def run(args: argparse.Namespace) -> int:
         preflight(found)
         registers = found.registers()
         save_registers(registers, args.out / "registers.yaml")
-        commands = motion.commands(args.cycles)
+        commands = motion.commands(motion.often(args.cycles, 3))
         played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
                          PlayOptions(hold=args.hold), progress=progress)
     for departure in registers.departures(model):
         print(f"workbench play: warning: {departure}", file=sys.stderr)
     if bus.retries:
         print(f"workbench play: warning: {bus.retries.total()} answers had to be requested again", file=sys.stderr)
-    print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late; torque is "
-          f"{'off' if played.released else 'on'}")
+    return _tell(log, played)
+
+
+def _tell(log: Path, played: Played) -> int:
+    """Why it was stopped first, then what there is; the exit code."""
     if played.stopped:
-        print(f"workbench play: stopped: {played.stopped}; torque is off", file=sys.stderr)
-    return 0 if not played.stopped else 130 if played.stopped == "Ctrl-C" else 2
+        print(f"workbench play: stopped: {played.stopped}", file=sys.stderr)
+    if played.log_problem:
+        print(f"workbench play: warning: no joint log: {played.log_problem}", file=sys.stderr)
+    else:
+        print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late")
+    print(f"torque is {'off' if played.released else 'on'}" if not played.unknown else
+          f"workbench play: torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off",
+          file=sys.stderr if played.unknown else sys.stdout)
+    if played.stopped.startswith(CTRL_C):
+        return 130
+    return 2 if played.stopped or played.unknown else 0
