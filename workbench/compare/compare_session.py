@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
 from workbench.compare.options import COMPARE
@@ -18,6 +22,9 @@ from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.steady import BaseStates
+
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -78,7 +85,7 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
         jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start,
-                          steadied=run.steadied))
+                          steadied=run.steadied, times=_instants(run, own) if kind == "finer" else None))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     progress("simulating", 0.0)
@@ -91,6 +98,15 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
                 mine[kind].append(take)
         out.append(Rollouts(mine["nominal"][0], tuple(mine["finer"]), tuple(mine["other_contact"])))
     return out
+
+
+def _instants(run: Run, config: SimulationConfig) -> Array | None:
+    """Of the log, where a floor is known by angles alone, as of a held robot: what tells no torques may be the compiled station's
+    where servos are switched off, too."""
+    if run.base != "fixed" or run.duration is None:
+        return None
+    lead = 0.0 if run.start is not None else COMPARE.lead
+    return np.arange(-round(lead / config.logged_every), math.floor(run.duration / config.logged_every + 1e-6) + 1) * config.logged_every
 
 
 def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:
