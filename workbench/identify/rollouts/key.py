@@ -10,27 +10,48 @@ import hashlib
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import joblib
 import numpy as np
 
-from workbench.identify.problem import TakeEvidence
+from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
-_ROOMS = ("robot", "motion", "servo", "recording", "effects", "simulation")
-_FILES = ("compare/channels.py", "compare/comparison.py", "compare/session_takes.py", "identify/problem.py",
-          "identify/rollouts.py", "identify/rollout_key.py")
+if TYPE_CHECKING:
+    from workbench.identify.problem import TakeEvidence
+
+_ROOMS = ("files", "robot", "motion", "servo", "recording", "effects", "simulation", "identify/rollouts")
+_FILES = ("compare/channels.py", "compare/comparison.py", "compare/session_takes.py", "identify/problem.py")
 
 
 @cache
 def rollout_code() -> str:
     """Of everything between a model and the channels of its rollout: versions, and the content of the packages it goes
     through."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     digest = hashlib.sha256(" ".join(version(name) for name in ("drake", "numba", "numpy", "scipy")).encode())
     for path in sorted([*(p for room in _ROOMS for p in (root / room).rglob("*.py")), *(root / name for name in _FILES)]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
+
+
+class ModelKeys:
+    """Names of models, as `RobotModel.sha256` is, a hundred times cheaper: a robot's file is read once, as a search plays
+    thousands of models that differ in numbers alone."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, str] = {}
+
+    def of(self, model: RobotModel) -> str:
+        """Of the description's content and of everything said about it."""
+        told = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
+        source = f"{model.description} {told}"
+        if source not in self._files:
+            content = model.source.source.read_bytes()
+            self._files[source] = hashlib.sha256(content + b" " + told.encode()).hexdigest()
+        physics = repr((sorted(model.servos.items()), model.effects))
+        return hashlib.sha256(f"{self._files[source]} {physics}".encode()).hexdigest()
 
 
 def take_key(e: TakeEvidence, config: SimulationConfig) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +14,9 @@ from workbench.compare.channels import joint_of
 from workbench.effects.registry import known_effects
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps
-from workbench.identify.rollout_key import take_key
+from workbench.identify.rollouts.key import ModelKeys, take_key
+from workbench.identify.rollouts.memory import RolloutMemory
+from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
@@ -36,51 +38,107 @@ class RolloutRequest:
 
 
 class RolloutEvaluator:
-    """Rolls models out on the session's takes and evaluates the residuals. memory: folder in which every result is kept, so that
-    a killed run resumes; results are the same with and without. work: seconds of a puppy's rollouts requested so far, at the
-    search's step."""
+    """Rolls models out on the session's takes and evaluates the residuals. memory: what was rolled out before, or a folder in
+    which every rollout is kept, so that a killed run resumes; results are the same with and without."""
 
     def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
-                 memory: Path | None = None) -> None:
+                 memory: Path | RolloutMemory | None = None) -> None:
         self.evidence = tuple(evidence)
         self.config = config
         self.n_jobs = n_jobs
-        self.memory = memory
-        self.rollouts = 0
-        self.work = 0.0
-        self._known: dict[str, NDArray[np.float32]] = {}
+        self.memory = memory if isinstance(memory, RolloutMemory) else RolloutMemory(memory, PROBLEM.remembered << 20)
         self._take_keys: dict[int, str] = {}
+        self._model_keys = ModelKeys()
 
-    def residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-        """For each question, residuals (N, c) by take; NaN where a take is not looked at."""
+    @property
+    def rollouts(self) -> int:
+        """Distinct rollouts that were requested so far, of this evaluator and of those that share its memory."""
+        return self.memory.rollouts
+
+    @property
+    def work(self) -> float:
+        """Seconds of a puppy's rollouts requested so far, at the search's step; likewise."""
+        return self.memory.work
+
+    def residuals(self, questions: Sequence[RolloutRequest], corrected: bool = True) -> list[dict[int, Array]]:
+        """For each question, residuals (N, c) by take; NaN where a take is not looked at. corrected: for the search's step."""
+        answers: dict[str, Array] = {}
         keys: list[dict[int, str]] = []
         new: dict[str, tuple[RolloutRequest, int, RobotModel]] = {}
         for q in questions:
             felt = {i: self._felt(q.model, i) for i in q.takes}
             keys.append({i: self._key(model, i, q) for i, model in felt.items()})
-            asked = {key: (q, i, felt[i]) for i, key in keys[-1].items() if key not in self._known and key not in new}
-            self.work += sum(self._length(i, self._until(i, q)) for _, i, _ in asked.values()) / q.step
-            new |= asked
-        self._known |= {key: np.full_like(self.evidence[i].recorded, np.nan, dtype=np.float32)
-                        for key, (q, i, _) in new.items() if not self._until(i, q)}
-        new = {key: what for key, what in new.items() if not self._recalled(key)}
+            for i, key in keys[-1].items():
+                if key in answers or key in new:
+                    continue
+                if not self._until(i, q):
+                    answers[key] = np.full_like(self.evidence[i].recorded, np.nan)
+                elif not self._recalled(key, i, q, answers):
+                    new[key] = (q, i, felt[i])
         # the longest first, so that no core waits at the end
         order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
         jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), self._until(i, q))
                 for q, i, model in (new[k] for k in order)]
-        self.rollouts += len(order)
         for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
             q, i, _ = new[key]
             e = self.evidence[i]
-            self._keep(key, np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan))
-        return [{i: self.evidence[i].residual(self._known[key].astype(float), q.model, q.step >= 1) for i, key in by_take.items()}
+            seen = np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan)
+            kept = seen.astype(np.float32)  # there are a thousand; noise is a ten thousandth
+            self.memory.keep(key, kept)
+            answers[key] = kept.astype(float)
+        return [{i: self.evidence[i].residual(answers[key], q.model, corrected and q.step >= 1) for i, key in by_take.items()}
                 for q, by_take in zip(questions, keys)]
 
+    def uncorrected(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
+        """As `residuals`, whatever their step is wrong by. Servo logs are not shifted, as their start is known, and come straight
+        from the compiled station where it knows their physics."""
+        if self.config.engine == "drake" or not all(is_log(self.evidence[i]) for q in questions for i in q.takes):
+            return self.residuals(questions, corrected=False)
+        answers: dict[str, Array] = {}
+        keys, missing, seen = [], [], set[str]()
+        for q in questions:
+            windows = "" if np.isinf(q.horizon) else f"-every{q.horizon:.6g}"
+            keys.append({i: f"log-{self._key(self._felt(q.model, i), i, q)}{windows}" for i in q.takes})
+            new = {i: k for i, k in keys[-1].items()
+                   if k not in answers and k not in seen and not self._recalled(k, i, q, answers)}
+            seen |= set(new.values())
+            missing.append(new)
+        asked = [(q, new) for q, new in zip(questions, missing) if new]
+        for (_, new), angles in zip(asked, self._in_threads(asked)):
+            for key, q_servo in zip(new.values(), angles or ()):
+                self.memory.keep(key, q_servo)
+                answers[key] = q_servo
+        covered = [set(by_take.values()) <= set(answers) for by_take in keys]
+        others = iter(self.residuals([q for q, here in zip(questions, covered) if not here], corrected=False))
+        return [{i: self._log_residual(i, answers[key]) for i, key in by_take.items()} if here else next(others)
+                for by_take, here in zip(keys, covered)]
+
+    def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
+        """Angles of logs, by question, each as soon as those before it are there."""
+        def rolled(of: tuple[RolloutRequest, Mapping[int, str]]) -> list[Array] | None:
+            q, takes = of
+            config = replace(self.config, time_step=q.step * self.config.time_step)
+            return log_angles([self.evidence[i] for i in takes], q.model, config, q.horizon)
+
+        if self.n_jobs == 1 or len(asked) < 2:
+            yield from map(rolled, asked)
+            return
+        with ThreadPoolExecutor(self.n_jobs) as pool:  # kernels hold no lock
+            try:
+                yield from pool.map(rolled, asked)
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+    def _log_residual(self, i: int, angles: Array) -> Array:
+        """Of a log's angles (M, c) at its `frames`."""
+        e = self.evidence[i]
+        simulated = np.full(e.recorded.shape, np.nan)
+        simulated[frames(e)] = angles
+        return np.asarray((e.recorded - simulated) / (e.sigma * e.rough))
+
     def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
-        """The same on other takes of the same robot, or on these looked at otherwise; each knows what the other was answered."""
-        other = RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
-        other.rollouts, other.work, other._known = self.rollouts, self.work, self._known
-        return other
+        """The same on other takes of the same robot, or on these looked at otherwise; what one is answered the other knows."""
+        return RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
 
     @property
     def seconds(self) -> float:
@@ -200,25 +258,19 @@ class RolloutEvaluator:
             self._take_keys[take] = take_key(self.evidence[take], replace(self.config, base=self.evidence[take].take.spec.base))
         until = self._until(take, q)
         late = "" if np.isinf(until) else f"-until{until:.6g}"
-        return f"{felt.sha256[:20]}-{self._take_keys[take][:20]}-{q.step:g}{late}"
+        return f"{self._model_keys.of(felt)}-{self._take_keys[take]}-{q.step:g}{late}"
 
     def _until(self, take: int, q: RolloutRequest) -> float:
         """How long a question looks at a take [s]."""
         return min(q.until, self.evidence[take].until)
 
-    def _recalled(self, key: str) -> bool:
-        """Whether an answer is known, now or from a run before."""
-        if key not in self._known and self.memory is not None and (path := self.memory / f"{key}.npy").exists():
-            self._known[key] = np.load(path)
-        return key in self._known
-
-    def _keep(self, key: str, answer: Array) -> None:
-        simulated = answer.astype(np.float32)  # there are a thousand; noise is a ten thousandth
-        self._known[key] = simulated
-        if self.memory is not None:
-            part = self.memory / f"{key}.{os.getpid()}.part.npy"  # two runs may share the memory
-            np.save(part, simulated)
-            part.replace(self.memory / f"{key}.npy")
+    def _recalled(self, key: str, take: int, q: RolloutRequest, answers: dict[str, Array]) -> bool:
+        """Counts a rollout; whether it is known, from this run or from one before: then it is among the answers."""
+        self.memory.request(key, self._length(take, self._until(take, q)) / q.step)
+        known = self.memory.get(key)
+        if known is not None:
+            answers[key] = known.astype(float)
+        return known is not None
 
 
 def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
