@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from workbench.effects.base import Effect, Parameter
 from workbench.effects.registry import known_effects
+from workbench.files.reading import write_whole
 from workbench.robot import EffectSpec
-from workbench.robot.files import write_whole
 
 PAGE = Path(__file__).with_name("effects.md")
 LAYERS = {

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.robot.files import write_together
+from workbench.files.reading import write_together
 
 ROOT = Path(__file__).resolve().parents[1]
 SERVO = 0.0572

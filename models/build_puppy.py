@@ -8,7 +8,7 @@ from pathlib import Path
 from models.puppy_assembly import links, read_parts
 from models.puppy_sdf import mesh_gltf, mesh_obj, read_signs, sdf
 from models.puppy_shapes import foot, part_shapes
-from workbench.robot.files import write_together, write_whole
+from workbench.files.reading import write_together, write_whole
 
 ROOT = Path(__file__).resolve().parents[1]
 

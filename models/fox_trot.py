@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from models.build_fox import LEGS, ROOT, SHANK, THIGH
-from workbench.robot.files import write_whole
+from workbench.files.reading import write_whole
 
 POSES = 8
 DWELL = 0.08

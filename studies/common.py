@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.cli.progress import Progress
+from workbench.files import InputError
+from workbench.files.reading import write_together
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
-from workbench.robot.files import write_together
+from workbench.robot import RobotModel
 from workbench.view.figures.style import styled
 from workbench.view.report.page import Report
 

@@ -25,10 +25,10 @@ from scipy.stats import wilcoxon
 from studies.common import ROOT
 from workbench.cli.progress import Progress
 from workbench.compare.session import Session, load_session
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 from workbench.identify.diagnosis import DiagnosisResult, diagnose_session
 from workbench.identify.results.take_report import TakeReport, rms
-from workbench.robot import InputError
-from workbench.robot.files import write_whole
 
 BLOCK = 0.5
 """Length of the stretches whose sums of squares count as one draw [s]: longer than what a servo remembers, a third of a step."""

@@ -23,6 +23,7 @@ from studies.xl330.rig import find_logs, published, write_session
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
 from workbench.effects.registry import effect_named
+from workbench.files.reading import write_whole
 from workbench.identify.evidence.fit import Fitted, fitting
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, start
 from workbench.identify.evidence.nuisance import uncertain_numbers
@@ -33,7 +34,6 @@ from workbench.identify.evidence.search import lockstep
 from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import prepared
 from workbench.identify.rollouts import RolloutEvaluator
-from workbench.robot.files import write_whole
 from workbench.simulation import SimulationConfig
 
 Array = NDArray[np.float64]

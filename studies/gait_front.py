@@ -15,7 +15,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from studies.common import publish, run_study
-from workbench.device.limits import RECOMMENDED
+from workbench.device.tables.limits import RECOMMENDED
 from workbench.gait.certificate import NAME, PUPPY_CLAIM
 from workbench.gait.engines import other_engine
 from workbench.gait.ensemble import load_ensemble

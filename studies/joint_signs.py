@@ -54,10 +54,10 @@ from models.puppy_assembly import read_parts
 from studies.gait import Gait, read_gait
 from studies.joint_signs_report import write_report
 from studies.joint_signs_rule import FREE, Choice, Verdict, knees_alike, label
+from workbench.files.reading import write_whole
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.robot import JOINTS, Ground, data_file, puppy_model
-from workbench.robot.files import write_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 
 from studies.gait import TURNED, Gait
 from studies.joint_signs_rule import FINAL_PITCH, FINAL_ROLL, FREE, Choice, Verdict, label
-from workbench.robot.files import write_whole
+from workbench.files.reading import write_whole
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt

@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
 
-from workbench.bench.arm import arm_sdf
+from benchmarks.arm import arm_sdf
 from workbench.compare.session import load_session
 from workbench.recording import BodyTrack, Measurement, observe, write_motive
 from workbench.simulation import Simulation, SimulationConfig

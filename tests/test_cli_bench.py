@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks import drives, engine
+from benchmarks.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
+from benchmarks.bare_plant import BarePlant
+from benchmarks.diagnose_time import RACE, READING, Stages, diagnose_time
+from benchmarks.figure import Figure, in_turns, median_and_quartiles
+from benchmarks.sysid import fit_against_mujoco_sysid
 from tests.command import refused, succeeds
-from workbench.bench import drives, engine
-from workbench.bench.arm import EXTRA, ODD, SERVO, arm, frictions, goals, measured, played, session
-from workbench.bench.bare_plant import BarePlant
-from workbench.bench.diagnose_time import RACE, READING, Stages, diagnose_time
-from workbench.bench.figure import Figure, in_turns, median_and_quartiles
-from workbench.bench.sysid import fit_against_mujoco_sysid
 from workbench.compare.session_takes import read_takes
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.command import succeeds
-from workbench.view import demo
+from workbench.api.demo import page as demo
 
 
 @pytest.mark.slow

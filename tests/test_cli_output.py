@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli.output import output_directory
-from workbench.robot import InputError
+from workbench.files import InputError
 
 
 def test_appears_at_the_end_and_whole(tmp_path: Path) -> None:

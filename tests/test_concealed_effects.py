@@ -15,8 +15,9 @@ from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.takes import logged_takes
 from studies.other_engine.hidden import OUTSIDE
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.recording import read_recording
-from workbench.robot import EffectSpec, InputError
+from workbench.robot import EffectSpec
 
 
 def test_a_hundred_sessions_hold_what_the_trial_asks():

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from workbench.device import read_tables, write_tables
+from workbench.files import InputError
 from workbench.motion import PoseTable, load_motion
-from workbench.robot import BUS_IDS, InputError, data_file
+from workbench.robot import BUS_IDS, data_file
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import ServoUnits
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from workbench.device import check_limits, export, read_tables
+from workbench.files import InputError
 from workbench.motion import Motion, PoseTable, load_motion
 from workbench.recording.take import Take
-from workbench.robot import COUNT, JOINTS, InputError, RobotModel, ServoConstants, data_file
+from workbench.robot import COUNT, JOINTS, RobotModel, ServoConstants, data_file
 
 WALK = load_motion(data_file("robotis_walk.csv"))
 

@@ -10,8 +10,9 @@ from tests.quadruped import quadruped_sdf
 from workbench.dynamics import InverseDynamics, RobotTrajectory
 from workbench.dynamics.contact import STICKING, project, share_forces
 from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, torque_margin
+from workbench.files import InputError
 from workbench.motion import Motion
-from workbench.robot import Ground, InputError, RobotModel, ServoConstants
+from workbench.robot import Ground, RobotModel, ServoConstants
 
 G = 9.81
 RISE = np.array([0, 0, 0.1])

@@ -19,10 +19,11 @@ from workbench.dynamics import (
 )
 from workbench.dynamics.derivatives import differentiate
 from workbench.dynamics.trajectory import angular_motion
+from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.recording import Take, quaternions
-from workbench.robot import Ground, InputError, RobotModel, data_file
+from workbench.robot import Ground, RobotModel, data_file
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 from workbench.view.report.forces import margin_table

@@ -13,8 +13,9 @@ from scipy.integrate import quad
 from tests.servo_rig import GRAVITY, LENGTH, SDF, make_rig, rig_model
 from workbench.effects.apply import physics_of
 from workbench.effects.registry import effect_named
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import EffectSpec, InputError, RobotModel, ServoConstants, puppy_model
+from workbench.robot import EffectSpec, RobotModel, ServoConstants, puppy_model
 from workbench.servo import AddServos, ServoBank, ServoTerm
 from workbench.simulation import Simulation, SimulationConfig
 

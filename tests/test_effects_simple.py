@@ -10,9 +10,10 @@ import pytest
 from workbench.effects.apply import physics_of, played, seen
 from workbench.effects.base import Effect, si_values
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement
-from workbench.robot import BUS_IDS, EffectSpec, Ground, InputError, puppy_model
+from workbench.robot import BUS_IDS, EffectSpec, Ground, puppy_model
 from workbench.servo import ServoLaw
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.contact import model_geometries

@@ -17,10 +17,11 @@ from workbench.compare.session_takes import read_takes, register_take
 from workbench.effects.apply import physics_of, seen
 from workbench.effects.base import si_values
 from workbench.effects.registry import known_effects
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Recording, Take, observe, take_from_recording
 from workbench.recording.mocap.tracks import model_axes
-from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel, ServoConstants, puppy_model
+from workbench.robot import EffectSpec, Kinematics, RobotModel, ServoConstants, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
 
 SERVO = ServoConstants(compliance_slope=None, compliance_margin=None, punch=None, proportional_gain=8.0,

@@ -14,7 +14,8 @@ from workbench.effects.apply import physics_of
 from workbench.effects.base import Effect
 from workbench.effects.foreign import check_effect
 from workbench.effects.registry import ENTRY_POINT_GROUP, known_effects
-from workbench.robot import EffectSpec, InputError, puppy_model
+from workbench.files import InputError
+from workbench.robot import EffectSpec, puppy_model
 
 SOUND = """
 from workbench.effects.base import Effect, Parameter

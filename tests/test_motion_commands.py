@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from workbench.files import InputError
 from workbench.motion import Commands
-from workbench.robot import InputError
 
 
 def test_reference_ramps_from_where_it_is() -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.shared_data import shared
+from workbench.files import InputError
 from workbench.motion import load_motion, load_mtn
-from workbench.robot import COUNT, InputError
+from workbench.robot import COUNT
 
 IDS = " ".join(["0", "1", "1"])
 GOOD = f"""type=motion

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from workbench.files import InputError
+from workbench.files.reading import write_together
 from workbench.motion import Motion, PoseTable, load_motion, save_motion
-from workbench.robot import COUNT, JOINTS, SPEED_UNIT, InputError, data_file
-from workbench.robot.files import write_together
+from workbench.robot import COUNT, JOINTS, SPEED_UNIT, data_file
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,9 @@ from studies.other_engine.servo import ServoBank
 from tests.other_engine_models import CROOKED, FRICTIONLESS, as_take, commands, joint, link, model_of, pendulum, sphere
 from tests.shared_data import shared
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.recording import read_recording, register, take_from_recording
-from workbench.robot import EffectSpec, InputError
+from workbench.robot import EffectSpec
 
 AX12 = FRICTIONLESS.updated({"compliance_margin": 1, "punch": 32, "coulomb_friction": 0.06, "viscous_friction": 0.01,
                              "reflected_inertia": 0.0065})

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from workbench.recording import read_recording, write_joint_log
-from workbench.recording.log_state import state_at
+from workbench.recording.servo_log.state import state_at
 from workbench.recording.white_noise import white_noise
 
 TIME = np.arange(0.0, 2.0, 0.01)

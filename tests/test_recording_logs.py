@@ -11,8 +11,9 @@ from tests.recording_robot import write_robot
 from tests.shared_data import shared
 from workbench.compare.channels import channel_names
 from workbench.compare.comparison import noise_of
+from workbench.files import InputError
 from workbench.recording import Measurement, read_recording, register, take_from_recording, write_joint_log
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 PENDULUM = """<?xml version="1.0"?><sdf version="1.9"><model name="pendulum"><link name="base"/><link name="arm"><inertial>
 <pose>0 0 -0.1 0 0 0</pose><mass>0.5</mass><inertia><ixx>1e-5</ixx><iyy>1e-5</iyy><izz>1e-5</izz></inertia></inertial></link>

@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.shared_data import shared
+from workbench.files import InputError
 from workbench.recording import BodyTrack, read_motive, read_recording, write_motive
-from workbench.robot import InputError
 
 RNG = np.random.default_rng(7)
 N = 40

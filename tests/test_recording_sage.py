@@ -10,11 +10,12 @@ import pytest
 from tests.gap_sessions import session_content, write_session
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
+from workbench.files import InputError
 from workbench.recording.formats.read import read_recording, recording_of_take
 from workbench.recording.formats.sage import sage_programmes
 from workbench.recording.joint_names import SO101_JOINTS as JOINTS
 from workbench.recording.joint_names import URDF_JOINTS, named_by_model
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 
 def write_npz(path: Path, *names: str, n: int = 30) -> Path:

@@ -7,9 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.recording_robot import capture, motion, write_robot
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import BodyTrack, Measurement, Take, observe, register, session_yaw, take_from_recording
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 
 @pytest.fixture(scope="module")

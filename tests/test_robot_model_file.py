@@ -11,17 +11,8 @@ import yaml
 
 from tests.gap_sessions import write_session
 from workbench.compare.session import load_session
-from workbench.robot import (
-    EffectSpec,
-    Ground,
-    InputError,
-    Posterior,
-    RobotModel,
-    load_model,
-    load_model_file,
-    puppy_model,
-    save_model,
-)
+from workbench.files import InputError
+from workbench.robot import EffectSpec, Ground, Posterior, RobotModel, load_model, load_model_file, puppy_model, save_model
 from workbench.robot.model_file import parameter_names
 from workbench.simulation import MakeStation
 

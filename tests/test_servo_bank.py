@@ -9,7 +9,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from tests.servo_rig import GRAVITY, LENGTH, make_rig, rig_model
-from workbench.robot import COUNT, InputError, ServoConstants
+from workbench.files import InputError
+from workbench.robot import COUNT, ServoConstants
 from workbench.servo import AddServos, ServoLaw
 
 PLANTS = {"discrete": {"time_step": 5e-4}, "runge_kutta3": {"time_step": 0.0, "integrator": "runge_kutta3"},

@@ -12,8 +12,9 @@ import yaml
 from tests.servo_rig import make_rig, rig_model
 from tests.simulation_compiled.drake_steps import CompiledSteps, config_for, drake_and_compiled, drake_steps
 from workbench.effects.apply import played
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import EffectSpec, InputError, ServoConstants, load_servo_constants, puppy_model
+from workbench.robot import EffectSpec, ServoConstants, load_servo_constants, puppy_model
 from workbench.servo import ServoLaw
 from workbench.simulation import Job, Simulation
 from workbench.simulation.batch import run_job

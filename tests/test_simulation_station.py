@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
+from workbench.files import InputError
 from workbench.motion import load_motion
-from workbench.robot import EffectSpec, Ground, InputError, ServoConstants, data_file, puppy_model
+from workbench.robot import EffectSpec, Ground, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, MakeStation, Simulation, SimulationConfig, simulate_batch
 
 GRAVITY = 9.81

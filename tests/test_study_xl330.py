@@ -16,8 +16,8 @@ from studies.xl330.rig import DUTY_PER_UNIT, Log, find_logs, nominal_servo, publ
 from studies.xl330.station import played
 from tests.shared_data import shared
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.recording import write_joint_log
-from workbench.robot import InputError
 
 M1 = {"kt": 0.387, "R": 4.02, "armature": 0.0018, "q_offset": 0.031, "friction_base": 0.0128, "friction_viscous": 0.0037}
 FRICTIONLESS = M1 | {"friction_base": 0.0, "friction_viscous": 0.0, "q_offset": 0.0}

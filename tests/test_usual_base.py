@@ -12,9 +12,10 @@ from pydrake.systems.analysis import Simulator
 
 import workbench
 from tests.command import refused
-from workbench.compare.file_problems import model_problems_of
 from workbench.compare.session import load_session
-from workbench.robot import InputError, RobotModel, load_model, puppy_model, save_model
+from workbench.files import InputError
+from workbench.inspect.problems import model_problems_of
+from workbench.robot import RobotModel, load_model, puppy_model, save_model
 from workbench.simulation import Job, MakeStation, SimulationConfig
 
 LOG = Path(__file__).parents[1] / "data" / "tutorial_arm" / "takes" / "slow.csv"

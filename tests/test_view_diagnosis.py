@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from benchmarks.arm import arm_sdf
 from tests.example_diagnosis import diagnosis, finding
 from tests.view_takes import small_robot, swing
-from workbench.bench.arm import arm_sdf
 from workbench.cli.diagnose import finding_line
 from workbench.identify.results.findings import (
     Alternative,

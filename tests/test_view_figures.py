@@ -12,8 +12,9 @@ from tests.view_takes import capture, small_robot, swing
 from workbench.compare.comparison import compare_takes
 from workbench.compare.footfalls import FootPhases, force_phases
 from workbench.compare.results import Channel
+from workbench.files import InputError
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel, ServoConstants
+from workbench.robot import RobotModel, ServoConstants
 from workbench.view import figures
 from workbench.view.figures.stance import intervals
 from workbench.view.figures.style import NOISE, RECORDED, SIMULATED, STANCE

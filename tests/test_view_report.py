@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.view_takes import capture, small_robot, swing
-from workbench.robot import InputError
+from workbench.files import InputError
 from workbench.view.figures import film_strip
 from workbench.view.report.page import Details, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay

@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.view_takes import capture, small_robot, swing
-from workbench.robot import InputError, RobotModel, puppy_model
+from workbench.files import InputError
+from workbench.robot import RobotModel, puppy_model
 from workbench.view.playback import play
 from workbench.view.scene.keyframes import kept_keys
 from workbench.view.scene.replay import ANGLE_TOLERANCE, MAX_FRAMES, POSITION_TOLERANCE, Scene, write_replay

@@ -25,18 +25,19 @@ if TYPE_CHECKING:
         predict,
     )
     from workbench.compare.session import Session, load_session
+    from workbench.files import InputError
     from workbench.gait.optimize import OptimizeOptions
     from workbench.gait.request import Request
     from workbench.motion import Motion, load_motion
     from workbench.recording import Take
-    from workbench.robot import ConfigureParser, EffectSpec, InputError, RobotModel, save_model
+    from workbench.robot import ConfigureParser, EffectSpec, RobotModel, save_model
     from workbench.simulation import AddServos, MakeStation, Simulation, SimulationConfig
     from workbench.view.scene.live import show
 
 _HOME = {
     "AddServos": "workbench.simulation", "ComparisonResult": "workbench.api.sessions", "ConfigureParser": "workbench.robot",
     "DiagnoseOptions": "workbench.api.sessions", "DiagnosisResult": "workbench.api.sessions", "EffectSpec": "workbench.robot",
-    "GaitResult": "workbench.api.gaits", "InputError": "workbench.robot", "MakeStation": "workbench.simulation",
+    "GaitResult": "workbench.api.gaits", "InputError": "workbench.files", "MakeStation": "workbench.simulation",
     "Motion": "workbench.motion", "OptimizeOptions": "workbench.gait.optimize", "Request": "workbench.gait.request",
     "PredictionResult": "workbench.api.sessions",
     "RobotModel": "workbench.robot", "Session": "workbench.compare.session", "Simulation": "workbench.simulation",

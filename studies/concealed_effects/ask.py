@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import workbench
-from workbench.robot.files import read_text, write_whole
+from workbench.files.reading import read_text, write_whole
 
 DIAGNOSE = (str(Path(sys.executable).with_name("workbench")), "diagnose")
 """The command that was installed beside this Python."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from studies.concealed_effects.score import Score
 from studies.concealed_effects.sealed import Vault, write_plan
-from workbench.robot.files import read_text, write_whole
+from workbench.files.reading import read_text, write_whole
 
 CARRIED = Path(__file__).parent / "results" / "under_way.json"
 SCORED = "scored_before.json"

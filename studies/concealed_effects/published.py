@@ -10,7 +10,7 @@ from typing import Any
 
 from studies.concealed_effects.score import Score
 from studies.concealed_effects.summary import bounds, by_effect
-from workbench.robot.files import read_text, write_whole
+from workbench.files.reading import read_text, write_whole
 
 RESULTS = Path(__file__).parent / "results" / "trial.json"
 PAGE = Path(__file__).parents[2] / "docs" / "validation.md"

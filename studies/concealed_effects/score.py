@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from workbench.files import InputError
+from workbench.files.reading import read_text
 from workbench.recording import read_recording
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.files import read_text
 
 Array = NDArray[np.float64]
 NEUTRAL = frozenset({"soft_ground"})

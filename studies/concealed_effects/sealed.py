@@ -17,8 +17,8 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from workbench.robot import InputError
-from workbench.robot.files import read_text, write_whole
+from workbench.files import InputError
+from workbench.files.reading import read_text, write_whole
 
 COUNT = 100
 PLAN = "plan.json"

@@ -17,8 +17,8 @@ from studies.concealed_effects.page import write_page
 from studies.concealed_effects.score import Score, score_folder, score_nothing
 from studies.concealed_effects.sealed import Vault
 from studies.concealed_effects.summary import summary
-from workbench.robot import InputError
-from workbench.robot.files import read_text, write_whole
+from workbench.files import InputError
+from workbench.files.reading import read_text, write_whole
 
 Say = Callable[[str], None]
 

@@ -17,8 +17,8 @@ from studies.filters.figures import draw_bodies, draw_velocities
 from studies.filters.measure import capture, study
 from studies.filters.report import report
 from studies.inputs import SECONDS, first_seconds, robotis
+from workbench.files.reading import write_whole
 from workbench.robot import puppy_model
-from workbench.robot.files import write_whole
 
 
 def filters(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:

@@ -14,7 +14,8 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
-from workbench.robot import ConfigureParser, Ground, InputError, Kinematics
+from workbench.files import InputError
+from workbench.robot import ConfigureParser, Ground, Kinematics
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from studies.other_engine.capture import Capture
-from workbench.robot.files import write_whole
+from workbench.files.reading import write_whole
 
 _KINDS = ("Rotation",) * 4 + ("Position",) * 3 + ("Mean Marker Error",)
 _AXES = (*"XYZW", *"XYZ", "")

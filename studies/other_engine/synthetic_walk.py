@@ -15,8 +15,8 @@ from studies.other_engine.excitation import MotionRows
 from studies.other_engine.firmware import read_rows
 from studies.other_engine.make_session import TakePlan, record, servo_yaml, session_entry
 from studies.other_engine.motive_file import write_motive_csv
+from workbench.files.reading import write_together
 from workbench.robot import data_file, puppy_model
-from workbench.robot.files import write_together
 
 SEED = 2020
 CYCLES = 13

@@ -15,8 +15,8 @@ import yaml
 
 from studies.concealed_effects.robots import arm
 from studies.concealed_effects.takes import LogPlan, log_csv, log_rows, logged_takes, play_log
+from workbench.files.reading import write_together
 from workbench.robot import EffectSpec, data_file
-from workbench.robot.files import write_together
 
 SEED = 7
 HIDDEN = EffectSpec("coulomb_friction", ("elbow",), {"torque": 0.12})

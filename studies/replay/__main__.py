@@ -24,7 +24,7 @@ from studies.concealed_effects.ask import Asker, asked
 from studies.concealed_effects.score import Score, score_folder, score_nothing
 from studies.replay.sessions import COUNT, KnownSession, known_sessions
 from studies.replay.table import Pair, table, verdict
-from workbench.robot import InputError
+from workbench.files import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = 3600.0

@@ -14,7 +14,7 @@ from studies.concealed_effects.generator import write_session
 from studies.concealed_effects.plan import SessionPlan, plan_sessions
 from studies.concealed_effects.score import SIZE
 from workbench.effects.registry import effect_named
-from workbench.robot.files import read_text
+from workbench.files.reading import read_text
 
 SEED, COUNT = 20_261_127, 22
 """Of the drawn sessions: no trial's, as a trial draws its own."""

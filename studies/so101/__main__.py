@@ -32,8 +32,9 @@ from studies.so101.session import write_session
 from workbench.cli.memory import rollout_memory
 from workbench.cli.progress import Progress
 from workbench.compare.session import Session, load_session
+from workbench.files import InputError
 from workbench.recording.formats.sage import JOINTS
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.robot.model_file import load_model
 from workbench.view.report.page import Picture, Provenance, Report, Section
 

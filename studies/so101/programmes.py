@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.so101.robot import COUNT
+from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.sage import JOINTS, sage_programmes
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 FILE = "so101_programmes.npz"

@@ -16,9 +16,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
+from workbench.files import InputError
+from workbench.files.yaml_file import yaml_text
 from workbench.recording.joint_names import URDF_JOINTS
-from workbench.robot import InputError, ServoConstants
-from workbench.robot.yaml_file import yaml_text
+from workbench.robot import ServoConstants
 
 BASE = "base_link"
 COUNT = 2 * np.pi / 4096

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from studies.so101.programmes import FILE, VALIDATION
 from studies.so101.robot import BASE, arm_sdf, servo, servo_yaml
+from workbench.files.reading import write_together
+from workbench.files.yaml_file import yaml_text
 from workbench.recording.formats.sage import JOINTS
-from workbench.robot.files import write_together
-from workbench.robot.yaml_file import yaml_text
 
 URDF = "so101_inertias_only.urdf"
 

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from studies import inputs
-from workbench.robot import InputError, data_file
-from workbench.robot.files import read_text, write_whole
-from workbench.robot.resources import resolve_model
+from workbench.files import InputError
+from workbench.files.reading import read_text, write_whole
+from workbench.files.resources import resolve_model
+from workbench.robot import data_file
 
 FACTORS = ("masses", "friction", "step", "contact")
 """That the question names; `drive` is apart, each drive has a cloud of its own."""

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from studies import inputs
 from studies.common import COORDINATES, body_track
 from studies.walk_spread.design import Case, Design, with_masses
+from workbench.files.reading import read_text, write_whole
 from workbench.motion import Commands, load_motion
 from workbench.robot import BUS_IDS, Ground, RobotModel, data_file
-from workbench.robot.files import read_text, write_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.simulation.play import motion_job
 

@@ -23,8 +23,8 @@ from studies.xl330.refit import fit_published, training
 from studies.xl330.rig import Log, find_logs, full_duty, nominal_servo, published, write_session
 from studies.xl330.station import played
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
-from workbench.robot import InputError
 
 DATA = ROOT.parent / "shared/data/xl330"
 MODELS = ("m1", "m3", "m4", "m6")

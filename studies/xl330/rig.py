@@ -15,10 +15,10 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 from workbench.recording import read_recording, write_joint_log
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.files import write_whole
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from workbench.compare.compare_session import compare_session
 from workbench.compare.comparison import compare_takes
 from workbench.compare.results import Comparison
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.recording.formats.rollout_table import save_rollout
 from workbench.recording.take import Take
-from workbench.robot import InputError
 from workbench.simulation import Simulation, SimulationConfig
 
 WORN = 0.35  # N m of Coulomb friction in joint three, nominal 0.06

@@ -17,7 +17,7 @@ from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes, register_takes
 from workbench.recording import read_recording, write_joint_log
 from workbench.recording.formats.log_commands import commands_of_rows
-from workbench.recording.log_state import state_at
+from workbench.recording.servo_log.state import state_at
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Job, Simulation, SimulationConfig, Start, simulate_batch
 

@@ -14,9 +14,10 @@ from tests.command import refused, succeeds
 from tests.gap_sessions import STARTS_AT, record_arm, session_content, write_session
 from workbench.compare.prediction import predict_session
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.recording import write_motive
 from workbench.recording.formats.read import read_recording
-from workbench.robot import EffectSpec, InputError, save_model
+from workbench.robot import EffectSpec, save_model
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.view.report.notebook import prediction_html
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.formats.rollout_table import is_rollout, load_rollout, save_rollout
 from workbench.recording.take import Take
-from workbench.robot import InputError
 
 COMMANDS = Commands(
     times=np.array([0.0, 0.1404]), joints=("a", "b"),

@@ -10,7 +10,8 @@ import pytest
 from tests.gap_sessions import MOTION, session_content, write_session
 from tests.shared_data import practice
 from workbench.compare.session import load_session
-from workbench.robot import BUS_IDS, RIGID_BODIES, InputError
+from workbench.files import InputError
+from workbench.robot import BUS_IDS, RIGID_BODIES
 
 MISSING = object()
 

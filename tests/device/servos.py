@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from workbench.bench.arm import arm_sdf
+from benchmarks.arm import arm_sdf
 from workbench.device.bus import Bus
 from workbench.device.virtual import AX12A, SECOND, STS3215, XL330, XL430, Clock, RampBody, ServoBus, VirtualPort, VirtualServo
 from workbench.robot import RobotModel, puppy_model

@@ -18,8 +18,8 @@ from workbench.device.capture import Faults, Recorder, VirtualLink, VirtualMotiv
 from workbench.device.capture.journal import Journal
 from workbench.device.capture.ledger import Ledger
 from workbench.device.capture.packets import BrokenPacketError, parse_frame, parse_server_info
+from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
-from workbench.robot import InputError
 
 VERSIONS = [(2, 7), (2, 10), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 4)]
 MANY = Faults(lost=0.02, broken=0.01, doubled=0.01, swapped=0.01)

@@ -5,11 +5,11 @@ import pytest
 
 from tests.device.whole_loop import stand
 from tests.firmware.image import IDS, Ear, Robot, image, needs_compiler
-from workbench.compare.robot_run import run_by_controller
+from workbench.api.robot_run import run_by_controller
 from workbench.compare.session import load_session
 from workbench.device.bus import BusError
-from workbench.device.controller import Controller
-from workbench.device.table_file import JointBounds, TableFile
+from workbench.device.controller.play import Controller
+from workbench.device.tables.table_file import JointBounds, TableFile
 from workbench.device.virtual import SECOND
 from workbench.device.virtual.cm530 import Board
 from workbench.device.virtual.cm530.port import PcLinkPort

@@ -5,8 +5,8 @@ import yaml
 
 from tests.gap_sessions import session_content, write_session
 from workbench.compare.session import load_session
+from workbench.files import InputError
 from workbench.identify.estimators.registers import read_off_registers
-from workbench.robot import InputError
 from workbench.robot.servo_registers import ServoReading, ServoRegisters, save_registers
 
 

@@ -13,9 +13,9 @@ from workbench.device.play import PlayOptions, finish_log, perform
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
 from workbench.device.virtual import MICROSECOND, bit_flips, seconds
+from workbench.files import InputError
 from workbench.motion import Motion
 from workbench.recording.formats.read import read_recording
-from workbench.robot import InputError
 
 MOTION = Motion("wave", np.array([0.0, 0.15, 0.27, 0.4]), ("one", "three", "two"),
                 np.radians([[0.0, 0, 0], [25, -15, 30], [-20, 12, -25], [0, 0, 0]]))

@@ -12,14 +12,15 @@ from tests.device.motive import MotiveOnSockets
 from tests.device.servos import arm, robot
 from tests.device.test_play import MOTION, START
 from tests.device.whole_loop import of_an_arm
-from workbench.compare.robot_run import run_on_robot
+from workbench.api.robot_run import run_on_robot
 from workbench.compare.session import load_session
 from workbench.compare.session_file import write_session
 from workbench.device.capture import Recorder, UdpLink
 from workbench.device.capture.background import BackgroundRecording
 from workbench.device.play import PlayOptions
+from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
-from workbench.robot import InputError, puppy_model
+from workbench.robot import puppy_model
 from workbench.simulation.virtual_robot import VirtualRobot
 
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 
 from workbench.device.virtual import AX12A, STS3215, XL330, XL430
+from workbench.files import InputError
 from workbench.motion import load_motion
-from workbench.robot import InputError, ServoConstants, data_file, puppy_model
+from workbench.robot import ServoConstants, data_file, puppy_model
 from workbench.robot.servo_profile_file import load_profile, model_name, servo_profile, servo_profiles
 
 VIRTUAL = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}

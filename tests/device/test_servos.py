@@ -10,7 +10,8 @@ from workbench.device.bus import BusError
 from workbench.device.bus.setup import set_id, set_up, wider_limits
 from workbench.device.bus.survey import survey
 from workbench.device.virtual import VirtualServo
-from workbench.robot import InputError, bus_ids
+from workbench.files import InputError
+from workbench.robot import bus_ids
 from workbench.robot.servo_registers import load_registers, save_registers
 
 

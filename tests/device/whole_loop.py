@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.device.servos import arm
 from tests.firmware.image import image
-from workbench.compare.robot_run import run_by_controller, run_on_robot
+from workbench.api.robot_run import run_by_controller, run_on_robot
 from workbench.compare.session import load_session
 from workbench.compare.session_file import write_session
 from workbench.device.bus import Bus

@@ -5,7 +5,7 @@ import pytest
 
 from tests.gap_sessions import write_session
 from workbench.compare.session import load_session
-from workbench.device.limits import check_limits
+from workbench.device.tables.limits import check_limits
 from workbench.experiment.design import Experiment, ObservationModel, Separation, design_experiment
 from workbench.experiment.limits import Reach
 from workbench.experiment.moves import JointMoves, Path, gravity_torque, long_runs

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from workbench.device.link import FrameReader, Message, message
-from workbench.device.table_file import TableFile, bounds_of, encode_table
+from workbench.device.tables.table_file import TableFile, bounds_of, encode_table
 from workbench.motion import load_motion
 from workbench.robot import data_file, puppy_model
 

@@ -10,7 +10,7 @@ import pytest
 from tests.firmware.native import LINK_PC, Sim, until, walk
 from tests.firmware.test_core_play import goal_times
 from workbench.device.link import AnswerMessage, FrameType, LogMessage, StateMessage, frame
-from workbench.device.table_file import JointBounds, TableFile, decode_table, encode_table
+from workbench.device.tables.table_file import JointBounds, TableFile, decode_table, encode_table
 from workbench.motion import PoseTable
 
 TABLE = walk()

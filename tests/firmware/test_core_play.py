@@ -18,7 +18,7 @@ from workbench.device.link import (
     frame,
     upload_frames,
 )
-from workbench.device.table_file import TableFile, decode_table, encode_table
+from workbench.device.tables.table_file import TableFile, decode_table, encode_table
 from workbench.motion import PoseTable
 
 TABLE = walk()

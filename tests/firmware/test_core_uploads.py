@@ -12,8 +12,8 @@ import pytest
 from tests.firmware.native import Sim, core, walk
 from tests.firmware.test_core_play import changed, upload
 from workbench.device.link import AnswerMessage, FrameType, frame, upload_frames
-from workbench.device.table_file import decode_table
-from workbench.robot import InputError
+from workbench.device.tables.table_file import decode_table
+from workbench.files import InputError
 
 TABLE = walk()
 PLAY = 5

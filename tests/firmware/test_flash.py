@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.firmware.image import Robot, image, needs_compiler
-from workbench.device.link import ControllerState
-from workbench.device.loader import (
+from workbench.device.controller.loader import (
     HALF,
     LOADED,
     UNKNOWN,
@@ -22,8 +21,9 @@ from workbench.device.loader import (
     check_image,
     load_loader_profile,
 )
+from workbench.device.link import ControllerState
 from workbench.device.virtual.loader import Controller, EmulatedLoader
-from workbench.robot import InputError
+from workbench.files import InputError
 
 PROFILE = load_loader_profile()
 IMAGE = struct.pack("<II", 0x20010000, 0x08003101) + random.Random(0).randbytes(3000)

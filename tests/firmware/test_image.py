@@ -12,8 +12,16 @@ import pytest
 from tests.firmware.image import IDS, Robot, image, needs_compiler
 from tests.firmware.native import walk
 from tests.firmware.test_core_play import changed
-from workbench.device.link import AnswerMessage, ControllerState, FrameType, LogMessage, StateMessage, frame, upload_frames
-from workbench.device.table_file import decode_table
+from workbench.device.link import (
+    AnswerMessage,
+    ControllerState,
+    FrameType,
+    LogMessage,
+    StateMessage,
+    frame,
+    upload_frames,
+)
+from workbench.device.tables.table_file import decode_table
 from workbench.device.virtual import MICROSECOND, MILLISECOND, SECOND
 from workbench.device.virtual.protocol import checksum, packet
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from tests.firmware.native import FIRMWARE, core, walk
 from workbench.device import export, read_table_file
-from workbench.device.table_file import (
+from workbench.device.tables.table_file import (
     MOST_BYTES,
     JointBounds,
     TableFile,
@@ -25,8 +25,9 @@ from workbench.device.table_file import (
     table_bytes,
     unplayable,
 )
+from workbench.files import InputError
 from workbench.motion import Motion, PoseTable, load_motion
-from workbench.robot import BUS_IDS, InputError, data_file, puppy_model
+from workbench.robot import BUS_IDS, data_file, puppy_model
 
 WALK = load_motion(data_file("robotis_walk.csv")).as_table()
 

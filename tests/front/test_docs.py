@@ -166,7 +166,7 @@ def test_the_example_format_is_read_and_says_what_is_damaged(examples: Path, tmp
     (tmp_path / "bad.txt").write_text("ticks of elbow\n0 1 2\n10 1\n")
     code = """
 from workbench.recording import read_recording
-from workbench.robot import InputError
+from workbench.files import InputError
 r = read_recording("log.txt")
 print(r.kind, *r.joints, r.rate, len(r.time))
 try:

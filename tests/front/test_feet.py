@@ -5,17 +5,8 @@ from pathlib import Path
 import pytest
 
 from models import build_fox, fox_trot
-from workbench.robot import (
-    InputError,
-    RobotModel,
-    data_file,
-    foot_points,
-    legs,
-    load_model,
-    puppy_model,
-    resolve_model,
-    save_model,
-)
+from workbench.files import InputError
+from workbench.robot import RobotModel, data_file, foot_points, legs, load_model, puppy_model, resolve_model, save_model
 
 FOX = "package://fox/fox.sdf"
 TWO_TOES = """<sdf version="1.9"><model name="m"><link name="base"/><link name="shank"/>

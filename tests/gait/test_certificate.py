@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
+from workbench.files import InputError
 from workbench.gait.certificate import NAME, Certificate, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
 from workbench.gait.ensemble import load_ensemble
@@ -16,7 +17,7 @@ from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
 from workbench.motion import load_motion
-from workbench.robot import InputError, puppy_model
+from workbench.robot import puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from studies.concealed_effects.robots import quadruped
+from workbench.files import InputError
 from workbench.gait.legs import legs_of
-from workbench.robot import InputError, RobotModel, puppy_model
+from workbench.robot import RobotModel, puppy_model
 
 
 @pytest.mark.parametrize("name", ["puppy", "another quadruped"])

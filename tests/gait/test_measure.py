@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from workbench.files import InputError
 from workbench.gait.limits import GaitLimits, binding, run_margins
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import fallen, measure
 from workbench.gait.request import Request
 from workbench.gait.requirements import direction_margins, speed_margins, worse_half
 from workbench.recording.take import Take
-from workbench.robot import InputError, puppy_model
+from workbench.robot import puppy_model
 
 MODEL = puppy_model()
 

@@ -5,7 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from workbench.robot import InputError, RobotModel, data_file, puppy_model
+from workbench.files import InputError
+from workbench.robot import RobotModel, data_file, puppy_model
 from workbench.robot.ranges import joint_ranges
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.command import refused
+from workbench.files import InputError
 from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
@@ -19,7 +20,7 @@ from workbench.gait.search import Budget, Found, raced, search, steered
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import seeds, space_of
 from workbench.gait.table import paths_of
-from workbench.robot import EffectSpec, InputError, data_file, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.robot.model_file import Posterior
 
 SMALL = Budget(seeds=6, starts=1, population=4, generations=1, robust=1, draws=1)
@@ -174,8 +175,11 @@ def test_a_diagnosed_models_posterior_is_drawn(machine, tmp_path):
     model = machine.model.with_effect(EffectSpec("backlash", ("flm",), {"gap": 3.0}))
     posterior = Posterior(("backlash(flm).gap",), np.array([3.0]), np.array([[0.04]]))
     draws = load_ensemble(posterior=posterior).draws(model, 30, 1, tmp_path)
-    gaps = [e.parameters["gap"] for d in draws for e in d.effects if e.effect == "backlash"]
-    assert len(gaps) == 30  # what the diagnosis found stands for the file's play
+    played = [(e.where, e.parameters["gap"]) for d in draws for e in d.effects if e.effect == "backlash"]
+    gaps = [gap for where, gap in played if where == ("flm",)]
+    assert len(gaps) == 30  # what the diagnosis found replaces the file's play in this joint
+    assert len(played) == 30 * 12  # and in no other
+    assert all(gap <= 1.0 for where, gap in played if where != ("flm",))
     assert np.mean(gaps) == pytest.approx(3.0, abs=0.15)
     assert 0.1 < np.std(gaps) < 0.3
 

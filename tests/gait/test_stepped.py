@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from workbench.files import InputError
 from workbench.motion import Commands, load_motion
-from workbench.robot import EffectSpec, InputError, data_file, puppy_model
+from workbench.robot import EffectSpec, data_file, puppy_model
 from workbench.simulation import Simulation, SimulationConfig
 
 FIELDS = ("time", "q", "v", "p_WB", "quat_WB", "torque")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from workbench.api.robots import load_model
-from workbench.device.firmware_tables import read_tables, write_tables
+from workbench.device.tables.firmware_tables import read_tables, write_tables
 from workbench.gait.certificate import PUPPY_CLAIM
 from workbench.gait.evaluate import table_sha256
 from workbench.gait.limits import GaitLimits, binding, contact_margin, table_margins, violation

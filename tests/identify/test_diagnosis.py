@@ -10,8 +10,9 @@ from workbench.cli.main import main
 from workbench.cli.memory import rollout_memory
 from workbench.compare.session import load_session
 from workbench.effects.registry import known_effects
+from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
-from workbench.robot import InputError, load_model
+from workbench.robot import load_model
 
 
 def test_a_quiet_robot_has_no_gap_and_a_damaged_take_is_named_and_left_out(tmp_path):

@@ -11,11 +11,11 @@ import pytest
 
 from tests.inputs.corpus import as_csv, motive
 from tests.recording_robot import capture, write_robot
+from workbench.files import InputError
 from workbench.recording import BodyTrack, read_recording, survey
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import tracks_of
-from workbench.robot import InputError
 
 HEADER = 7  # rows of it
 

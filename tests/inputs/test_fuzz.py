@@ -12,14 +12,15 @@ from hypothesis import strategies as st
 
 from tests.inputs.corpus import beside, corpus
 from tests.inputs.mutate import mutated
-from workbench.compare.file_problems import recording_problems
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
+from workbench.inspect.problems import recording_problems
+from workbench.inspect.recognise import inspect_file
 from workbench.motion import load_motion, load_mtn
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.rollout_table import load_rollout
-from workbench.robot import InputError, RobotModel, load_model, load_servo_constants
-from workbench.robot.yaml_file import read_yaml
-from workbench.view.report.inspection import inspect_file
+from workbench.robot import RobotModel, load_model, load_servo_constants
 
 NAMES = ("motive.csv", "log.csv", "bam.json", "ros.csv", "programmes.npz", "plain.npz", "episode.parquet", "poses.csv",
          "page.mtn", "servo.yaml", "rollout.csv", "pos.txt", "state_motor.csv", "comparison.json", "session.yaml")

@@ -10,12 +10,12 @@ import pytest
 from pyarrow import parquet
 
 from tests.inputs.corpus import bam_log, corpus, joint_log, lerobot, ros_csv, sage, swing
+from workbench.files import InputError
 from workbench.recording import Recording, read_recording
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.read import recording_of_take
 from workbench.recording.formats.rollout_table import load_rollout
-from workbench.recording.plausibility import beyond_range
-from workbench.robot import InputError
+from workbench.recording.servo_log.plausibility import beyond_range
 
 
 def _read(folder: Path, time: np.ndarray, goal: np.ndarray, position: np.ndarray) -> Recording:

@@ -13,11 +13,12 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from tests.inputs.corpus import ROBOT, SDF
 from workbench.effects.apply import physics_of
-from workbench.robot import EffectSpec, InputError, Kinematics, RobotModel
+from workbench.files import InputError
+from workbench.inspect.recognise import inspect_file
+from workbench.robot import EffectSpec, Kinematics, RobotModel
 from workbench.robot.model_source import model_problems, prepared
 from workbench.simulation import MakeStation
 from workbench.simulation.compiled import kernel
-from workbench.view.report.inspection import inspect_file
 
 
 @pytest.fixture(autouse=True)

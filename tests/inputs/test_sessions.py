@@ -18,10 +18,10 @@ from tests.gap_sessions import record_arm, session_content, write_session
 from workbench.cli import progress
 from workbench.cli.check import check_session
 from workbench.cli.output import LEFT, output_directory
-from workbench.compare.file_problems import session_check, summed_up
 from workbench.compare.session import load_session
+from workbench.files import InputError
+from workbench.inspect.problems import session_check, summed_up
 from workbench.recording import read_recording, write_motive
-from workbench.robot import InputError
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ from workbench.cli.check import check_session
 from workbench.cli.memory import rollout_memory
 from workbench.compare.session import load_session
 from workbench.compare.session_takes import read_takes
-from workbench.robot import InputError
-from workbench.robot.errors import MistypedError
+from workbench.files import InputError
+from workbench.files.errors import MistypedError
 from workbench.robot.servo_constants import ServoConstants
 
 ARM = Path(__file__).parents[2] / "data" / "tutorial_arm"

@@ -9,9 +9,10 @@ import pytest
 
 from tests.command import refused, succeeds
 from tests.inputs.corpus import MTN, POSES, SERVO
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
 from workbench.motion import load_motion, load_mtn
-from workbench.robot import InputError, load_servo_constants
-from workbench.robot.yaml_file import read_yaml
+from workbench.robot import load_servo_constants
 
 BOMB = "\n".join(f"{b}: &{b} [{','.join([f'*{a}'] * 10)}]" if a else f"{b}: &{b} [{','.join('l' * 10)}]"
                  for a, b in zip(["", *"abcdefghi"], "abcdefghij"))

@@ -9,9 +9,10 @@ import pytest
 
 from tests.servo_rig import rig_model
 from tests.simulation_compiled.drake_steps import config_for, drake_and_compiled
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.files import load_motion
-from workbench.robot import EffectSpec, Ground, InputError, RobotModel, ServoConstants, data_file, puppy_model
+from workbench.robot import EffectSpec, Ground, RobotModel, ServoConstants, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, Start, simulate_batch
 from workbench.simulation.batch import run_job
 from workbench.simulation.compiled import covers

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import workbench
-from workbench.robot.errors import InputError
-from workbench.robot.plug_ins import installed
+from workbench.files import InputError
+from workbench.files.plug_ins import installed
 
 State = Literal["ok", "missing", "broken"]
 MEMORY_GB, DISK_GB = 4.0, 1.0

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from workbench.api.sessions import Progress
 from workbench.compare.session_takes import no_progress
+from workbench.files import InputError
 from workbench.gait.engines import other_engine
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.machine import GaitMachine
@@ -15,7 +16,7 @@ from workbench.gait.optimize import Optimized, OptimizeOptions, write_gait
 from workbench.gait.optimize import optimize as seek
 from workbench.gait.request import Request
 from workbench.motion import Motion
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.view.report.gait import write_gait_page
 from workbench.view.report.notebook import gait_html
 

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from workbench.compare.session import load_session
 from workbench.effects.apply import resolved
-from workbench.robot import ROBOTS, InputError, RobotModel, puppy_model, resource_dir
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
+from workbench.robot import ROBOTS, RobotModel, puppy_model, resource_dir
 from workbench.robot.model import PUPPY
 from workbench.robot.model_file import load_model as read_model_file
-from workbench.robot.yaml_file import read_yaml
 
 
 def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None = None) -> RobotModel:

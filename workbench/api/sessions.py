@@ -13,12 +13,13 @@ from workbench.compare.results import Comparison
 from workbench.compare.session import Session, load_session
 from workbench.compare.session_takes import LeftOut, no_progress
 from workbench.experiment.next_experiment import with_next_experiment
+from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.motion import Motion, save_motion
 from workbench.recording import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison

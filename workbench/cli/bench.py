@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 
 
@@ -25,16 +26,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Measures, prints and writes."""
-    from workbench.bench.run import run_bench
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.robot import InputError
+    from workbench.files import InputError
 
+    try:
+        benchmarks = import_module("benchmarks.run")  # by name: it lies beside the package, in the repository alone
+    except ModuleNotFoundError as e:
+        if e.name != "benchmarks":
+            raise
+        raise InputError(None, "the benchmarks are not part of the installed package; run `workbench bench` from a clone of "
+                               "the repository") from None
     if args.out is not None and args.out.is_dir():
         raise InputError(args.out, "expected a file to write, found a directory")
     with ExitStack() as stack:
         folder = None if args.out is None else stack.enter_context(output_directory(args.out.parent))
-        text = json.dumps(run_bench(args.quick, stack.enter_context(Progress("bench"))), indent=2)
+        text = json.dumps(benchmarks.run_bench(args.quick, stack.enter_context(Progress("bench"))), indent=2)
         if folder is not None:
             (folder / args.out.name).write_text(text + "\n", encoding="utf-8")
     print(text)

@@ -85,7 +85,7 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
     from workbench.device.bus import open_port
     from workbench.device.bus.bridge import RATE
     from workbench.device.bus.ports import GONE
-    from workbench.robot import InputError
+    from workbench.files import InputError
 
     if virtual is None:
         port = open_port(_port_name(args), RATE)

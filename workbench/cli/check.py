@@ -24,8 +24,8 @@ def add_yes(parser: argparse.ArgumentParser) -> None:
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
     """Warns of a session's problems, and returns the names of the takes of which it said that they are left out; InputError where
     its takes cannot be used (together), or where one lasts so long that it is mostly a slip, unless `yes`."""
-    from workbench.compare.file_problems import session_check
-    from workbench.robot import InputError
+    from workbench.files import InputError
+    from workbench.inspect.problems import session_check
 
     found = session_check(session)
     warn(verb, found.warnings)
@@ -44,27 +44,27 @@ def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset
 
 def check_model(verb: str, model: RobotModel) -> None:
     """Warns of a robot's problems."""
-    from workbench.compare.file_problems import model_problems_of, summed_up
+    from workbench.inspect.problems import model_problems_of, summed_up
 
     problems = model_problems_of(model)
     warn(verb, [f"{model.description}: {summed_up(problems)}"] if problems else [])
 
 
-def check_motion(verb: str, motion: Motion, cycles: int = 1, yes: bool = True) -> None:
+def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
-    from workbench.compare.file_problems import motion_problems, slow_poses, summed_up
-    from workbench.robot import InputError
+    from workbench.files import InputError
+    from workbench.inspect.problems import motion_problems, slow_poses, summed_up
 
     problems = motion_problems(motion, cycles)
     warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
         raise InputError(motion.source, f"{text} Say --yes if it is meant")
-    _ask(motion.source, cycles * motion.duration, yes)
+    _ask(motion.source, motion.seconds(cycles), yes)
 
 
-def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int = 1, yes: bool = True) -> None:
+def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
-    from workbench.compare.file_problems import recording_problems, serious, summed_up
+    from workbench.inspect.problems import recording_problems, serious, summed_up
     from workbench.motion import load_motion
     from workbench.recording.formats.file_kind import file_kind
     from workbench.recording.formats.read import read_recording
@@ -82,8 +82,8 @@ def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int 
 
 
 def _ask(what: str, seconds: float, yes: bool) -> None:
-    from workbench.compare.file_problems import long_work
-    from workbench.robot import InputError
+    from workbench.files import InputError
+    from workbench.inspect.problems import long_work
 
     text = long_work(seconds)
     if text and not yes:

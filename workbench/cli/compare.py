@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from workbench.cli.check import add_yes, check_files, check_session, say_left_out
-from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_cycles, add_model, add_out, load_model, positive
 
 STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
 
@@ -24,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser, "the session's own; of two files, the bundled puppy")
     parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of A and B; a session says it itself")
-    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_cycles(parser, 1)
     add_yes(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
     add_out(parser)

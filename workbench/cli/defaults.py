@@ -30,7 +30,7 @@ def apply_defaults(verbs: Mapping[str, argparse.ArgumentParser]) -> None:
         if os.environ.get("WORKBENCH_DEFAULTS"):
             _refuse(path, "WORKBENCH_DEFAULTS: file not found")
         return
-    from workbench.robot.yaml_file import read_yaml
+    from workbench.files.yaml_file import read_yaml
 
     content = read_yaml(path)
     if content is None:
@@ -73,6 +73,6 @@ def _value(action: argparse.Action, value: Any, path: Path, key: str) -> Any:
 
 
 def _refuse(path: Path, problem: str) -> None:
-    from workbench.robot.errors import InputError
+    from workbench.files import InputError
 
     raise InputError(path, problem)

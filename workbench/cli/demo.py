@@ -22,9 +22,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Runs it, prints the table and where the report is."""
+    from workbench.api.demo.page import run_demo
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.view.demo import run_demo
 
     with output_directory(args.out) as folder, Progress("demo") as progress:
         demo = run_demo(folder, progress)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cli.check import add_yes, check_session, say_left_out
@@ -42,18 +43,27 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, predicts and writes."""
+    options = {"thorough": args.thorough, "memory": args.memory, "without": tuple(args.without), "yes": args.yes}
+    return diagnose_and_report(args.session, args.out, args.jobs, **options)
+
+
+def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: bool = False, memory: str | None = None,
+                        without: tuple[str, ...] = (), yes: bool = False) -> int:
+    """Diagnoses the session at `path`, writes the results into `out` and prints the verdict; returns the exit code.
+
+    The other arguments are the options of the verb `diagnose`."""
     from workbench.api.sessions import DiagnoseOptions, diagnose
     from workbench.cli.memory import rollout_memory
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
 
-    session = load_session(args.session)
-    told = check_session("diagnose", session, args.yes)
-    with (output_directory(args.out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
-          rollout_memory(args.out, session, args.memory) as memory):
-        result = diagnose(session, DiagnoseOptions(args.jobs, args.thorough, memory, tuple(args.without)), progress=progress)
-        paths = result.save(folder, progress, args.jobs)
+    session = load_session(path)
+    told = check_session("diagnose", session, yes)
+    with (output_directory(out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
+          rollout_memory(out, session, memory) as kept):
+        result = diagnose(session, DiagnoseOptions(jobs, thorough, kept, without), progress=progress)
+        paths = result.save(folder, progress, jobs)
     diagnosis = result.diagnosis
     say_left_out("diagnose", diagnosis.left_out, told)
     if diagnosis.stopped:
@@ -61,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
-    print(f"wrote {args.out}: {', '.join(path.name for path in paths if path.parent == folder)}")
+    print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
     return 0
 
 

@@ -7,11 +7,12 @@ import sys
 from typing import TYPE_CHECKING
 
 from workbench.cli.check import add_yes, check_model, check_motion
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_cycles, add_model, add_out, load_model
 
 if TYPE_CHECKING:
+    from workbench.files import InputError
     from workbench.motion import Motion
-    from workbench.robot import InputError, RobotModel
+    from workbench.robot import RobotModel
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -26,7 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
-    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="played in simulation (default: 3)")
+    add_cycles(parser, 3)
     parser.add_argument("--force", action="store_true", help="write the tables although a limit is broken, with a warning")
     add_yes(parser)
     add_out(parser)
@@ -44,15 +45,16 @@ def run(args: argparse.Namespace) -> int:
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    cycles = motion.often(args.cycles, 3)
     check_model("export", model)
-    check_motion("export", motion, args.cycles, args.yes)
+    check_motion("export", motion, cycles, args.yes)
     motion.as_table()  # refused before the simulation
     uncertified = uncertified_by(args.motion, motion, model)
     if uncertified is not None and not args.force:
         raise uncertified
     base = "fixed" if model.kinematics.fixed_to_world else "free"
     with output_directory(args.out) as folder, Progress("export", stages=("simulating", "writing")) as progress:
-        take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, args.cycles,
+        take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)
     if uncertified is not None:
@@ -66,8 +68,8 @@ def run(args: argparse.Namespace) -> int:
 
 def uncertified_by(path: str, motion: Motion, model: RobotModel) -> InputError | None:
     """What is wrong with the certificate of a motion that `optimize` made."""
+    from workbench.files import InputError
     from workbench.gait.certificate import check_certificate, has_mark
-    from workbench.robot import InputError
 
     if not has_mark(path):
         return None

@@ -37,11 +37,11 @@ def run(args: argparse.Namespace) -> int:
     """Builds, asks, loads, keeps the transcript."""
     from workbench.cli.export import uncertified_by
     from workbench.cli.progress import Progress
-    from workbench.device.loader import FACTORY, LoadError, Loading, Transcript, load_loader_profile
-    from workbench.device.program import build_program
+    from workbench.device.controller.loader import FACTORY, LoadError, Loading, Transcript, load_loader_profile
+    from workbench.device.controller.program import build_program
+    from workbench.files import InputError
+    from workbench.files.reading import write_whole
     from workbench.motion import load_motion
-    from workbench.robot import InputError
-    from workbench.robot.files import write_whole
 
     profile = load_loader_profile(args.loader)
     with Progress("flash") as progress:
@@ -83,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its module is imported late
-    from workbench.device.serial_line import SerialLine, default_port
+    from workbench.device.controller.serial_line import SerialLine, default_port
 
     return SerialLine(port or default_port(), rate)
 

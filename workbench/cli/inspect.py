@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Prints the inspection."""
-    from workbench.view.report.inspection import inspect_file
+    from workbench.inspect.recognise import inspect_file
 
     inspection = inspect_file(args.file, dict(args.packages))
     print(json.dumps(inspection.as_dict(), indent=2, allow_nan=False) if args.json else inspection.as_text())

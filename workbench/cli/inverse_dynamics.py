@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from workbench.cli.check import add_yes, check_files, check_session
-from workbench.cli.options import PUPPY, add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_cycles, add_model, add_out, load_model
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -23,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--motion", metavar="FILE", help="motion that was played in the recording, if it does not say itself")
     add_model(parser, "the bundled puppy; with --take the session's own")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of a motion or recording (default: free)")
-    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often a motion is played (default: 1)")
+    add_cycles(parser, 1)
     add_yes(parser)
     add_out(parser, default="runs/inverse-dynamics")
     parser.set_defaults(run=run)
@@ -31,9 +31,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Computes, writes the table and the figures, and prints the margins."""
+    from workbench.api.forces import forces_of_file, forces_of_take
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.compare.forces import forces_of_file, forces_of_take
     from workbench.compare.session import load_session
     from workbench.dynamics import save_inverse_dynamics
     from workbench.view.figures import save_figure

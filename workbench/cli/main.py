@@ -127,7 +127,7 @@ def _serious(record: logging.LogRecord) -> bool:
 
 def _readable(error: OSError | ValueError) -> str | None:
     """One line for what the user can correct; None for what is a defect of ours."""
-    from workbench.robot.errors import InputError
+    from workbench.files import InputError
 
     if isinstance(error, InputError):
         return str(error)

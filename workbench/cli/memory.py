@@ -14,9 +14,9 @@ from pathlib import Path
 
 from workbench.cli.output import runs
 from workbench.compare.session import Session
+from workbench.files import InputError
+from workbench.files.numerals import whole_of
 from workbench.identify.rollout_key import rollout_code
-from workbench.robot import InputError
-from workbench.robot.numerals import whole_of
 
 STAYS = 16
 """Letters of the digest in the folder's name."""

@@ -104,7 +104,7 @@ def _request(args: argparse.Namespace, model: RobotModel) -> Request:
 def _is_model_file(name: str) -> bool:
     from pathlib import Path
 
-    from workbench.robot.yaml_file import read_yaml
+    from workbench.files.yaml_file import read_yaml
 
     if name == PUPPY or Path(name).suffix.lower() not in (".yaml", ".yml"):
         return False
@@ -118,7 +118,7 @@ def _speed(text: str) -> float:
 
 
 def _positive(text: str) -> float:
-    from workbench.robot.numerals import number_of
+    from workbench.files.numerals import number_of
 
     value = number_of(text)
     if value is None or not 0 < value < math.inf:

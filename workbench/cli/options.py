@@ -26,6 +26,12 @@ def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy
     add_packages(parser)
 
 
+def add_cycles(parser: argparse.ArgumentParser, default: int) -> None:
+    """--cycles: how often a motion's loop runs. default: where neither the option nor the file says it."""
+    parser.add_argument("--cycles", type=positive, metavar="N", help="how often the motion, or its loop between start and stop, "
+                        f"is played (default: as its file says, else {default})")
+
+
 def add_packages(parser: argparse.ArgumentParser) -> None:
     """--package: where package:// URIs of a model's meshes point."""
     parser.add_argument("--package", metavar="NAME=DIR", dest="packages", type=_package, action="append", default=[],
@@ -56,7 +62,7 @@ def load_model(name: str, packages: Sequence[tuple[str, str]] = ()) -> RobotMode
 
 def positive(text: str) -> int:
     """A whole number of at least 1, for argparse."""
-    from workbench.robot.numerals import whole_of
+    from workbench.files.numerals import whole_of
 
     value = whole_of(text)
     if value is None or not 1 <= value <= MOST:
@@ -66,7 +72,7 @@ def positive(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A positive finite number, for argparse."""
-    from workbench.robot.numerals import number_of
+    from workbench.files.numerals import number_of
 
     value = number_of(text)
     if value is None or not value > 0:

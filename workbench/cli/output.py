@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from workbench.robot.errors import InputError
-from workbench.robot.numerals import whole_of
+from workbench.files import InputError
+from workbench.files.numerals import whole_of
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_cycles, add_model, add_out, load_model
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("motion", metavar="MOTION", nargs="?")
     add_bus(parser)
     add_model(parser)
-    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="how often the motion is played (default: 3)")
+    add_cycles(parser, 3)
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
     parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
@@ -33,11 +33,11 @@ def run(args: argparse.Namespace) -> int:
     """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.survey import survey
-    from workbench.device.limits import refuse_broken_limits
     from workbench.device.play import PlayOptions, finish_log, perform, preflight
     from workbench.device.stop import stop_on_signals
+    from workbench.device.tables.limits import refuse_broken_limits
+    from workbench.files import InputError
     from workbench.motion import load_motion
-    from workbench.robot import InputError
     from workbench.robot.servo_registers import save_registers
 
     if (args.motion is None) == (args.finish is None):
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
         preflight(found)
         registers = found.registers()
         save_registers(registers, args.out / "registers.yaml")
-        commands = motion.commands(args.cycles)
+        commands = motion.commands(motion.often(args.cycles, 3))
         played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
                          PlayOptions(hold=args.hold), progress=progress)
     for departure in registers.departures(model):

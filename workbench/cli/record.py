@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.device.capture import Recorder, UdpLink, finish, record_take
     from workbench.device.stop import stop_on_signals
-    from workbench.robot import InputError
+    from workbench.files import InputError
 
     if (args.host is None) == (args.finish is None):
         raise InputError(None, "expected either HOST or --finish JOURNAL")

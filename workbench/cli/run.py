@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_pc_link
-from workbench.cli.options import add_model, add_out, load_model, positive
+from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,7 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--motive", metavar="HOST",
                         help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
-    parser.add_argument("--cycles", type=positive, default=10, metavar="N", help="how often the motion is played (default: 10)")
+    add_cycles(parser, 10)
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulated cameras")
     parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
     parser.add_argument("--diagnose", action="store_true", help="search for the physics that is missing, too")
@@ -36,18 +36,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Plays, records, compares and says what came of it."""
+    from workbench.api.robot_run import run_by_controller, run_on_robot
+    from workbench.cli.diagnose import diagnose_and_report
     from workbench.cli.progress import Progress
     from workbench.compare.compare_session import compare_session
-    from workbench.compare.robot_run import run_by_controller, run_on_robot
     from workbench.compare.session import load_session
     from workbench.device.capture import Recorder, UdpLink
-    from workbench.device.limits import refuse_broken_limits
     from workbench.device.stop import stop_on_signals
+    from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
     from workbench.view.report.comparison import write_comparison
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    cycles = motion.often(args.cycles, 10)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
@@ -56,10 +58,10 @@ def run(args: argparse.Namespace) -> int:
         with stop_on_signals() as stop:
             if args.upload:
                 with open_pc_link(args, virtual) as port:
-                    done = run_by_controller(port, model, motion, args.cycles, args.out, lambda: stop.reason, **options)
+                    done = run_by_controller(port, model, motion, cycles, args.out, lambda: stop.reason, **options)
             else:
                 with open_bus(args, model, virtual) as bus:
-                    done = run_on_robot(bus, model, motion, args.cycles, args.out, lambda: stop.reason, **options)
+                    done = run_on_robot(bus, model, motion, cycles, args.out, lambda: stop.reason, **options)
         for warning in done.warnings:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
@@ -71,7 +73,5 @@ def run(args: argparse.Namespace) -> int:
     print(comparison.table())
     print(f"wrote {args.out / 'comparison'}: comparison.json, report.html")
     if args.diagnose:
-        from workbench.cli.main import main
-
-        return main(["diagnose", str(args.out), "--out", str(args.out / "diagnosis"), "--jobs", str(args.jobs)])
+        return diagnose_and_report(args.out, args.out / "diagnosis", args.jobs)
     return 0

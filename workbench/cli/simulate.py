@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from workbench.cli.check import add_yes, check_model, check_motion
-from workbench.cli.options import add_model, add_out, load_model, positive, time_step
+from workbench.cli.options import add_cycles, add_model, add_out, load_model, time_step
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -23,7 +23,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         "of the session that the model is of, else free)")
     parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
                         help="full servo law; its fast approximation; joints that follow the motion exactly")
-    parser.add_argument("--cycles", type=positive, default=1, metavar="N", help="how often the motion is played (default: 1)")
+    add_cycles(parser, 1)
     parser.add_argument("--time-step", type=time_step, default=1e-3, metavar="S", help="of the simulation (default: 0.001)")
     add_yes(parser)
     add_out(parser, default="runs/simulate")
@@ -47,11 +47,12 @@ def run(args: argparse.Namespace) -> int:
     base = args.base or model.usual_base
     model.check_base(floating=base == "free")
     motion = load_motion(args.motion, model)
+    cycles = motion.often(args.cycles, 1)
     check_model("simulate", model)
-    check_motion("simulate", motion, args.cycles, args.yes)
+    check_motion("simulate", motion, cycles, args.yes)
     config = SimulationConfig(time_step=args.time_step, base=base, drive=args.drive, contact=args.contact)
     with output_directory(args.out) as folder, Progress("simulate", stages=("simulating", "writing")) as progress:
-        take = play_motion(Simulation(model, config), motion, args.cycles, progress=lambda done: progress("simulating", done))
+        take = play_motion(Simulation(model, config), motion, cycles, progress=lambda done: progress("simulating", done))
         progress("writing")
         title = f"{motion.name}, {args.contact} contact, {args.drive} drive"
         written = [save_rollout(take, folder / "rollout.csv")]

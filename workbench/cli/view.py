@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from workbench.cli.options import PUPPY, add_model, load_model, positive, seconds
+from workbench.cli.options import PUPPY, add_cycles, add_model, load_model, positive, seconds
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -21,7 +21,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--take", metavar="NAME", help="which take of a session (default: its first)")
     parser.add_argument("--base", choices=("free", "fixed"),
                         help="of a recording or motion (default: as the model's takes, else free)")
-    parser.add_argument("--cycles", type=positive, default=3, metavar="N", help="how often a motion is played (default: 3)")
+    add_cycles(parser, 3)
     parser.add_argument("--port", type=positive, metavar="N", help="of the server (default: the first free one from 7000 on)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="end by itself after that long")
     add_model(parser, "the bundled puppy; whose take it is")

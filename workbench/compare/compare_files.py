@@ -13,16 +13,18 @@ from workbench.compare.comparison import compare_takes
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
 from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, readable, register_take
+from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 
 
-def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *, cycles: int = 1,
+def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *,
+                  cycles: int | None = None,
                   base: Base = "free", progress: Progress = no_progress, n_jobs: int = 2) -> Comparison:
     """Compares two files; a motion is first played `cycles` times on `model`, its base free or fixed.
 
@@ -109,7 +111,7 @@ def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
     return ReadTake(TakeSpec(path.stem, path, base=base), model, recording, recording.commands)
 
 
-def _run(path: Path, model: RobotModel, cycles: int, base: Base, beside: ReadTake | None) -> Run:
+def _run(path: Path, model: RobotModel, cycles: int | None, base: Base, beside: ReadTake | None) -> Run:
     """A motion's run, as long as the recording beside it."""
     commands = load_motion(path, model).commands(cycles)
     return Run(path.stem, model, commands, commands.end if beside is None else beside.duration, base)

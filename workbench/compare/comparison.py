@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from workbench.compare import metrics
 from workbench.compare.footfalls import foot_phases, force_phases
 from workbench.compare.results import NAN, Channel, Comparison, Pair, TakeComparison
+from workbench.files import InputError
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 __all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "aligned", "compare_takes", "noise_of"]
 

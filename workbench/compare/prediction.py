@@ -13,6 +13,7 @@ from workbench.compare.options import COMPARE
 from workbench.compare.session import PredictSpec, Session
 from workbench.compare.session_takes import LeftOut, Progress, capture_yaw, no_progress, read_takes
 from workbench.effects.apply import seen
+from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.joint_log import write_joint_log
 from workbench.recording.formats.motive_write import write_motive
@@ -24,7 +25,7 @@ from workbench.recording.mocap.registration import register
 from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.recording import Recording
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import Simulation, SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from workbench.compare.footfalls import FootPhases
+from workbench.files.reading import write_whole
 from workbench.recording.take import Take
-from workbench.robot.files import write_whole
 
 NAN = float("nan")
 

@@ -9,14 +9,15 @@ from pathlib import Path
 from typing import Literal
 
 from workbench.compare.options import FILES
+from workbench.files import InputError
+from workbench.files.yaml_file import Fields, top_of
 from workbench.motion import load_motion
 from workbench.motion.commands import Commands
 from workbench.motion.table import MOST_CYCLES
 from workbench.recording.formats.read import recording_of_take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.robot.robot_section import read_model
 from workbench.robot.servo_registers import ServoRegisters, load_registers
-from workbench.robot.yaml_file import Fields, top_of
 
 Base = Literal["free", "fixed"]
 
@@ -25,15 +26,15 @@ Base = Literal["free", "fixed"]
 class TakeSpec:
     """One take of a session: what was commanded, what was recorded.
 
-    motion: pose table, played `cycles` times; None where the recording carries its own commands. starts_at: recording
-    time of the first command [s]; None: estimate it. servos: constants that differ in this take. use: "fit", "validate"
-    or None.
+    motion: pose table, played `cycles` times (None: as often as it says itself, else once); None where the recording carries its
+    own commands. starts_at: recording time of the first command [s]; None: estimate it. servos: constants that differ in this
+    take. use: "fit", "validate" or None.
     """
 
     name: str
     recording: Path
     motion: Path | None = None
-    cycles: int = 1
+    cycles: int | None = None
     base: Base = "free"
     starts_at: float | None = None
     servos: Mapping[str, float] = field(default_factory=dict)
@@ -50,7 +51,7 @@ class PredictSpec:
 
     name: str
     motion: Path | None = None
-    cycles: int = 1
+    cycles: int | None = None
     commands: Path | None = None
     start: Path | None = None
     starts_at: float | None = None
@@ -119,7 +120,7 @@ def _take(f: Fields, model: RobotModel) -> TakeSpec:
     use = f.text("use", choices=("fit", "validate"))
     take = TakeSpec(
         name=name, recording=_recording(f, name), motion=f.file("motion"),
-        cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1, base=_base(f, model),
+        cycles=f.whole("cycles", None, least=1, most=MOST_CYCLES), base=_base(f, model),
         starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
         servos=_changes(f, model), use=use,  # type: ignore[arg-type]
     )
@@ -139,7 +140,7 @@ def _recording(f: Fields, take: str) -> Path:
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:
     f.only("name", "motion", "cycles", "commands", "start", "starts_at", "frames", "base", "servos")
     spec = PredictSpec(
-        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", 1, least=1, most=MOST_CYCLES) or 1,
+        name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", None, least=1, most=MOST_CYCLES),
         commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
         frames=f.whole("frames", least=1, most=FILES.most_frames),
         base=_base(f, model), servos=_changes(f, model),

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from workbench.files.reading import write_whole
+from workbench.files.yaml_file import yaml_text
 from workbench.robot import RobotModel
-from workbench.robot.files import write_whole
 from workbench.robot.model_file import robot_content
-from workbench.robot.yaml_file import yaml_text
 
 
 def write_session(folder: Path, model: RobotModel, takes: Sequence[Mapping[str, Any]], registers: str | None = None) -> Path:

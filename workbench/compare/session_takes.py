@@ -13,19 +13,20 @@ from workbench.compare.comparison import aligned
 from workbench.compare.options import FILES
 from workbench.compare.session import Session, TakeSpec
 from workbench.effects.apply import seen
+from workbench.files import InputError
+from workbench.files.errors import MistypedError
 from workbench.motion.commands import Commands
 from workbench.recording.formats.read import read_recording
 from workbench.recording.joint_names import named_by_model
-from workbench.recording.log_state import first_command, state_at
 from workbench.recording.mocap.observe import observe
 from workbench.recording.mocap.registration import register
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.mocap.yaw import session_yaw
 from workbench.recording.recording import Measurement, Recording
+from workbench.recording.servo_log.state import first_command, state_at
 from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
-from workbench.robot import InputError, RobotModel
-from workbench.robot.errors import MistypedError
+from workbench.robot import RobotModel
 from workbench.simulation import Start
 
 Progress = Callable[[str, float | None], None]

@@ -16,10 +16,11 @@ from workbench.dynamics.margins import motor_torque, servo_load, speed_margin, t
 from workbench.dynamics.result import InverseDynamicsResult
 from workbench.dynamics.stance import dearness, floor_under
 from workbench.dynamics.trajectory import RobotTrajectory, smoothed
+from workbench.files import InputError
 from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
-from workbench.robot import GRAVITY, InputError, RobotModel
+from workbench.robot import GRAVITY, RobotModel
 
 Array = NDArray[np.float64]
 Stance = Mapping[str, NDArray[np.bool_]]
@@ -83,14 +84,14 @@ class InverseDynamics:
         none = np.zeros((N, n))
         return self._result(name, trajectory, solution, _Spreads(none, np.zeros((N, 6)), none, none), problems)
 
-    def of_motion(self, motion: Motion, cycles: int = 1, step: float = 1 / 240) -> InverseDynamicsResult:
+    def of_motion(self, motion: Motion, cycles: int | None = None, step: float = 1 / 240) -> InverseDynamicsResult:
         """Of a motion's angles followed exactly (the thesis's smooth cubic, sampled every `step` s) on a fixed base.
 
         A motion alone does not say how a free base moves: InputError. Simulate it with the ideal drive, and hand in the take.
         """
         if self.base != "fixed":
             raise InputError(motion.source, "a motion does not say how a free base moves; expected a take of it, ideal drive")
-        path = interpolate_motion(motion, cycles, step)
+        path = interpolate_motion(motion, motion.often(cycles), step)
         N = len(path.time)
         place, turn = np.tile(self.machine.mount[0], (N, 1)), np.tile(self.machine.mount[1], (N, 1))
         still = np.zeros((N, 6))

@@ -16,8 +16,9 @@ from pydrake.multibody.tree import MultibodyForces
 
 from workbench.dynamics.trajectory import RobotTrajectory
 from workbench.effects.apply import physics_of, resolved
+from workbench.files import InputError
 from workbench.recording import quaternions
-from workbench.robot import GRAVITY, ConfigureParser, InputError, RobotModel
+from workbench.robot import GRAVITY, ConfigureParser, RobotModel
 from workbench.robot.kinematics import cross, rotation_about
 from workbench.robot.model_source.checks import quiet_drake
 

@@ -13,9 +13,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
+from workbench.files import InputError
+from workbench.files.reading import read_text, write_whole
 from workbench.recording.formats.numbers import number_columns
-from workbench.robot import InputError
-from workbench.robot.files import read_text, write_whole
 
 Array = NDArray[np.float64]
 

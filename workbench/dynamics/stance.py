@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.dynamics.machine import FootPoints
-from workbench.robot import InputError
+from workbench.files import InputError
 
 Array = NDArray[np.float64]
 

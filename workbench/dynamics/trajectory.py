@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.dynamics.derivatives import Derivatives, differentiate
+from workbench.files import InputError
 from workbench.recording import quaternions
-from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 

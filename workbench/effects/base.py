@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
-from workbench.robot import EffectSpec, Ground, InputError, RobotModel
+from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
 
 if TYPE_CHECKING:

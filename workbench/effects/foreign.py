@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, get_args
 
 from workbench.effects.base import Effect, Estimator, Family, Layer, Parameter, Place
-from workbench.robot import InputError
+from workbench.files import InputError
 
 _WORDS = {"layer": Layer, "family": Family, "estimator": Estimator}
 HOOKS = tuple(name for name, value in vars(Effect).items() if callable(value) and not name.startswith("_"))

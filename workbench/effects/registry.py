@@ -6,8 +6,8 @@ from functools import cache
 
 from workbench.effects.base import Effect, Estimator
 from workbench.effects.foreign import answering_for, check_effect
-from workbench.robot import InputError
-from workbench.robot.plug_ins import of_folder, with_plug_ins
+from workbench.files import InputError
+from workbench.files.plug_ins import of_folder, with_plug_ins
 
 ENTRY_POINT_GROUP = "workbench.effects"
 

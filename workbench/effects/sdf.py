@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
-from workbench.robot import InputError, JointFrame, Kinematics
+from workbench.files import InputError
+from workbench.robot import JointFrame, Kinematics
 from workbench.robot.model_source import named
 
 Array = NDArray[np.float64]

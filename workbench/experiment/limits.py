@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
+from workbench.files import InputError
 from workbench.motion import Motion
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import units_of
 

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from workbench.files import InputError
+from workbench.files.reading import read_text
 from workbench.gait.evaluate import table_sha256
 from workbench.gait.limits import Margin
 from workbench.motion import Motion, PoseTable
-from workbench.robot import InputError, RobotModel
-from workbench.robot.files import read_text
+from workbench.robot import RobotModel
 
 NAME = "certificate.json"
 MARK = "made by workbench optimize; its certificate is certificate.json beside it"

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
+from workbench.files import InputError
+from workbench.files.reading import write_whole
+from workbench.files.yaml_file import Fields, read_yaml
 from workbench.gait.legs import legs_of
-from workbench.robot import EffectSpec, InputError, RobotModel, data_file
-from workbench.robot.files import write_whole
+from workbench.robot import EffectSpec, RobotModel, data_file
 from workbench.robot.model_file import Posterior, parameter_names
-from workbench.robot.yaml_file import Fields, read_yaml
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,8 @@ EFFECTS = {"friction": ("ground_friction", "friction"), "supply_voltage": ("supp
            "supply_sag": ("supply_sag", "drop"), "backlash": ("backlash", "gap"), "command_delay": ("command_delay", "delay")}
 """The effect and the parameter that each range is of, in the units of docs/formats.md, section 7."""
 EACH_SERVO = ("backlash", "command_delay")
+EVERYWHERE = ""
+"""Place of an effect that names none: the ground, the supply, or every servo."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Ensemble:
     servo at full duty], "backlash" [deg] of each leg's joint and "command_delay" [s] of each servo. mass_share: half width of a
     uniform draw of each link's mass, as a share of it. payload: a mass [kg] at a random point of the base link. zero_sd: standard
     deviation of the zero of each leg's joint [deg]. posterior: of a diagnosed model, whose parameters are drawn too, in place of
-    the range of the same effect. source: file, for messages.
+    the range of the same effect at the same place; elsewhere the range stays. source: file, for messages.
     """
 
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -82,8 +85,8 @@ class Ensemble:
         if self.mass_share:
             factors = {link: float(1 + self.mass_share * rng.uniform(-1, 1)) for link in model.kinematics.links}
             drawn = with_masses(drawn, factors, folder)
-        told = {e.effect for e in model.effects}  # what a diagnosis found is better known than the file's range
-        return drawn.with_effects((*drawn.effects, *(e for e in effects if e.effect not in told)))
+        known = {(e.effect, place) for e in model.effects for place in e.where or (EVERYWHERE,)}
+        return drawn.with_effects((*drawn.effects, *(e for e in effects if not _diagnosed(e, known))))
 
 
 def with_masses(model: RobotModel, factors: Mapping[str, float], folder: Path) -> RobotModel:
@@ -130,6 +133,11 @@ def load_ensemble(path: str | Path | None = None, posterior: Posterior | None = 
         raise InputError(path, f"link_mass.share: expected less than 1, got {mass:g}")
     top.done()
     return Ensemble(ranges, mass, payload, zero, posterior if posterior is not None and posterior.names else None, str(path))
+
+
+def _diagnosed(drawn: EffectSpec, known: set[tuple[str, str]]) -> bool:
+    """Whether a diagnosis found this effect at this place: there it is better known than the file's range, and nowhere else."""
+    return (drawn.effect, EVERYWHERE) in known or any((drawn.effect, place) in known for place in drawn.where)
 
 
 def _from_posterior(model: RobotModel, posterior: Posterior, rng: np.random.Generator) -> RobotModel:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+from workbench.files import InputError
 from workbench.gait.feet import feet_measure
 from workbench.gait.limits import Margin, allowed_rms, contact_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
@@ -22,7 +23,7 @@ from workbench.gait.shape import GaitShape
 from workbench.gait.table import AT_ONCE, GaitTable, Paths, gait_table, paths_of, table_of
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig
 
 SECONDS, CYCLES = 2.0, 2

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
+from workbench.files.option_checks import check_choice, check_positive, check_whole
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
@@ -19,7 +20,6 @@ from workbench.gait.table import GaitTable
 from workbench.motion import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.robot.option_checks import check_choice, check_positive, check_whole
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.dynamics.machine import Machine
-from workbench.robot import InputError, RobotModel
+from workbench.files import InputError
+from workbench.robot import RobotModel
 from workbench.robot.kinematics import Kinematics, cross, rotation_about
 
 Array = NDArray[np.float64]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from workbench.device.table_file import most_poses, other_family
+from workbench.device.tables.table_file import most_poses, other_family
+from workbench.files.option_checks import check_positive
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.table import GaitTable
-from workbench.robot.option_checks import check_positive
 
 
 @dataclass(frozen=True)

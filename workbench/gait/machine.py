@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from workbench.dynamics import InverseDynamics, RobotTrajectory
 from workbench.effects.apply import physics_of
+from workbench.files import InputError
 from workbench.gait.legs import Leg, legs_of
 from workbench.gait.self_contact import SelfContact
 from workbench.gait.shape import GaitShape, foot_path
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.robot.ranges import JointRange, joint_ranges
 from workbench.robot.servo_units import ServoUnits, units_of
 from workbench.servo import ServoLaw

@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from workbench.files import InputError
+from workbench.files.option_checks import check_whole
+from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
 from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
 from workbench.gait.ensemble import Ensemble
@@ -28,9 +31,7 @@ from workbench.gait.shape import GaitShape
 from workbench.gait.table import GaitTable, gait_table
 from workbench.motion import Motion, load_motion
 from workbench.motion.files import motion_text
-from workbench.robot import InputError, RobotModel, data_file
-from workbench.robot.files import write_together
-from workbench.robot.option_checks import check_whole
+from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 
 WALK = "robotis_walk.csv"

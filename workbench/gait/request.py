@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from workbench.files import InputError
+from workbench.files.option_checks import check_choice
 from workbench.gait.limits import GaitLimits
 from workbench.gait.measure import GaitMeasure
-from workbench.robot import EffectSpec, InputError, RobotModel
-from workbench.robot.option_checks import check_choice
+from workbench.robot import EffectSpec, RobotModel
 
 Way = Literal["forward", "backward", "sideways", "turn", "arc"]
 Aim = Literal["speed", "gentleness", "energy", "smoothness"]

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import cma
 import numpy as np
 
+from workbench.files.option_checks import check_positive, check_whole
 from workbench.gait.evaluate import Candidate, Evaluator
 from workbench.gait.limits import Margin, binding
 from workbench.gait.request import Request
 from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
-from workbench.robot.option_checks import check_positive, check_whole
 
 STRAYING = ("drift", "curvature off the arc")
 """Limits that steering can keep."""

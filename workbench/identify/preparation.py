@@ -15,11 +15,11 @@ from workbench.compare.metrics import rms
 from workbench.compare.options import COMPARE
 from workbench.compare.session import Session
 from workbench.compare.session_takes import LeftOut, Progress, ReadTake, RegisteredTake, register_takes
+from workbench.files import InputError
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, part_of, running_sum
 from workbench.identify.shooting import base_states, unsettled
 from workbench.recording.take import Take
-from workbench.robot import InputError
 from workbench.simulation import SimulationConfig
 from workbench.simulation.steady import BaseStates
 

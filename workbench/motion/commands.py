@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.robot import InputError
+from workbench.files import InputError
 
 Array = NDArray[np.float64]
 

@@ -9,19 +9,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.numerals import number_of, whole_of
+from workbench.files.reading import write_whole
+from workbench.files.tables import plain_text
 from workbench.motion.motion import Motion
 from workbench.motion.mtn import load_mtn
-from workbench.robot import BUS_IDS, JOINTS, InputError, RobotModel, bus_ids
-from workbench.robot.files import write_whole
-from workbench.robot.numerals import number_of
+from workbench.motion.table import MOST_CYCLES, SECTIONS
+from workbench.robot import BUS_IDS, JOINTS, RobotModel, bus_ids
 from workbench.robot.servo_units import units_of
-from workbench.robot.tables import plain_text
 
 MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
 """Beyond an hour, or ten turns, a table is in another unit."""
 
 SPEED = "speed."
 """What a joint's name has before it in the column of its moving speeds."""
+SECTION, CYCLES = "section", "# cycles:"
+"""The column that tells start, loop and stop, and the comment that says how often the loop runs."""
 
 
 def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
@@ -29,8 +33,10 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
 
     Columns are found by the header's names; without a header they are `time` and the model's joints in alphabetical
     order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of all joints or of none, are moving speeds in place of
-    the travel over the dwell. What the motion is rounded to when it is played are the counts of the model's servos (without a
-    model, the AX-12A's). InputError names line and column of what is wrong, or a joint `model` lacks.
+    the travel over the dwell. A column `section` says `start`, `loop` or `stop`, in that order: start and stop are played once,
+    the loop is repeated; without it all is the loop. A comment line `# cycles: N` says how often, where nobody else does. What
+    the motion is rounded to when it is played are the counts of the model's servos (without a model, the AX-12A's). InputError
+    names line and column of what is wrong, or a joint `model` lacks.
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
@@ -51,9 +57,13 @@ def motion_text(motion: Motion, about: str = "") -> str:
     if motion.speeds is not None:
         header += [SPEED + j for j in motion.joints]
         columns.append(np.degrees(motion.speeds))
+    rows = [",".join(f"{x + 0.0:.10g}" for x in row) for row in np.hstack(columns)]
+    if motion.start or motion.stop:
+        header.insert(0, SECTION)
+        rows = [f"{section},{row}" for section, row in zip(motion.sections, rows)]
     lines = [f"# {about}"] if about else []
-    lines += [",".join(header)] + [",".join(f"{x + 0.0:.10g}" for x in row) for row in np.hstack(columns)]
-    return "\n".join(lines) + "\n"
+    lines += [f"{CYCLES} {motion.cycles}"] if motion.cycles is not None else []
+    return "\n".join([*lines, ",".join(header), *rows]) + "\n"
 
 
 Line = tuple[int, list[str]]
@@ -64,7 +74,9 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
              if line.strip() and not line.lstrip().startswith("#")]
     if not lines:
         raise InputError(path, "empty; expected rows of time and joint angles")
+    cycles = _cycles(path, text)
     names, rows = _columns(path, lines, model)
+    start, stop, names, rows = _sections(path, names, rows)
     table = np.empty((len(rows), len(names)))
     for k, (n, cells) in enumerate(rows):
         if len(cells) != len(names):
@@ -80,7 +92,42 @@ def _parse(path: str | Path, text: str, model: RobotModel | None) -> Motion:
         return np.radians(table[:, [names.index(name) for name in wanted]])
 
     return Motion(Path(path).stem, table[:, names.index("time")], joints, columns(joints), str(path),
-                  columns([SPEED + j for j in joints]) if ramped else None)
+                  columns([SPEED + j for j in joints]) if ramped else None, start=start, stop=stop, cycles=cycles)
+
+
+def _cycles(path: str | Path, text: str) -> int | None:
+    """How often the loop runs by the file's own comment; None without one."""
+    for n, line in enumerate(text.splitlines(), start=1):
+        if line.startswith(CYCLES):
+            value = whole_of(line.removeprefix(CYCLES).strip())
+            if value is None or not 1 <= value <= MOST_CYCLES:
+                raise InputError(path, f"line {n}: expected '{CYCLES} N' with N from 1 to {MOST_CYCLES}, found '{line[:40]}'")
+            return value
+    return None
+
+
+def _sections(path: str | Path, names: list[str], rows: list[Line]) -> tuple[int, int, list[str], list[Line]]:
+    """How many poses of start and stop the column `section` says, and names and rows without it."""
+    if SECTION not in names:
+        return 0, 0, names, rows
+    column = names.index(SECTION)
+    last, of_rows = 0, list[str]()
+    for n, cells in rows:
+        found = cells[column] if column < len(cells) else ""
+        if found not in SECTIONS:
+            raise InputError(path, f"line {n}, column {SECTION}: expected {', '.join(SECTIONS)}, found '{found[:40]}'")
+        if SECTIONS.index(found) < last:
+            raise InputError(path, f"line {n}, column {SECTION}: '{found}' after '{SECTIONS[last]}'; expected start, loop, stop")
+        last = SECTIONS.index(found)
+        of_rows.append(found)
+    if of_rows and of_rows[0] != of_rows[min(1, len(of_rows) - 1)]:
+        problem = f"'{of_rows[0]}' has no pose: the first row is none, it is where the second one comes from"
+        raise InputError(path, f"line {rows[0][0]}, column {SECTION}: {problem}")
+    if "loop" not in of_rows:
+        raise InputError(path, f"column {SECTION}: expected rows of a loop")
+    start, stop = of_rows[1:].count("start"), of_rows[1:].count("stop")
+    return (start, stop, [name for name in names if name != SECTION],
+            [(n, cells[:column] + cells[column + 1:]) for n, cells in rows])
 
 
 def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> tuple[list[str], list[Line]]:
@@ -99,7 +146,7 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
     for name in first:
         if first.count(name) > 1:
             raise InputError(path, f"line {n}: column '{name}' stands there twice")
-        if name != "time" and known is not None and name.removeprefix(SPEED) not in known:
+        if name not in ("time", SECTION) and known is not None and name.removeprefix(SPEED) not in known:
             raise InputError(path, f"line {n}: the robot has no joint '{name}'; its joints: {' '.join(known)}")
     return first, lines[1:]
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.motion.table import PoseTable
-from workbench.robot import InputError
+from workbench.motion.table import SECTIONS, PoseTable, Section
 from workbench.robot.servo_units import ServoUnits
 
 Array = NDArray[np.float64]
@@ -22,6 +22,9 @@ class Motion:
     times: (K,) [s], increasing, K at least 2. joints: (n,) names. angles: (K, n) [rad], zero = servo centre. speeds: (K, n)
     [rad/s] moving speeds, where they are not the travel over the dwell; the first row's count for nothing. units: (n,) counts of
     the joints' servos, to which all is rounded when it is played (default: the AX-12A's; `load_motion` takes the model's).
+    start, stop: how many poses (the first row is none) at the beginning are played once, before the loop, and how many at the end
+    once after it; the others are the loop, which is repeated. cycles: how often by the motion's own file; None where it does not
+    say.
     """
 
     name: str
@@ -31,6 +34,9 @@ class Motion:
     source: str = "motion"
     speeds: Array | None = None
     units: tuple[ServoUnits, ...] = ()
+    start: int = 0
+    stop: int = 0
+    cycles: int | None = None
 
     def __post_init__(self) -> None:
         if self.angles.shape != (len(self.times), len(self.joints)):
@@ -39,6 +45,9 @@ class Motion:
             raise InputError(self.source, "expected as many moving speeds as angles")
         if len(self.times) < 2 or not self.joints:
             raise InputError(self.source, "expected one joint or more and two rows: where the cycle closes, and a pose")
+        if self.start < 0 or self.stop < 0 or self.start + self.stop > len(self.times) - 2:
+            said = f"{self.start} poses of start and {self.stop} of stop"
+            raise InputError(self.source, f"{said}: expected a pose of the loop, too")
         twice = [j for i, j in enumerate(self.joints) if j in self.joints[:i]]
         if twice:
             raise InputError(self.source, f"joint '{twice[0]}' stands there twice")
@@ -58,26 +67,56 @@ class Motion:
     @staticmethod
     def from_table(table: PoseTable) -> Motion:
         """The poses as angles at their arrival times, with their moving speeds, so that `as_table` gives the same counts; the
-        first row is the last pose, where the cycle closes."""
+        first row is the last pose of the loop, where that closes, or neutral, where a start leads into it."""
         angles, speeds = table.angles(), table.moving_speeds()
         times = np.concatenate([[0.0], np.cumsum(table.dwells_ms) / 1000])
-        return Motion(table.source, times, table.joints, np.vstack([angles[-1:], angles]), table.source,
-                      np.vstack([speeds[-1:], speeds]), table.units)
+        last = len(table) - table.stop - 1
+        first = np.zeros((1, len(table.joints))) if table.start else angles[last:last + 1]
+        return Motion(table.source, times, table.joints, np.vstack([first, angles]), table.source,
+                      np.vstack([speeds[last:last + 1], speeds]), table.units, table.start, table.stop)
 
     @property
     def duration(self) -> float:
-        """Length of one cycle [s]."""
-        return float(self.times[-1] - self.times[0])
+        """Length of one cycle of the loop [s]."""
+        return float(self.times[len(self.times) - 1 - self.stop] - self.times[self.start])
+
+    def seconds(self, cycles: int | None = None) -> float:
+        """How long start, so many cycles (default: its own) and stop take [s]."""
+        return float(self.times[-1] - self.times[0]) + (self.often(cycles) - 1) * self.duration
+
+    def often(self, cycles: int | None, default: int = 1) -> int:
+        """How many cycles are played: as many as asked for, else as the motion says itself, else the default."""
+        return cycles if cycles is not None else self.cycles if self.cycles is not None else default
 
     @property
     def closes(self) -> bool:
-        """Whether the last row is the first one, so that cycles follow each other without a jump."""
-        return bool(np.allclose(self.angles[0], self.angles[-1], rtol=0, atol=1e-9))
+        """Whether cycles follow each other without a jump: the loop ends in the first row, or a start leads into it."""
+        last = self.angles[len(self.times) - 1 - self.stop]
+        return self.start > 0 or bool(np.allclose(self.angles[0], last, rtol=0, atol=1e-9))
+
+    @property
+    def sections(self) -> tuple[Section, ...]:
+        """The section of each row (K,); the first row, which is no pose, has that of the second."""
+        loop = len(self.times) - 1 - self.start - self.stop
+        of_poses = [name for name, n in zip(SECTIONS, (self.start, loop, self.stop)) for _ in range(n)]
+        return (of_poses[0], *of_poses)
+
+    def unrolled(self, cycles: int | None = None) -> Motion:
+        """Start, so many cycles (default: its own) and stop as one motion without sections, to be played once."""
+        table_rows = np.arange(1, len(self.times))
+        last = len(self.times) - self.stop
+        loop = np.tile(table_rows[self.start:last - 1], self.often(cycles))
+        rows = np.concatenate([[0], table_rows[:self.start], loop, table_rows[last - 1:]])
+        times = self.times[0] + np.concatenate([[0.0], np.cumsum(np.diff(self.times)[rows[1:] - 1])])
+        return replace(self, times=times, angles=self.angles[rows], start=0, stop=0, cycles=1,
+                       speeds=None if self.speeds is None else self.speeds[rows])
 
     def as_table(self) -> PoseTable:
         """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for what the registers cannot hold."""
-        return PoseTable.from_angles(self.joints, self.times, self.angles, self.source, self.speeds, self.units)
+        return PoseTable.from_angles(
+            self.joints, self.times, self.angles, self.source, self.speeds, self.units, self.start, self.stop)
 
-    def commands(self, cycles: int = 1) -> Commands:
-        """What the firmware sends for so many cycles, rounded to the servo's counts and milliseconds."""
-        return self.as_table().commands(cycles)
+    def commands(self, cycles: int | None = None) -> Commands:
+        """What the firmware sends for the start, so many cycles (default: the motion's own, else 1) and the stop, rounded to the
+        servo's counts and milliseconds."""
+        return self.as_table().commands(self.often(cycles))

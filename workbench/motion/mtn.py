@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.numerals import number_of
+from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.motion.motion import Motion
-from workbench.robot import COUNT, InputError
-from workbench.robot.files import MOST_TEXT, regular_file
-from workbench.robot.numerals import number_of
+from workbench.robot import COUNT
 
 Array = NDArray[np.float64]
 

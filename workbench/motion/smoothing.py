@@ -59,7 +59,9 @@ def interpolate(
 
 
 def interpolate_motion(motion: Motion, cycles: int = 1, step: float = 1e-4, knots: Knots = "smooth") -> Trajectory:
-    """A motion, looped, as a trajectory from its first row; periodic if its cycle closes."""
+    """A motion, looped, as a trajectory from its first row; periodic if its cycle closes. Start and stop are followed once."""
+    if motion.start or motion.stop:
+        return interpolate_motion(motion.unrolled(cycles), 1, step, knots)
     starts = motion.duration * np.arange(cycles)
     times = np.concatenate([[0.0], (starts[:, None] + (motion.times[1:] - motion.times[0])).ravel()])
     angles = np.vstack([motion.angles[:1], np.tile(motion.angles[1:], (cycles, 1))])

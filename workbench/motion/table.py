@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import InputError
 from workbench.robot.servo_units import AX12A, ServoUnits
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+Section = Literal["start", "loop", "stop"]
+SECTIONS: tuple[Section, ...] = ("start", "loop", "stop")
+"""In the order in which they are played: once, again and again, once."""
 
 MOST_CYCLES = 10_000
 """Of one run: hours of walking."""
@@ -25,7 +29,8 @@ class PoseTable:
 
     joints: (n,) names. goals: (P, n) goal positions. speeds: (P, n) moving speeds, 0 = at once. dwells_ms: (P,) [ms], at least 1.
     source: where they come from. units: (n,) what each joint's counts mean and where they end (default: the AX-12A's, 0 to 1023).
-    InputError names joint, pose and value out of range.
+    start, stop: how many of the first poses are played once before the loop, and how many of the last ones once after it; the
+    poses between them are the loop, at least one. InputError names joint, pose and value out of range.
     """
 
     joints: tuple[str, ...]
@@ -34,6 +39,8 @@ class PoseTable:
     dwells_ms: Counts
     source: str = "pose table"
     units: tuple[ServoUnits, ...] = ()
+    start: int = 0
+    stop: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", self.units or (AX12A,) * len(self.joints))
@@ -44,6 +51,9 @@ class PoseTable:
             raise InputError(self.source, f"{len(self.units)} servos' units for {len(self.joints)} joints")
         if 0 in shape:
             raise InputError(self.source, "expected at least one pose of one joint")
+        if self.start < 0 or self.stop < 0 or self.loop < 1:
+            said = f"{self.start} poses of start and {self.stop} of stop"
+            raise InputError(self.source, f"{said}, of {len(self)} in all: expected at least one pose between them, the loop")
         for what, counts, most in (("goal position", self.goals, self._of(lambda u: u.highest)),
                                    ("moving speed", self.speeds, self._of(lambda u: u.fastest))):
             for k, i in np.argwhere((counts < 0) | (counts > most))[:1]:
@@ -55,19 +65,55 @@ class PoseTable:
     def __len__(self) -> int:
         return len(self.dwells_ms)
 
+    @property
+    def loop(self) -> int:
+        """How many poses are repeated."""
+        return len(self) - self.start - self.stop
+
+    @property
+    def period(self) -> float:
+        """Length of the loop [s]."""
+        return float(self.dwells_ms[self.start:len(self) - self.stop].sum()) / 1000
+
+    def order(self, cycles: int = 1) -> NDArray[np.int_]:
+        """Indices of the poses as they are played: the start, so many loops, the stop."""
+        every = np.arange(len(self))
+        last = len(self) - self.stop
+        return np.concatenate([every[:self.start], np.tile(every[self.start:last], cycles), every[last:]])
+
+    def part(self, section: Section) -> PoseTable | None:
+        """The poses of one section as a table without sections; None where it has none."""
+        last = len(self) - self.stop
+        inside = {"start": slice(0, self.start), "loop": slice(self.start, last), "stop": slice(last, len(self))}[section]
+        if inside.start == inside.stop:
+            return None
+        return PoseTable(self.joints, self.goals[inside], self.speeds[inside], self.dwells_ms[inside], self.source, self.units)
+
+    @staticmethod
+    def in_sections(start: PoseTable | None, loop: PoseTable, stop: PoseTable | None) -> PoseTable:
+        """One table of three, of the same joints."""
+        parts = [p for p in (start, loop, stop) if p is not None]
+        goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
+        return PoseTable(loop.joints, goals, speeds, dwells, loop.source, loop.units, len(start or ()), len(stop or ()))
+
     @staticmethod
     def from_angles(joints: tuple[str, ...], times: Array, angles: Array, source: str = "motion",
-                    moving_speeds: Array | None = None, units: tuple[ServoUnits, ...] = ()) -> PoseTable:
+                    moving_speeds: Array | None = None, units: tuple[ServoUnits, ...] = (), start: int = 0, stop: int = 0,
+                    ) -> PoseTable:
         """The thesis's equations 3.1 to 3.4: rows of angles (K, n) [rad] at times (K,) [s] become K - 1 poses.
 
         Goals and speeds are rounded to the counts of each joint's servo (units; the AX-12A's: 300/1023 deg about 512 and 114/1023
         rpm), dwells to milliseconds. The first row gives no pose of its own, only the speed of the first pose. moving_speeds:
-        (K, n) [rad/s] in place of the travel over the dwell.
+        (K, n) [rad/s] in place of the travel over the dwell. start, stop: as in the class. The first pose of a loop after a start
+        is reached from the start's last pose and from the loop's: without moving_speeds it gets the faster of the two speeds.
         """
         each = units or (AX12A,) * len(joints)
         elapsed = np.diff(times)
         with np.errstate(divide="raise", invalid="raise", over="ignore"):
             asked = np.abs(np.diff(angles, axis=0) / elapsed[:, None] if moving_speeds is None else moving_speeds[1:])
+            if start and moving_speeds is None:
+                again = np.abs(angles[start + 1] - angles[len(angles) - 1 - stop]) / elapsed[start]
+                asked[start] = np.maximum(asked[start], again)
         return PoseTable(
             joints,
             goals=np.array([u.centre for u in each]) + _nearest(angles[1:] / np.array([u.count for u in each])),
@@ -75,6 +121,8 @@ class PoseTable:
             dwells_ms=_nearest(elapsed * 1000, lost=0.0),  # in the file's own unit: what lies below a half stays below
             source=source,
             units=each,
+            start=start,
+            stop=stop,
         )
 
     def angles(self) -> Array:
@@ -100,19 +148,20 @@ class PoseTable:
         return np.asarray(self.speeds * self._of(lambda u: u.table_unit), dtype=float)
 
     def commands(self, cycles: int = 1) -> Commands:
-        """What the firmware sends: each pose when the dwells before it are over, all poses again for each cycle."""
+        """What the firmware sends: each pose when the dwells before it are over; the start, so many loops, the stop."""
         if not 1 <= cycles <= MOST_CYCLES:
             raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
-        ends = np.cumsum(np.tile(self.dwells_ms, cycles)) / 1000
-        goals = np.tile(self.angles(), (cycles, 1))
+        played = self.order(cycles)
+        ends = np.cumsum(self.dwells_ms[played]) / 1000
+        goals = self.angles()[played]
         return Commands(
             times=np.concatenate([[0.0], ends[:-1]]),
             joints=self.joints,
             goals=goals,
-            speeds=np.tile(self.rates(), (cycles, 1)),
+            speeds=self.rates()[played],
             enabled=np.ones(goals.shape, dtype=bool),
             end=float(ends[-1]),
-            poses=np.tile(np.arange(len(self)), cycles),
+            poses=played,
         )
 
     def _of(self, what: Callable[[ServoUnits], float]) -> Array:

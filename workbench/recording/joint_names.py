@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from workbench.files import InputError
+from workbench.files.errors import MistypedError
 from workbench.recording.recording import Recording
-from workbench.robot import InputError, RobotModel
-from workbench.robot.errors import MistypedError
+from workbench.robot import RobotModel
 
 SO101_JOINTS = ("Rotation", "Pitch", "Elbow", "Wrist_Pitch", "Wrist_Roll", "Jaw")
 """Order of the columns of an npz, which does not name them (the SO-101's joint_list.txt)."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.joint_names import named_by_model
@@ -16,7 +17,7 @@ from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import Tracks, check_assets, tracks_of
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 

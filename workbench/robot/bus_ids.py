@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
 from workbench.robot.model import RobotModel
 from workbench.robot.names import BUS_IDS
 

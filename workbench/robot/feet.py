@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import cached_by_content
+from workbench.files import InputError
+from workbench.files.reading import cached_by_content
 from workbench.robot.kinematics import Kinematics
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def _shapes(path: Path) -> Mapping[str, Points]:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
+    from workbench.files.resources import ConfigureParser
     from workbench.robot.model_source.checks import quiet_drake
-    from workbench.robot.resources import ConfigureParser
 
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)

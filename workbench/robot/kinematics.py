@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import cached_by_content
+from workbench.files import InputError
+from workbench.files.reading import cached_by_content
 
 Array = NDArray[np.float64]
 
@@ -145,9 +145,9 @@ def _parse(path: Path, text: str | None = None) -> Kinematics:
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.multibody.tree import RevoluteJoint, WeldJoint
 
+    from workbench.files.resources import ConfigureParser
     from workbench.robot.model_source.checks import drake_error, quiet_drake
     from workbench.robot.model_source.prepare import named
-    from workbench.robot.resources import ConfigureParser
 
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)

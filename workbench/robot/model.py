@@ -12,12 +12,12 @@ from typing import Any, Literal
 
 import yaml
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
+from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
 from workbench.robot.model_source import ModelSource, model_problems, prepared
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
-from workbench.robot.resources import resolve_model
 from workbench.robot.servo_constants import ServoConstants
 
 PUPPY = "package://puppy/puppy.sdf"

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import write_whole
+from workbench.files import InputError
+from workbench.files.reading import write_whole
+from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.robot_section import read_model, read_servos
-from workbench.robot.yaml_file import Fields, top_of, yaml_text
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import read_text
+from workbench.files import InputError
+from workbench.files.reading import read_text
+from workbench.files.resources import data_file
 from workbench.robot.model import PUPPY, RobotModel
-from workbench.robot.resources import data_file
 
 TABLE = "joint_ranges.csv"
 COLUMNS = ["joint", "lower", "upper", "source"]

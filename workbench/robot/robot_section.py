@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
+from workbench.files.yaml_file import Fields
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import KEYS, ServoConstants, load_servo_constants, servo_constants
-from workbench.robot.yaml_file import Fields
 
 _CONSTANTS = set(KEYS)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from workbench.robot.errors import InputError
-from workbench.robot.yaml_file import read_yaml
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
 
 COUNT = math.radians(300 / 1023)
 """One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
 from workbench.robot.servo_constants import ServoConstants
 
 LAW_KEYS = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")

@@ -9,12 +9,12 @@ from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import Any
 
-from workbench.robot.errors import InputError
-from workbench.robot.plug_ins import with_plug_ins
-from workbench.robot.resources import resource_dir
+from workbench.files import InputError
+from workbench.files.plug_ins import with_plug_ins
+from workbench.files.resources import resource_dir
+from workbench.files.yaml_file import Fields, top_of
 from workbench.robot.servo_constants import TOLERANCES
 from workbench.robot.servo_profile import LAW_KEYS, MORE_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
-from workbench.robot.yaml_file import Fields, top_of
 
 ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",

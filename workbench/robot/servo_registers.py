@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from workbench.robot.files import write_whole
+from workbench.files.reading import write_whole
+from workbench.files.yaml_file import Fields, read_yaml, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.servo_constants import COUNT
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import servo_profile
-from workbench.robot.yaml_file import Fields, read_yaml, yaml_text
 
 FORMAT = 1
 

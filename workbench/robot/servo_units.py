@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
 from workbench.robot.model import RobotModel
 from workbench.robot.servo_constants import COUNT, SPEED_UNIT
 from workbench.robot.servo_profile import ServoProfile

@@ -12,7 +12,8 @@ from pydrake.multibody.tree import JointActuator, PdControllerGains, RevoluteJoi
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from workbench.robot import InputError, RobotModel
+from workbench.files import InputError
+from workbench.robot import RobotModel
 from workbench.servo.law import ServoLaw
 from workbench.servo.rubbing import nominal_terms
 from workbench.servo.system import ServoBank

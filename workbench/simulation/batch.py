@@ -13,8 +13,8 @@ from typing import Any
 from joblib import Parallel, delayed
 from joblib.parallel import get_active_backend
 
+from workbench.files import InputError
 from workbench.recording.take import Take
-from workbench.robot import InputError
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Simulation
 

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, fields, replace
 
-from workbench.robot import InputError, RobotModel
-from workbench.robot.option_checks import check_choice
+from workbench.files import InputError
+from workbench.files.option_checks import check_choice
+from workbench.robot import RobotModel
 
 BASES = ("auto", "free", "fixed", "path")
 DRIVES = ("servo", "fast_servo", "ideal", "playback")

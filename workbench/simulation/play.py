@@ -20,13 +20,14 @@ LEAD = 0.3
 """Rest before the first command [s]."""
 
 
-def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int = 1, duration: float | None = None,
-               lead: float = LEAD) -> Job:
-    """A motion played `cycles` times, or for `duration` [s] of that, after `lead` [s] of rest.
+def motion_job(model: RobotModel, config: SimulationConfig, motion: Motion, cycles: int | None = None,
+               duration: float | None = None, lead: float = LEAD) -> Job:
+    """A motion played `cycles` times (None: as often as it says itself), or for `duration` [s] of that, after `lead` [s] of rest.
 
     A servo gets the firmware's commands, rounded as there. An ideal joint follows the angles themselves, by a smooth cubic, as
     in the thesis's inverse dynamics.
     """
+    cycles = motion.often(cycles)
     commands = motion.commands(cycles)
     trajectory = smooth_trajectory(model, config, motion, cycles) if config.drive == "ideal" else None
     return Job(model, config, commands, commands.end if duration is None else duration, lead, trajectory, name=motion.name)
@@ -41,7 +42,8 @@ def smooth_trajectory(model: RobotModel, config: SimulationConfig, motion: Motio
     return smooth.time, angles
 
 
-def play_motion(simulation: Simulation, motion: Motion, cycles: int = 1, progress: Callable[[float], None] | None = None) -> Take:
+def play_motion(simulation: Simulation, motion: Motion, cycles: int | None = None,
+                progress: Callable[[float], None] | None = None) -> Take:
     """The take of `motion_job` on a station that exists. progress: called with the share of the time that is done, 0 to 1."""
     job = motion_job(simulation.model, simulation.config, motion, cycles)
     assert job.duration is not None

@@ -12,7 +12,8 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, Multiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from workbench.robot import InputError, RobotModel
+from workbench.files import InputError
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 

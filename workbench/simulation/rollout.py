@@ -15,10 +15,11 @@ from pydrake.trajectories import PiecewisePolynomial
 from scipy.spatial.transform import Rotation
 
 from workbench.effects.apply import physics_of, played
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.smoothing import interpolate
 from workbench.recording.take import Take
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 from workbench.servo.bank import servo_joints
 from workbench.servo.system import ServoBank
 from workbench.simulation.config import SimulationConfig

@@ -23,7 +23,8 @@ from pydrake.systems.primitives import ConstantValueSource, VectorLogSink
 
 from workbench.effects.apply import Physics, physics_of
 from workbench.effects.sdf import SPRING_TIME
-from workbench.robot import ConfigureParser, InputError, RobotModel
+from workbench.files import InputError
+from workbench.robot import ConfigureParser, RobotModel
 from workbench.robot.model_source.checks import quiet_drake
 from workbench.servo import AddServos, ServoLaw
 from workbench.servo.bank import find_actuator, servo_joints

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.effects.apply import played
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
-from workbench.robot import InputError
 
 if TYPE_CHECKING:
     from workbench.simulation.rollout import Simulation, Start

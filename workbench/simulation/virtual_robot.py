@@ -25,9 +25,10 @@ from workbench.device.virtual import (
 )
 from workbench.effects.apply import physics_of, played, resolved, seen
 from workbench.effects.base import Effect
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Take, observe
-from workbench.robot import InputError, RobotModel, bus_ids
+from workbench.robot import RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation

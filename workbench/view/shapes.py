@@ -14,10 +14,10 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from workbench.files.resources import ConfigureParser
 from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
 from workbench.robot.model_source.checks import quiet_drake
-from workbench.robot.resources import ConfigureParser
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.files import InputError
 from workbench.recording import Recording
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.registry import RecordingFormat
-from workbench.robot import InputError
 
 FIRST = b"ticks of "
 TICK = 2 * math.pi / 4096

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workbench.robot import InputError
+from workbench.files import InputError
 
 
 class BusError(InputError):

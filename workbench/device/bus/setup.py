@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
-from workbench.robot import InputError, RobotModel, bus_ids
+from workbench.files import InputError
+from workbench.robot import RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 
 ROUNDING = 2

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
-from workbench.robot import InputError, RobotModel, bus_ids
+from workbench.files import InputError
+from workbench.robot import RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profile
 from workbench.robot.servo_registers import ServoReading, ServoRegisters

@@ -8,7 +8,7 @@ from pathlib import Path
 from workbench.device.capture.finish import Capture
 from workbench.device.capture.recorder import Recorder
 from workbench.device.capture.take import record_take
-from workbench.robot import InputError
+from workbench.files import InputError
 
 PATIENCE = 10.0
 """Until the first frame has to be there [s]: three times what the recorder itself waits for it."""

@@ -25,10 +25,10 @@ from workbench.device.capture.packets import (
     parse_names,
     stated_number,
 )
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
-from workbench.robot import InputError
-from workbench.robot.files import write_whole
 
 Array = NDArray[np.float64]
 KEPT = 20

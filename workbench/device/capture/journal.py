@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from workbench.robot import InputError
+from workbench.files import InputError
 
 MAGIC = b"workbench natnet journal 1\n"
 SYNC_EVERY = 0.5

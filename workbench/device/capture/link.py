@@ -12,7 +12,7 @@ from typing import Protocol
 
 from workbench.device.capture.packets import ServerInfo
 from workbench.device.capture.virtual_motive import VirtualMotive
-from workbench.robot import InputError
+from workbench.files import InputError
 
 BUFFER = 4 << 20
 """Receive buffer asked of the system [bytes]: some seconds of frames, for a disk that is slow to sync."""

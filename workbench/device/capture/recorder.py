@@ -24,7 +24,7 @@ from workbench.device.capture.packets import (
     parse_server_info,
     stated_number,
 )
-from workbench.robot import InputError
+from workbench.files import InputError
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from workbench.robot import InputError
+from workbench.files import InputError
 
 KIND = "workbench play journal 1"
 

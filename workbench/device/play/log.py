@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.device.play.journal import read_play_journal
+from workbench.files import InputError
 from workbench.recording.formats.joint_log import write_joint_log
-from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 STEP = 0.02

@@ -12,8 +12,8 @@ from workbench.device.play.journal import PlayJournal
 from workbench.device.play.log import finish_log
 from workbench.device.play.player import Played, PlayOptions, play
 from workbench.device.play.watch import WatchOptions
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import InputError
 
 
 def preflight(found: Survey) -> None:

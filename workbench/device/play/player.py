@@ -13,8 +13,8 @@ from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.rig import Rig
 from workbench.device.play.watch import Reaction, Watch, WatchOptions
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import InputError
 
 Progress = Callable[[str, float | None], None]
 

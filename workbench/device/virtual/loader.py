@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from workbench.device.controller.loader import LoaderProfile
 from workbench.device.link import FrameType, frame
-from workbench.device.loader import LoaderProfile
 
 SETTLE = 0.5
 """Silence after which the loader takes what has come for the whole image [s]. The real one's rule is not known."""

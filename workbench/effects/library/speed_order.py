@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.effects.base import Effect
+from workbench.files import InputError
 from workbench.motion.commands import Commands
-from workbench.robot import EffectSpec, InputError, RobotModel
+from workbench.robot import EffectSpec, RobotModel
 
 
 class SpeedOrder(Effect):

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
+from workbench.files.reading import write_together
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
-from workbench.robot.files import write_together
 from workbench.robot.model_file import model_text
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.reading import read_json
 from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.files import read_json
 
 Array = NDArray[np.float64]
 _FULL_DUTY = 885.0

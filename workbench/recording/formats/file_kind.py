@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from workbench.files.numerals import number_of
+from workbench.files.tables import is_binary, plain_head, split_row
 from workbench.recording.formats.registry import format_of
 from workbench.recording.formats.rollout_table import is_rollout
-from workbench.robot.numerals import number_of
-from workbench.robot.tables import is_binary, plain_head, split_row
 
 Kind = Literal["recording", "motion", "rollout"]
 
@@ -31,6 +31,6 @@ def file_kind(path: str | Path) -> Kind:
         return "rollout"
     first = next((line for line in lines if line and not line.startswith("#")), "")
     cells = split_row(first)
-    plain = "time" in cells and not any(mark in c for c in cells for mark in "./[")
+    plain = "time" in cells and not any(mark in c.removeprefix("speed.") for c in cells for mark in "./[")
     numbers = bool(cells) and all(number_of(c) is not None for c in cells)
     return "motion" if plain or numbers else "recording"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from workbench.files import InputError
+from workbench.files.numerals import number_of
+from workbench.files.tables import is_binary, split_row
 from workbench.recording.formats.registry import known_formats
-from workbench.robot import InputError
-from workbench.robot.numerals import number_of
-from workbench.robot.tables import is_binary, split_row
 
 _SHOWN = 6
 """Columns named in one line."""

@@ -15,13 +15,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.reading import read_json, regular_file
 from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
-from workbench.recording.log_state import count_of
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.files import read_json, regular_file
+from workbench.recording.servo_log.state import count_of
 
 Array = NDArray[np.float64]
 COUNT = 360 / 4096

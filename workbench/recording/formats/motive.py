@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_header import (
     Asset,
@@ -23,7 +24,6 @@ from workbench.recording.formats.numbers import Bytes, column, read_columns, sta
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.quaternions import from_euler
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 _BODIES = ("Rigid Body", "Bone")

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from workbench.robot import InputError
-from workbench.robot.numerals import number_of
-from workbench.robot.tables import is_binary, split_row
+from workbench.files import InputError
+from workbench.files.numerals import number_of
+from workbench.files.tables import is_binary, split_row
 
 _METRES = {"meters": 1.0, "metres": 1.0, "m": 1.0, "centimeters": 0.01, "centimetres": 0.01, "cm": 0.01,
            "millimeters": 0.001, "millimetres": 0.001, "mm": 0.001}

@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv as arrow_csv
 
+from workbench.files.reading import write_whole
 from workbench.recording.body_track import BodyTrack
-from workbench.robot.files import write_whole
 
 _UNITS = {"Meters": 1.0, "Centimeters": 100.0, "Millimeters": 1000.0}
 _DIGITS = 6  # as Motive writes

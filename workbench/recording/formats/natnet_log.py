@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from workbench.files import InputError
+from workbench.files.tables import is_binary, split_row
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.tables import is_binary, split_row
 
 _TURN = r"(rot(ation)?|quat(ernion)?|q|r|o(rientation)?)(_rs)?"
 _POSE = (r"(.*[ ./_])?((pos(ition)?|t|p|trans(lation)?)(_rs_r)?)?[ _./]?x", rf"(.*[ ./_])?{_TURN}[ _./]?x",
@@ -35,7 +35,7 @@ def matches(head: bytes) -> bool:
 
 def read(path: Path) -> Recording:
     """InputError that says what it looks like and what is wanted: which body of the robot this is, and when, nothing says."""
-    from workbench.robot.tables import plain_head
+    from workbench.files.tables import plain_head
 
     cells = _cells(plain_head(path))
     timed = any(re.fullmatch(r"(?i)(%?time.*|t|stamp|frame.*|secs?)", c) for c in cells)

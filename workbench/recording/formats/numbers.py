@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from pyarrow import compute as arrow_compute
 from pyarrow import csv as arrow_csv
 
-from workbench.robot import InputError
-from workbench.robot.errors import MistypedError
-from workbench.robot.files import MOST_TEXT, regular_file
-from workbench.robot.numerals import number_of
-from workbench.robot.tables import HEAD, plain_table, split_row
+from workbench.files import InputError
+from workbench.files.errors import MistypedError
+from workbench.files.numerals import number_of
+from workbench.files.reading import MOST_TEXT, regular_file
+from workbench.files.tables import HEAD, plain_table, split_row
 
 Array = NDArray[np.float64]
 Bytes = bytes | mmap.mmap

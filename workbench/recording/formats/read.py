@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from workbench.files import InputError
+from workbench.files.tables import plain_head
 from workbench.recording.formats.foreign import refusal
 from workbench.recording.formats.registry import RecordingFormat, format_of, format_of_folder, known_formats
-from workbench.recording.plausibility import checked
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.tables import plain_head
+from workbench.recording.servo_log.plausibility import checked
 
 
 def recording_of_take(path: Path, take: str) -> Path:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from workbench.files.plug_ins import of_folder, with_plug_ins
 from workbench.recording.recording import Recording
-from workbench.robot.plug_ins import of_folder, with_plug_ins
 
 ENTRY_POINT_GROUP = "workbench.formats"
 

@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.reading import parse_json, read_text, write_whole
 from workbench.motion.commands import Commands
 from workbench.recording.formats.log_commands import out_of_order
 from workbench.recording.formats.numbers import number_columns
 from workbench.recording.take import Take
-from workbench.robot import InputError
-from workbench.robot.files import parse_json, read_text, write_whole
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,12 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from workbench.files import InputError
+from workbench.files.tables import is_binary, split_row
 from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.tables import is_binary, split_row
 
 Array = NDArray[np.float64]
 _TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.IGNORECASE)

@@ -14,15 +14,15 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
+from workbench.files import InputError
+from workbench.files.reading import parse_json, read_text, regular_file
+from workbench.files.tables import plain_head
 from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
 from workbench.recording.formats.numbers import map_file, rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.joint_names import SO101_JOINTS as JOINTS
 from workbench.recording.joint_names import URDF_JOINTS
 from workbench.recording.recording import Recording
-from workbench.robot import InputError
-from workbench.robot.files import parse_json, read_text, regular_file
-from workbench.robot.tables import plain_head
 
 Array = NDArray[np.float64]
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}

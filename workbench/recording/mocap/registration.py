@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.joint_names import named_by_model
-from workbench.recording.log_state import count_of, count_that_stays, first_command, resolution, staying
 from workbench.recording.mocap.angles import Angles, joint_angles
 from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.pivots import base_origin, find_pivots
@@ -19,9 +19,10 @@ from workbench.recording.mocap.start import StartEstimate, find_start, lagged_re
 from workbench.recording.mocap.tracks import Tracks, capture_axes, check_assets, tracks_of
 from workbench.recording.mocap.yaw import YawEstimate, yaw_of
 from workbench.recording.recording import Measurement, Recording
+from workbench.recording.servo_log.state import count_of, count_that_stays, first_command, resolution, staying
 from workbench.recording.take import Take
 from workbench.recording.white_noise import white_noise
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 _SETTLED = 0.02  # [s] before the start that are not counted as rest

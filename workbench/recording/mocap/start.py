@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
-from workbench.robot import InputError
 
 Array = NDArray[np.float64]
 _LAG = 45.0

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.recording import quaternions as quat
 from workbench.recording.recording import Recording
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 FARTHEST = 1000.0

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, relative_rotation, seen_joints, tracks_of, turned
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
-from workbench.robot import InputError, RobotModel
+from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
 _LEAST = np.deg2rad(2.0)  # a joint that turns less says little about its axis

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import cached_by_content
+from workbench.files import InputError
+from workbench.files.reading import cached_by_content
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def _built(path: Path, source: Path) -> tuple[Any, Any, list[Any]]:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
-    from workbench.robot.resources import ConfigureParser
+    from workbench.files.resources import ConfigureParser
 
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)

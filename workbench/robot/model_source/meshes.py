@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import regular_file, write_whole
-from workbench.robot.resources import resource_dir
+from workbench.files import InputError
+from workbench.files.reading import regular_file, write_whole
+from workbench.files.resources import resource_dir
 
 READ = (".obj", ".gltf", ".glb", ".vtk")
 """By Drake as they are."""

@@ -13,8 +13,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import write_whole
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 from workbench.robot.model_source.meshes import READ, drake_mesh, find_mesh
 from workbench.robot.model_source.structure import check_structure
 from workbench.robot.model_source.urdf import sdf_of_urdf

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
 
 _RADIANS = 4 * math.pi
 """Limits beyond are degrees."""

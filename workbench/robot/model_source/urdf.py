@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from workbench.robot.errors import InputError
+from workbench.files import InputError
 from workbench.robot.model_source.xml_file import DRAKE
 
 _TYPES = {"revolute": "revolute", "continuous": "revolute", "fixed": "fixed", "prismatic": "prismatic"}

@@ -7,9 +7,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import regular_file
-from workbench.robot.numerals import number_of
+from workbench.files import InputError
+from workbench.files.numerals import number_of
+from workbench.files.reading import regular_file
 
 MOST_XML = 32 << 20
 """Largest description [bytes]; a robot of a hundred links has 0.1 MB."""

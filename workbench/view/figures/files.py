@@ -8,8 +8,8 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from workbench.robot.errors import InputError
-from workbench.robot.files import write_whole
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 from workbench.view.figures.style import styled
 
 LARGEST_SVG = 200_000

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.compare.footfalls import foot_phases
+from workbench.files import InputError
 from workbench.gait.certificate import CLAIM, PUPPY_CLAIM, Certificate
 from workbench.gait.limits import each
 from workbench.gait.measure import GaitMeasure, measure
@@ -17,7 +18,7 @@ from workbench.gait.optimize import WALK, Optimized
 from workbench.gait.table import GaitTable
 from workbench.motion import load_motion
 from workbench.recording.take import Take
-from workbench.robot import PUPPY, InputError, RobotModel, data_file
+from workbench.robot import PUPPY, RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import (
     body_attitude,

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
-from workbench.robot.files import read_text, write_whole
+from workbench.files.reading import read_text, write_whole
 from workbench.robot.model import RobotModel
 from workbench.view.figures import encode
 

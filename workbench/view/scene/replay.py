@@ -14,8 +14,8 @@ from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, MeshcatCone, M
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
+from workbench.files.reading import write_whole
 from workbench.recording.take import Take
-from workbench.robot.files import write_whole
 from workbench.robot.model import GRAVITY, RobotModel
 from workbench.view.figures.style import ACCENT, RECORDED, SIMULATED, rgb
 from workbench.view.playback import Playback, common_span, names_of, play, since_start

@@ -8,12 +8,13 @@ from typing import Literal
 
 from workbench.compare.compare_files import recorded_take
 from workbench.compare.session import Base
+from workbench.files import InputError
+from workbench.files.yaml_file import read_yaml
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
 from workbench.recording.formats.rollout_table import load_rollout
 from workbench.recording.take import Take
-from workbench.robot import ROBOTS, InputError, RobotModel
-from workbench.robot.yaml_file import read_yaml
+from workbench.robot import ROBOTS, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
 
@@ -33,7 +34,7 @@ def subject_of(name: str) -> Literal["model", "session", "take"]:
     return "take"
 
 
-def take_of(name: str, model: RobotModel, base: Base, cycles: int, progress: Callable[[str, float | None], None]) -> Take:
+def take_of(name: str, model: RobotModel, base: Base, cycles: int | None, progress: Callable[[str, float | None], None]) -> Take:
     """A rollout as it is, a recording from its first motion on, a motion simulated. InputError names the file and the problem."""
     kind = file_kind(name)
     if kind == "rollout":
@@ -42,4 +43,5 @@ def take_of(name: str, model: RobotModel, base: Base, cycles: int, progress: Cal
         return recorded_take(name, model, base)
     model.check_base(floating=base == "free")
     simulation = Simulation(model, SimulationConfig(base=base))
-    return play_motion(simulation, load_motion(name, model), cycles, progress=lambda done: progress("simulating", done))
+    motion = load_motion(name, model)
+    return play_motion(simulation, motion, motion.often(cycles, 3), progress=lambda done: progress("simulating", done))

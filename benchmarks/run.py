@@ -1,0 +1,110 @@
+"""All figures in one run, with the machine they were measured on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from benchmarks import compiled, drives, engine, reader
+from benchmarks.diagnose_time import diagnose_time
+from benchmarks.figure import Figure
+from benchmarks.sysid import fit_against_mujoco_sysid
+from workbench.motion import load_motion
+from workbench.robot import data_file, puppy_model
+
+STEP = 1e-3
+SEED = 0
+CYCLES = 4
+PACKAGES = ("drake", "mujoco", "numpy", "pandas", "pyarrow", "joblib", "numba")
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured: seconds of motion, turns, step [s] that counts as converged, frames, rollouts."""
+
+    duration: float = 1.5
+    walk: float = 0.5
+    turns: int = 9
+    finest: float = 1e-4
+    frames: int = 72_000
+    readings: int = 7
+    rollouts: int = 64
+    batches: int = 3
+
+
+QUICK = Size(duration=0.1, walk=0.1, turns=1, finest=5e-4, frames=2000, readings=1, rollouts=4, batches=1)
+"""To see that everything runs; the figures mean nothing."""
+
+
+LOG, LOG_QUICK, LOG_DIAGNOSED = 4.0, 0.3, 2.4
+"""Seconds of motion in the logs that are fitted, and in the one that is diagnosed."""
+TURNS = 2
+
+
+def run_bench(quick: bool = False, progress: Callable[[str], None] = lambda what: None) -> dict[str, Any]:
+    """Measures every figure on the puppy's walk, then what fits cost, and returns the JSON of `workbench bench`."""
+    began, load = time.perf_counter(), os.getloadavg()[0]
+    figures = _measure(QUICK if quick else Size(), progress) + _fits(quick, progress)
+    warnings = ["quick: too little was measured for the figures to mean anything"] if quick else []
+    if load > 1:
+        warnings.append(f"load average {load:.1f} at the start: other work falsifies what is measured in wall time, the batch "
+                        "and the reader")
+    return {"format": 1, "quick": quick, "machine": _machine(load), "versions": _versions(), "seed": SEED, "warnings": warnings,
+            "figures": {f.name: f.to_json() for f in figures}, "seconds": time.perf_counter() - began}
+
+
+def _measure(size: Size, progress: Callable[[str], None]) -> list[Figure]:
+    model = puppy_model()
+    walk = load_motion(data_file("robotis_walk.csv"), model).commands(CYCLES)
+    progress("batch of rollouts on two processes against one")  # first, while no worker process is up
+    batch = drives.batch_on_two_processes(model, walk, size.walk, size.rollouts, size.batches, SEED)
+    progress("compiled rollouts on two threads against one")
+    threads = compiled.batch_on_two_threads(model, walk, size.walk, size.rollouts, size.batches, SEED)
+    progress("compiled steps against Drake's")
+    steps = compiled.compiled_against_drake(model, walk, size.duration, STEP, size.turns)
+    progress("station against bare plant")
+    figures = drives.station_against_bare_plant(model, walk, size.duration, STEP, size.turns)
+    for base, duration in (("fixed", size.duration), ("free", size.walk)):
+        progress(f"station against MuJoCo, base {base}")
+        exact = drives.converged(model, walk, duration, base, size.finest)
+        figures.append(engine.station_against_mujoco(model, walk, duration, exact, size.finest, STEP, size.turns))
+        figures.append(compiled.compiled_against_mujoco(model, walk, duration, exact, size.finest, STEP, size.turns))
+    progress("fast servo and larger steps")
+    exact = drives.converged(model, walk, size.duration, "fixed", size.finest)
+    figures.append(drives.fast_servo_and_larger_steps(model, walk, size.duration, exact, size.turns))
+    progress("Motive reader against pandas")
+    return [*steps, *figures, threads, reader.reader_against_pandas(size.frames, size.readings, SEED), batch]
+
+
+def _fits(quick: bool, progress: Callable[[str], None]) -> list[Figure]:
+    progress("fit against MuJoCo's system identification")
+    fit = fit_against_mujoco_sysid(LOG_QUICK, 1, SEED, iterations=1) if quick else fit_against_mujoco_sysid(LOG, TURNS, SEED)
+    progress("where a diagnosis spends its time")
+    return [fit, diagnose_time(None if quick else LOG_DIAGNOSED, SEED)]
+
+
+def _machine(load: float) -> dict[str, Any]:
+    return {"processor": _processor(), "cores": os.cpu_count(), "system": platform.platform(), "load_average_at_start": load}
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as f:
+            return next((line.partition(":")[2].strip() for line in f if line.startswith("model name")), platform.machine())
+    except OSError:
+        return platform.processor() or platform.machine()
+
+
+def _versions() -> dict[str, str]:
+    out = {"workbench": version("drake-workbench"), "python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            out[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return out

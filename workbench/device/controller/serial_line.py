@@ -1,0 +1,64 @@
+"""A serial line to a controller, by pyserial."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import serial
+from serial.tools import list_ports
+
+from workbench.files import InputError
+
+
+class SerialLine:
+    """8N1 at a rate, as `Line` wants it; InputError where the port cannot be opened."""
+
+    def __init__(self, port: str, rate: int) -> None:
+        try:
+            self._port = serial.Serial(port, rate, timeout=0, write_timeout=10, exclusive=True)
+        except (serial.SerialException, OSError, ValueError) as e:
+            there = [p.device for p in list_ports.comports()]
+            raise InputError(port, f"cannot be opened ({_reason(e)}); serial ports here: {' '.join(there) or 'none'}") from None
+
+    def write(self, data: bytes) -> None:
+        """Sends, and waits until the operating system has taken it."""
+        self._guard(lambda: self._port.write(data))
+
+    def read(self, seconds: float) -> bytes:
+        """What comes within this time, or as soon as something has come."""
+        until = time.monotonic() + seconds
+        while True:
+            data: bytes = self._guard(lambda: self._port.read(4096))
+            if data or time.monotonic() >= until:
+                return data
+            time.sleep(0.002)
+
+    def close(self) -> None:
+        """Gives the port back."""
+        self._port.close()
+
+    def _guard(self, call):  # type: ignore[no-untyped-def]  # of whatever it calls
+        """An adapter that is pulled out raises termios.error, which is no OSError."""
+        try:
+            return call()
+        except serial.SerialException as e:
+            raise OSError(5, _reason(e)) from None
+        except Exception as e:
+            if type(e).__module__ != "termios":
+                raise
+            raise OSError(5, "the adapter is gone") from None
+
+
+def _reason(e: Exception) -> str:
+    number = getattr(e, "errno", None)
+    return {2: "no such port", 13: "no permission: are you in the group dialout?", 16: "in use by another program"}.get(
+        number or 0, " ".join(str(e).split()))
+
+
+def default_port() -> str:
+    """The only serial port there is; InputError that lists them where there is none or more."""
+    there = [p.device for p in list_ports.comports() if "USB" in p.device or "ACM" in p.device or Path(p.device).suffix == ""]
+    if len(there) != 1:
+        raise InputError("--port", f"say which serial port the controller is on; here: {' '.join(there) or 'none'}")
+    return str(there[0])

@@ -1,0 +1,201 @@
+"""The binary table: what the controller plays, compiled into its program or sent to it (layout in docs/robot.md)."""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.files import InputError
+from workbench.motion import PoseTable
+from workbench.robot import BUS_IDS, RobotModel, bus_ids
+from workbench.robot.ranges import joint_ranges
+from workbench.robot.servo_units import AX12A
+
+MAGIC = b"WBTB"
+VERSION = 1
+STOPS = 1
+AX12A_NUMBER = 12
+CENTRE, LARGEST = AX12A.centre, AX12A.highest
+MOST_JOINTS = 26
+"""A Sync Write of goal and speed stays below the AX-12A's receive buffer of 143 bytes."""
+MOST_BYTES = 4096
+"""Longest table that the controller's program has room for, over a link or built in (firmware/core/limits.h)."""
+SHORTEST_MS, LONGEST_MS = 10, 600_000
+"""Dwells: a Sync Write, its verification and a repair have to fit in; longer than ten minutes is a mistake [ms]."""
+
+_HEAD = struct.Struct("<4sBBHHHI")
+_JOINT = struct.Struct("<BBHHHHH")
+
+
+@dataclass(frozen=True)
+class JointBounds:
+    """What the controller holds a joint to: bus ID, model number of its servo, goals from `low` to `high`, moving speed up to
+    `fastest`, and where neutral is [all in the servo's own counts]."""
+
+    bus_id: int
+    model_number: int = AX12A_NUMBER
+    low: int = 0
+    high: int = LARGEST
+    fastest: int = LARGEST
+    neutral: int = CENTRE
+
+
+@dataclass(frozen=True)
+class TableFile:
+    """A pose table with what makes it safe to play. joints: as many as the table's columns. cycles: how many, where `stops`;
+    else the table goes on until it is stopped or another comes."""
+
+    table: PoseTable
+    joints: tuple[JointBounds, ...]
+    cycles: int = 0
+    stops: bool = False
+
+
+def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | None = None) -> tuple[JointBounds, ...]:
+    """Bounds of a model's joints in counts, no narrower than the table's own goals (`export` has checked it, or was forced).
+
+    numbers: model number of each joint's servo (default: the AX-12A's). InputError for a table that the controller's program
+    cannot play.
+    """
+    other = unplayable(table)
+    if other:
+        raise InputError(table.source, other)
+    ids, ranges = bus_ids(model), joint_ranges(model)
+    bounds = []
+    for i, joint in enumerate(table.joints):
+        servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)
+        low, high = (min(max(round(CENTRE + limit / AX12A.count), 0), LARGEST) if math.isfinite(limit) else edge
+                     for limit, edge in zip(limits, (0, LARGEST)))
+        no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
+        bounds.append(JointBounds(
+            ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
+            low=min(low, CENTRE, int(table.goals[:, i].min())), high=max(high, CENTRE, int(table.goals[:, i].max())),
+            fastest=max(1, min(LARGEST, round(no_load / AX12A.speed_unit)), int(table.speeds[:, i].max()))))
+    return tuple(bounds)
+
+
+def unplayable(table: PoseTable) -> str:
+    """Why the controller's program cannot play a table, "" where it can: another servo family, or more poses than fit."""
+    return other_family(table) or too_long(len(table.joints), len(table))
+
+
+def other_family(table: PoseTable) -> str:
+    """Which servo the controller's program does not speak to, "" where all are of the AX-12A's family, as it needs them."""
+    others = [(j, u.family) for j, u in zip(table.joints, table.units) if u != AX12A]
+    if not others:
+        return ""
+    joint, family = others[0]
+    return f"joint {joint} has a servo of the family {family}; the CM-530's program plays the AX-12A's alone"
+
+
+def too_long(joints: int, poses: int) -> str:
+    """Why so many poses of so many joints do not fit into the controller, "" where they do."""
+    size = table_bytes(joints, poses)
+    if size <= MOST_BYTES:
+        return ""
+    return (f"{poses} poses of {joints} joints make a table of {size} bytes; the CM-530's program takes {MOST_BYTES} "
+            f"({most_poses(joints)} poses)")
+
+
+def table_bytes(joints: int, poses: int) -> int:
+    """Size of a binary table [bytes]."""
+    return _HEAD.size + _JOINT.size * joints + (4 + 4 * joints) * poses + 4
+
+
+def most_poses(joints: int) -> int:
+    """How many poses of so many joints the controller's program takes in one table."""
+    return max(MOST_BYTES - table_bytes(joints, 0), 0) // (table_bytes(joints, 1) - table_bytes(joints, 0))
+
+
+def encode_table(file: TableFile) -> bytes:
+    """The bytes of a table; InputError where the format cannot hold it."""
+    table = file.table
+    flags = STOPS if file.stops else 0
+    if len(file.joints) != len(table.joints):
+        raise InputError(table.source, f"bounds of {len(file.joints)} joints for {len(table.joints)} columns")
+    if len(table) > 0xFFFF or not 0 <= file.cycles <= 0xFFFF:
+        raise InputError(table.source, f"{len(table)} poses, {file.cycles} cycles: expected at most 65535 of each")
+    size = table_bytes(len(file.joints), len(table))
+    parts = [_HEAD.pack(MAGIC, VERSION, len(file.joints) & 0xFF, len(table), flags, file.cycles, size)]
+    try:
+        parts += [_JOINT.pack(j.bus_id, 0, j.model_number, j.low, j.high, j.fastest, j.neutral) for j in file.joints]
+        for dwell, goals, speeds in zip(table.dwells_ms, table.goals, table.speeds):
+            parts.append(struct.pack("<I", dwell) + np.column_stack([goals, speeds]).astype("<u2").tobytes())
+    except struct.error as e:
+        raise InputError(table.source, f"a bound or dwell does not fit the binary table ({e})") from None
+    body = b"".join(parts)
+    data = body + struct.pack("<I", zlib.crc32(body))
+    decode_table(data, source=table.source)  # what the controller would refuse is never written
+    return data
+
+
+def decode_table(data: bytes, names: Mapping[int, str] | None = None, source: str = "table") -> TableFile:
+    """The table in these bytes; InputError says what is wrong with them, exactly where the controller's program refuses them.
+
+    names: joint by bus ID (default: the puppy's; others are called `id7`).
+    """
+    if len(data) < _HEAD.size:
+        raise InputError(source, f"{len(data)} bytes: too short for a table")
+    magic, version, n, poses, flags, cycles, size = _HEAD.unpack_from(data)
+    if magic != MAGIC:
+        raise InputError(source, f"starts with {magic!r}, expected {MAGIC!r}")
+    if version != VERSION:
+        raise InputError(source, f"version {version}; expected {VERSION}")
+    if not 1 <= n <= MOST_JOINTS or not poses:
+        raise InputError(source, f"{poses} poses of {n} joints; expected at least one pose of 1 to {MOST_JOINTS} joints")
+    if flags & ~STOPS or (flags & STOPS and not cycles):
+        raise InputError(source, f"flags {flags:#x} with {cycles} cycles mean nothing")
+    if size != len(data) or size != table_bytes(n, poses):
+        takes = table_bytes(n, poses)
+        raise InputError(source, f"{len(data)} bytes, its head says {size}; {poses} poses of {n} joints take {takes}")
+    joints = _joints(data, n, source)
+    if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
+        raise InputError(source, "its CRC-32 does not fit its content")
+    table = _poses(data, joints, poses, names or {v: k for k, v in BUS_IDS.items()}, source)
+    return TableFile(table, joints, cycles, bool(flags & STOPS))
+
+
+def read_table_file(path: str | Path, names: Mapping[int, str] | None = None) -> TableFile:
+    """Reads a binary table; InputError where it cannot be read or is none."""
+    try:
+        data = Path(path).read_bytes()
+    except OSError as e:
+        raise InputError(path, f"cannot be read ({e.strerror})") from None
+    return decode_table(data, names, str(path))
+
+
+def _joints(data: bytes, n: int, source: str) -> tuple[JointBounds, ...]:
+    joints: list[JointBounds] = []
+    for k in range(n):
+        bus_id, zero, number, low, high, fastest, neutral = _JOINT.unpack_from(data, _HEAD.size + _JOINT.size * k)
+        place = f"joint {k + 1}"
+        if bus_id > 253 or zero or bus_id in [j.bus_id for j in joints]:
+            raise InputError(source, f"{place}: bus ID {bus_id} is above 253, or there twice, or the byte after it is not 0")
+        if not low <= neutral <= high <= LARGEST or not 1 <= fastest <= LARGEST:
+            raise InputError(source, f"{place}: bounds {low} to {high} about {neutral}, speeds up to {fastest}, make no sense")
+        joints.append(JointBounds(bus_id, number, low, high, fastest, neutral))
+    return tuple(joints)
+
+
+def _poses(data: bytes, joints: Sequence[JointBounds], poses: int, names: Mapping[int, str], source: str) -> PoseTable:
+    n = len(joints)
+    rows = np.frombuffer(data, np.uint8, (4 + 4 * n) * poses, _HEAD.size + _JOINT.size * n).reshape(poses, -1)
+    dwells = rows[:, :4].copy().view("<u4")[:, 0].astype(np.int64)
+    counts = rows[:, 4:].copy().view("<u2").reshape(poses, n, 2).astype(np.int64)
+    goals, speeds = counts[..., 0], counts[..., 1]
+    for k, dwell in enumerate(dwells):
+        if not SHORTEST_MS <= dwell <= LONGEST_MS:
+            raise InputError(source, f"pose {k + 1}: dwell of {dwell} ms; the controller plays {SHORTEST_MS} to {LONGEST_MS} ms")
+        for i, joint in enumerate(joints):
+            place, goal, speed = f"pose {k + 1}, bus ID {joint.bus_id}", goals[k, i], speeds[k, i]
+            if not joint.low <= goal <= joint.high:
+                raise InputError(source, f"{place}: goal {goal} is outside {joint.low} to {joint.high}")
+            if speed > joint.fastest:
+                raise InputError(source, f"{place}: speed {speed} is above {joint.fastest}")
+    return PoseTable(tuple(names.get(j.bus_id, f"id{j.bus_id}") for j in joints), goals, speeds, dwells, source)

@@ -1,0 +1,209 @@
+"""What is doubtful in the files that a run uses, against the robot they are of: said by `inspect` and by every verb alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from workbench.compare.options import FILES
+from workbench.compare.prediction import read_start
+from workbench.compare.session import PredictSpec, Session, TakeSpec
+from workbench.compare.session_takes import capture_yaw, read_takes, readable
+from workbench.effects.apply import resolved
+from workbench.files import InputError
+from workbench.files.errors import MistypedError
+from workbench.motion import Motion, load_motion
+from workbench.recording.formats.read import read_recording
+from workbench.recording.mocap.mending import mend
+from workbench.recording.mocap.tracks import check_assets, tracks_of
+from workbench.recording.recording import Recording
+from workbench.recording.servo_log.plausibility import beyond_range
+from workbench.recording.take_from import named_by_model
+from workbench.robot import RobotModel
+
+_ROUTINE = " unseen in "
+
+
+@dataclass(frozen=True)
+class SessionCheck:
+    """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
+    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves. refused: why no
+    verb can use the takes, or not together, with the file's name."""
+
+    problems: Mapping[str, Sequence[str]]
+    longest: float
+    longest_name: str
+    damaged: frozenset[str] = frozenset()
+    refused: str | None = None
+
+    @property
+    def warnings(self) -> list[str]:
+        """A line for each file with problems that are not routine, as gaps of cameras are, damaged takes among them."""
+        out = []
+        for of, lines in self.problems.items():
+            bad = [] if of == "takes" and self.refused else serious(lines)
+            if of in self.damaged:
+                out += [f"{of} left out: {bad[0]}"] if of.startswith("take ") else []
+            elif bad:
+                out.append(f"{of}: {summed_up(bad)}")
+        return out
+
+
+def session_problems(session: Session) -> list[str]:
+    """A line for each thing that is doubtful in a session."""
+    return [f"{of}: {text}" for of, lines in session_check(session).problems.items() for text in lines]
+
+
+def session_check(session: Session) -> SessionCheck:
+    """What is doubtful in a session: its robot, its servos, each of its takes and predictions, every file of them read and
+    checked against the robot. A damaged take, which the verbs leave out, is one of them."""
+    found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
+    seconds = {"": 0.0}
+    damaged, mistyped = set(), ""
+    for of, entries in (("take", session.takes), ("predict", session.predict)):
+        for entry in entries:
+            name = f"{of} '{entry.name}'"
+            try:
+                found[name], seconds[name] = (_take_problems(entry, session) if isinstance(entry, TakeSpec)
+                                              else _prediction_problems(entry, session))
+                if entry.servos:
+                    found[name] += sorted({text for servo in session.model_of(entry).servos.values() for text in servo.doubts})
+            except InputError as e:
+                found[name] = [str(e)]
+                damaged.add(name)
+                if isinstance(e, MistypedError):
+                    mistyped = mistyped or f"{session.path}: {name}: {e}"
+    usable = not mistyped and any(f"take '{t.name}'" not in damaged for t in session.takes)
+    refused = _no_yaw(session) if usable else None
+    if refused:
+        found["takes"] = [refused]
+    if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
+        found["predict"] = ["the yaw of the capture cannot be found from takes: it is estimated from where the bodies stand at "
+                            "the start, to some degrees; give the session's `yaw` [deg], or a captured take"]
+    longest = max(seconds, key=lambda name: seconds[name])
+    doubtful = {of: lines for of, lines in found.items() if lines}
+    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), mistyped or refused)
+
+
+def _no_yaw(session: Session) -> str | None:
+    """Why the takes that cameras saw do not tell where the robot headed; None where they do, or the session does."""
+    try:
+        capture_yaw(session, read_takes(session)[0])
+    except InputError as e:
+        return str(e)
+    return None
+
+
+def model_problems_of(model: RobotModel) -> list[str]:
+    """What is doubtful in a robot's description, its servos' constants and its effects, a line each."""
+    out = list(model.held_problems if model.held else model.problems)
+    doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
+    out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
+    given = set(model.servos)
+    lacking = [j for j in model.joints if j not in given]
+    if given and lacking:
+        out.append(f"servos: none is given for {', '.join(lacking)}; taken as an AX-12A")
+    list(resolved(model))  # InputError where an effect is not what it says
+    return out
+
+
+def recording_problems(path: str | Path, recording: Recording, model: RobotModel | None = None) -> list[str]:
+    """What is doubtful in a recording, what is routine last; against a `model`'s joints, links and ranges where one is given.
+    InputError where it cannot be of the model."""
+    out = list(recording.problems)
+    if recording.sensing == "mocap":
+        if not recording.rigid_bodies:
+            found = f"only {len(recording.markers)} markers" if recording.markers else "nothing solved"
+            out.append(f"no rigid bodies, {found}: no verb can use it; solve the robot's rigid bodies in Motive and export again")
+        else:
+            if model is not None:
+                check_assets(recording, model)
+            out += mend(tracks_of(recording), model).problems
+    elif model is not None:
+        named = named_by_model(recording, model)
+        frames = model.kinematics.frames
+        out += beyond_range(named, {j: (frames[j].lower, frames[j].upper) for j in model.joints})
+    return sorted(dict.fromkeys(out), key=lambda text: _ROUTINE in text)
+
+
+def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:
+    """What is doubtful in a motion that is played `cycles` times (None: as often as it says itself), a line each."""
+    jumps = motion.often(cycles) > 1 and not motion.closes
+    out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
+    if (text := slow_poses(motion) or long_work(motion.seconds(1))) is not None:
+        out.append(text)
+    if np.abs(motion.angles).max() < FILES.smallest_motion and np.ptp(motion.angles) > 0:
+        most = np.rad2deg(np.abs(motion.angles).max())
+        out.append(f"no joint leaves {most:.2g} deg: are the angles in radians? (a table has degrees)")
+    if np.abs(motion.angles).max() > FILES.largest_angle:
+        most = np.rad2deg(np.abs(motion.angles).max())
+        out.append(f"a joint goes to {most:.4g} deg from its servo's centre: are the angles in counts? (a table has degrees)")
+    try:
+        motion.as_table()
+    except InputError as e:
+        out.append(e.problem)
+    return out
+
+
+def long_work(seconds: float) -> str | None:
+    """A line where so much is to be simulated that it was probably a slip."""
+    if seconds <= FILES.longest:
+        return None
+    return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: a slip in times, frames or cycles?"
+
+
+def slow_poses(motion: Motion) -> str | None:
+    """A line where poses follow each other so slowly that their times are not in seconds."""
+    apart = float(np.median(np.diff(motion.times)))
+    if apart <= FILES.slowest_pose:
+        return None
+    return (f"a pose every {apart:.4g} s, {motion.seconds(1):.6g} s in all: are the times in milliseconds, a slip? "
+            "(a table has seconds)")
+
+
+def serious(problems: Sequence[str]) -> list[str]:
+    """Those that are not routine, as gaps of cameras are."""
+    return [text for text in problems if _ROUTINE not in text]
+
+
+def summed_up(problems: Sequence[str], most: int = 3) -> str:
+    """Several problems in one line, the first few in full."""
+    more = f" (and {len(problems) - most} more: see workbench inspect)" if len(problems) > most else ""
+    return "; ".join(problems[:most]) + more
+
+
+def _take_problems(take: TakeSpec, session: Session) -> tuple[list[str], float]:
+    model = session.model_of(take)
+    recording = readable(take.recording, model)
+    out = recording_problems(take.recording, recording, model)
+    commands = take.commands(model) or recording.commands
+    if commands is None:
+        raise InputError(take.recording, "no motion is given, and the recording has no commands")
+    if take.motion is not None:
+        out = [f"{take.motion}: {text}" for text in motion_problems(load_motion(take.motion, model), take.cycles)] + out
+    if np.ptp(commands.goals, axis=0).max() == 0 and len(commands.times) > 1:
+        out.insert(0, "its commands never change")
+    seconds = float(recording.time[-1] - recording.time[0])
+    if take.starts_at is not None and take.starts_at > recording.time[-1]:
+        out.insert(0, f"starts_at: {take.starts_at:g} s is after the recording's end, {recording.time[-1]:g} s")
+    return ([text] if (text := long_work(seconds)) else []) + out, seconds
+
+
+def _prediction_problems(entry: PredictSpec, session: Session) -> tuple[list[str], float]:
+    model = session.model_of(entry)
+    if entry.commands is not None:
+        log = named_by_model(read_recording(entry.commands), model)
+        seconds = float(log.time[-1] - log.time[0])
+        return ([text] if (text := long_work(seconds)) else []) + list(log.problems), seconds
+    assert entry.start is not None
+    assert entry.motion is not None
+    start = read_start(entry.start)
+    check_assets(start, model)
+    seconds = (entry.frames or 0) / start.rate
+    motion = load_motion(entry.motion, model)
+    motion.commands(entry.cycles)
+    out = [f"{entry.motion}: {text}" for text in motion_problems(motion, entry.cycles)]
+    return ([text] if (text := long_work(seconds)) else []) + out, seconds
