@@ -36,6 +36,8 @@ Estimator = Literal["end of travel", "play across the axis", "turn of an asset a
 """Ways to read an effect off the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
+REACH = 2.0
+"""Times what one in a hundred passes: further than that no number plausibly goes."""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 
@@ -47,7 +49,9 @@ class Parameter:
     them. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
     takes the place of a value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording
     goes below, as every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left
-    out; empty: it is always given."""
+    out; empty: it is always given. seldom_beyond: what one servo (or robot) in a hundred passes that has the effect at all, of a
+    vector its length, with the reason beside it; priors and reach follow from it. logarithmic: a ratio whose size is its
+    logarithm, so that 2 and 1/2 are as far."""
 
     name: str
     unit: str
@@ -60,12 +64,18 @@ class Parameter:
     replaces: bool = False
     resolution: float = 0.0
     option: str = ""
+    seldom_beyond: float = math.nan
+    logarithmic: bool = False
 
     def typical_beside(self, neutral: float) -> float:
         """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
         that is so near, or less, that the step between them would show nothing of this, one beyond."""
         near = self.replaces and self.typical > (1 - NEAR) * neutral
         return BEYOND * neutral if near else self.typical
+
+    def distance(self, value: float, neutral: float) -> float:
+        """How far a value is from neutral: of a ratio the size of its logarithm."""
+        return abs(math.log(value / neutral)) if self.logarithmic else abs(value - neutral)
 
 
 @dataclass(frozen=True)
@@ -148,9 +158,16 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """How far its numbers may lie from neutral on this robot, in the units of docs/formats.md, a vector by its length: a
-        search moves no number further, and of servo logs it refutes what wants to go there."""
-        return math.inf
+        """How far its numbers may lie from neutral on this robot (`Parameter.distance`), in the units of docs/formats.md, a
+        vector by its length: a search moves no number further, and of servo logs it refutes what wants to go there. REACH times
+        what one in a hundred passes, where all parameters say that; an effect that vanishes at infinity has no end."""
+        neutral = iter(self.neutral(model))
+        away = []
+        for p in self.parameters:
+            at = [next(neutral) for _ in range(3 if p.vector else 1)]
+            if not p.shapes:
+                away.append(p.distance(p.seldom_beyond, 0.0 if p.vector else at[0]))
+        return REACH * max(away) if away and all(map(math.isfinite, away)) else math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         """Changes the robot's SDF."""

@@ -16,7 +16,8 @@ ZERO_SD = math.radians(1.15)
 it by eye."""
 
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
-         "reflected_inertia": "kg m^2", ZERO: "rad"}
+         "reflected_inertia": "kg m^2", "goal_delay": "s", "goal_ramp": "deg/s", "minimum_duty": "1", "dead_zone": "deg",
+         "command_filter": "s", "derivative_gain": "s/rad", "load_friction": "1", ZERO: "rad"}
 """The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
 apart."""
 
@@ -25,10 +26,7 @@ def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncer
     """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
     tells a zero."""
     servo = model.servo(joint)
-    shares = {
-        "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),
-        "back_emf": servo.share_known("no_load_speed"), "coulomb_friction": servo.share_known("coulomb_friction"),
-        "viscous_friction": servo.share_known("viscous_friction"), "reflected_inertia": servo.share_known("reflected_inertia")}
+    shares = {name: servo.share_known(name) for name in UNITS if name != ZERO}
     out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and nominal_value(servo, name) > 0]
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 

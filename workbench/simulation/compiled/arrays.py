@@ -59,7 +59,8 @@ class Servos(NamedTuple):
     sag (a,): volts lost for each servo at full duty, by term; supply (m,) [V]. fade [1/s]. sticking (b, m), speed (b,):
     friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it
     at rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates.
-    lopsided (d, m): shares by which friction is more forwards, by term."""
+    lopsided (d, m): shares by which friction is more forwards, by term. derivative [duty per rad/s], ramp [rad/s], lag [s] (m,):
+    of the law."""
 
     joint: Ints
     zero: Array
@@ -70,6 +71,9 @@ class Servos(NamedTuple):
     back_emf: Array
     viscous: Array
     coulomb: Array
+    derivative: Array
+    ramp: Array
+    lag: Array
     terms: bool
     varies: bool
     most: Array
@@ -141,14 +145,16 @@ class Schedule(NamedTuple):
 
 class State(NamedTuple):
     """Changed by a run. base (7,): quaternion wxyz and position of the base in W; q (n,), v (nv,); reference (m,): the ramp;
-    goal, reach (m,): of the command, and how far the ramp goes in a step; on (m,). memory (4, m): velocity, what is known of the
-    load, load and friction of the step before; stepped (1,): 1 where there was one."""
+    goal, reach (m,): of the command, and how far the ramp goes in a step; lagging (m,): the goal behind its filter; on (m,).
+    memory (4, m): velocity, what is known of the load, load and friction of the step before; stepped (1,): 1 where there was
+    one."""
 
     base: Array
     q: Array
     v: Array
     reference: Array
     goal: Array
+    lagging: Array
     reach: Array
     on: NDArray[np.bool_]
     memory: Array
