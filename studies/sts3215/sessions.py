@@ -15,8 +15,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from workbench.robot import InputError
-from workbench.robot.files import write_whole
+from workbench.files import InputError
+from workbench.files.reading import write_whole
 
 Array = NDArray[np.float64]
 Entry = dict[str, Any]
@@ -25,8 +25,12 @@ DUTY_PER_UNIT = 0.16489
 """Duty per radian of position error for each unit of the firmware's position gain, as the logs' authors state it."""
 GAINS, PROGRAMMES = (8, 16, 32), ("lift_and_drop", "sin_sin")
 SERVO = {"model": "STS3215", "stall_torque": 2.94, "no_load_speed": 4.71, "rated_voltage": 12.0, "supply_voltage": 12.0,
-         "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278}
-"""Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1)."""
+         "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278,
+         "minimum_duty": {"value": 0.015, "sd": 0.0075}, "dead_zone": {"value": 0.0879, "sd": 0.044},
+         "goal_delay": {"value": 0.02, "sd": 0.01}, "goal_ramp": {"value": 299.0, "sd": 15.0},
+         "load_friction": {"value": 0.3, "sd": 0.18}, "torque_tolerance": 0.5, "back_emf_tolerance": 0.5}
+"""Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1);
+the law, and how well it is known, as in data/servos/sts3215.yaml, with the default goal speed, 3400 counts/s."""
 SDF = """<?xml version="1.0"?>
 <sdf version="1.9"><model name="sts3215_rig">
 <link name="stand"/>
@@ -58,7 +62,8 @@ class Rig:
         return SDF.format(arm=ARM, joint=JOINT, mass=mass, z=-z, about_centre=self.inertia - mass * z * z)
 
 
-RIGS = {r.name: r for r in (Rig("arm150_0.741kg", 0.741, 0.150, 0.018793, 1.12685), Rig("arm150_0.969kg", 0.969, 0.150, 0.024550, 1.46192),
+RIGS = {r.name: r for r in (Rig("arm150_0.741kg", 0.741, 0.150, 0.018793, 1.12685),
+                            Rig("arm150_0.969kg", 0.969, 0.150, 0.024550, 1.46192),
                             Rig("arm100_0.741kg", 0.741, 0.100, 0.009273, 0.74437))}
 
 

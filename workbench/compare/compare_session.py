@@ -23,7 +23,6 @@ from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.steady import BaseStates
 
-
 Array = NDArray[np.float64]
 
 
@@ -106,7 +105,8 @@ def _instants(run: Run, config: SimulationConfig) -> Array | None:
     if run.base != "fixed" or run.duration is None:
         return None
     lead = 0.0 if run.start is not None else COMPARE.lead
-    return np.arange(-round(lead / config.logged_every), math.floor(run.duration / config.logged_every + 1e-6) + 1) * config.logged_every
+    rows = np.arange(-round(lead / config.logged_every), math.floor(run.duration / config.logged_every + 1e-6) + 1)
+    return np.asarray(rows * config.logged_every, dtype=float)
 
 
 def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:

@@ -31,6 +31,9 @@ Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measure
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
 """Effects that do nearly the same, until data separate them: where no member is sure, the family may be."""
+Tie = Literal["gravity against torque", "less torque at full duty"]
+"""What servo logs tell as one number: angles do not change if all torques and inertias grow alike, so that only gravity over
+torque is known; and a torque that ends early, bends or sags with duty does the same."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
 """Ways to read an effect off the recordings (workbench/identify/estimators)."""
@@ -121,6 +124,8 @@ class Effect:
     engines are."""
     includes: ClassVar[tuple[str, ...]] = ()
     """Effects at the same place whose freedom it has, so that these say nothing beside it."""
+    tied: ClassVar[Tie | None] = None
+    """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
     steady_pull: ClassVar[bool] = False
     """Whether it pulls at the robot with a steady force: of several such, beside the one the others only make up for how roughly
     that was fitted."""

@@ -38,8 +38,8 @@ class BaseStates:
 
 @dataclass(frozen=True)
 class JointStates:
-    """Where the servos of a held robot were. times: (K,) [s] after the first command; q, v: (K, n) [rad, rad/s] in the model's order
-    of joints, as their own sensors tell them; NaN where unseen, which are left alone."""
+    """Where the servos of a held robot were. times: (K,) [s] after the first command; q, v: (K, n) [rad, rad/s] in the model's
+    order of joints, as their own sensors tell them; NaN where unseen, which are left alone."""
 
     times: Array
     q: Array

@@ -254,7 +254,8 @@ def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidenc
 
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
             ) -> Region:
-    return region_of([joint], evidence, uncertain_numbers(nominal, joint, zeroed=False), _acting(pool, joint, nominal), options)
+    numbers = uncertain_numbers(nominal, joint, False, options.sheet)
+    return region_of([joint], evidence, numbers, _acting(pool, joint, nominal), options)
 
 
 def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:

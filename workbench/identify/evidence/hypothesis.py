@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
-FAR = 3.0
+FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 FREEDOM = 4.0
 """Of the t of sizes: twelve degrees of play, where one servo in a hundred has four, cost nine nats more than one degree does."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
+from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -15,6 +16,10 @@ ZERO_SD = math.radians(1.15)
 """Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
 it by eye."""
 
+OF_SHEET = {"torque_at_full_duty": ("torque_tolerance", ("stall_torque", "supply_voltage")),
+            "back_emf": ("back_emf_tolerance", ("no_load_speed",))}
+"""Numbers that come from a data sheet, with what of servo.yaml says how well they are known: its tolerance, or standard
+deviations."""
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
          "reflected_inertia": "kg m^2", "goal_delay": "s", "goal_ramp": "deg/s", "minimum_duty": "1", "dead_zone": "deg",
          "command_filter": "s", "derivative_gain": "s/rad", "load_friction": "1", ZERO: "rad"}
@@ -22,11 +27,14 @@ UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_frictio
 apart."""
 
 
-def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncertain]:
+def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
     """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
-    tells a zero."""
+    tells a zero. sheet: standard deviation of the logarithm of torque and back-EMF of which nobody says how well they are
+    known."""
     servo = model.servo(joint)
     shares = {name: servo.share_known(name) for name in UNITS if name != ZERO}
+    shares |= {name: sheet for name, (tolerance, keys) in OF_SHEET.items()
+               if getattr(servo, tolerance) is None and not set(keys) & set(dict(servo.sd))}
     out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and nominal_value(servo, name) > 0]
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 

@@ -70,13 +70,24 @@ def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: E
     How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
     something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
     longer than `options.explored` and at a coarse step, and then judges what it fitted, and goes on, by what the closest fits
-    leave.
+    leave. It explores in windows, and judges by whole logs only where these tell as much (`_judging_horizon`).
     """
-    states = list(found)
-    for exploring in (True, False):
-        here = rollouts.around_here(PROBLEM.coarse if exploring else step, options.horizon)
-        rollouts, states = _all_levels(here, states, options, exploring, report)
+    rollouts, states = _all_levels(rollouts.around_here(PROBLEM.coarse, options.horizon), list(found), options, True, report)
+    here = rollouts.around_here(step, _judging_horizon(rollouts, states, options))
+    rollouts, states = _all_levels(here, states, options, False, report)
     return rollouts, tuple(states)
+
+
+def _judging_horizon(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> float:
+    """By which horizon models are judged [s]: that of windows, or infinity, whole logs. What a right model leaves grows little
+    over a log, and then the whole log tells most, as no window starts from a noisy state; where stick and slip decide what is
+    left after seconds, it grows by several times, and is luck (`options.grown`)."""
+    if not np.isfinite(options.horizon):
+        return options.horizon
+    whole = rollouts.around_here(rollouts.step, np.inf)
+    left = whole.answers([(i, f.best.hypothesis) for i, f in enumerate(found)])
+    grown = [np.log(f.region.likelihood.discrepancy(r) / f.region.likelihood.discrepancy(f.best.r)) for f, r in zip(found, left)]
+    return np.inf if np.mean(grown) < np.log(options.grown) else options.horizon
 
 
 def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Report

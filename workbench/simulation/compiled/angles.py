@@ -40,7 +40,8 @@ def servo_angles(jobs: Sequence[Job]) -> list[Array]:
         told = np.column_stack([np.interp(job.times, time, log.q[:, j], left=np.nan, right=np.nan) for j in joints])
         angles = told - compiled.physics.zero
         if job.restarts is not None:
-            _from_where_put(angles, job.times, time, log.q[:, joints] - compiled.physics.zero, job.restarts)
+            rows = log.q[:, joints] - compiled.physics.zero
+            _from_where_put(angles, job.times, np.asarray(time, dtype=float), rows, job.restarts)
         out.append(angles)
     return out
 
