@@ -11,7 +11,7 @@ void bridge_begin(struct robot *r) {
 
 /* After silence: all servos are asked where they are, then a ramp to neutral and torque off, if anything was moved. */
 void bridge_end(struct robot *r, uint8_t reason) {
-    bool moved = r->bridge.moved && reason != REASON_HELD;
+    bool moved = r->bridge.moved;
     enter(r, moved ? STATE_CHECK : STATE_LIMP, reason, 0xFF);
     if (moved) r->check_for = STATE_YIELD;
 }

@@ -5,12 +5,13 @@ static void start(struct robot *r, uint8_t reason) {
     if (r->joints == 0) return;
     if (r->state == STATE_STILL || r->state == STATE_LIMP) enter(r, STATE_CHECK, reason, 0xFF);
     if (r->state != STATE_NEUTRAL) return;
-    enter(r, STATE_PLAY, reason, 0xFF);
-    begin_play(r);
+    play_from_neutral(r, reason);
 }
 
+/* A stop starts nothing: where nothing moves it does nothing, and a check that would lead to a ramp is given up. */
 static void stop(struct robot *r, uint8_t reason) {
-    if (r->state == STATE_STILL || r->state == STATE_LIMP) start(r, reason);
+    if (r->state == STATE_CHECK && r->check_for == STATE_RAMP)
+        enter(r, r->came_from == STATE_STILL ? STATE_STILL : STATE_LIMP, reason, 0xFF);
     if (r->state != STATE_PLAY && !(r->state == STATE_RAMP && r->after == STATE_PLAY)) return;
     r->reason = reason;
     ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
@@ -33,12 +34,16 @@ static void button(struct robot *r) {
     if (!r->pressed && lasted >= BUTTON_MS) r->armed = true;
     if (r->pressed && r->armed && lasted >= HELD_MS && !r->held_told) {
         r->held_told = true;
-        if (r->state == STATE_BRIDGE) bridge_end(r, REASON_HELD);
         react(r, REASON_HELD, 0xFF);
     }
 }
 
-void commands_tick(struct robot *r) { button(r); }
+void commands_tick(struct robot *r) {
+    button(r);
+    if (r->joints == 0 && r->state == STATE_LIMP && r->now % 64u == 0) r->send_release = true; /* no servo is read that could say it heard */
+    bool waits = r->state == STATE_NEUTRAL || (r->state == STATE_STILL && r->joints);
+    if (waits && r->now - r->entered >= IDLE_MS) react(r, REASON_IDLE, 0xFF);
+}
 
 static void result(struct robot *r, uint8_t link, uint8_t code) {
     const struct frame_reader *f = &r->link[link].reader;
@@ -73,7 +78,7 @@ static void order(struct robot *r, uint8_t link, uint8_t type) {
         stop(r, REASON_LINK);
         break;
     case FRAME_RELEASE:
-        if (r->state != STATE_BRIDGE && r->joints) enter(r, STATE_LIMP, REASON_LINK, 0xFF);
+        enter(r, STATE_LIMP, REASON_LINK, 0xFF);
         break;
     case FRAME_BRIDGE_END:
         if (r->state == STATE_BRIDGE) bridge_end(r, REASON_LINK);
@@ -96,9 +101,11 @@ static void frame(struct robot *r, uint8_t link) {
 
 static void remote(struct robot *r, uint8_t byte) {
     uint16_t pressed = remote_feed(&r->remote, byte, r->now);
+    if (pressed == REMOTE_6) enter(r, STATE_LIMP, REASON_REMOTE, 0xFF);
     if (r->state == STATE_BRIDGE) return;
     if (pressed == REMOTE_U) start(r, REASON_REMOTE);
-    if (pressed == REMOTE_1) stop(r, REASON_REMOTE);
+    if (pressed == REMOTE_1 && (r->state == STATE_STILL || r->state == STATE_LIMP)) start(r, REASON_REMOTE); /* neutral, by a person */
+    else if (pressed == REMOTE_1) stop(r, REASON_REMOTE);
 }
 
 /* Some bytes of each link at each wake, so that no pose has to wait for a long message. */

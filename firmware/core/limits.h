@@ -18,6 +18,8 @@
 #define CHECK_TRIES 5u        /* of one read before torque goes on */
 #define CHECK_SPREAD 6u       /* counts: two readings of a joint at rest agree within this before torque goes on */
 
+#define BOOT_MS 2000u         /* after a reset servos may be starting themselves: an XC-330 takes 0.4 s, and none answers meanwhile */
+
 #define LIMIT_SPREAD 2u       /* counts by which a servo's angle limits may be narrower than the table's bounds: rounding */
 
 #define DEAD_ROUNDS 4u        /* rounds without an answer: about 100 ms, 300 ms are allowed; four by chance: 1e-12 at 0.1 % flips */
@@ -39,6 +41,9 @@
 
 #define SEAT_COUNTS 14        /* 4 degrees: what a joint is told more than neutral before it is let down onto its droop */
 #define SEAT_MS 300u          /* for each of the two; friction lets go slowly */
+
+#define RAMP_TORQUE 512u      /* half of full torque until neutral is reached for the first time: whatever is caught is not crushed */
+#define IDLE_MS 300000u       /* held for so long without being used, torque goes: servos that hold get hot */
 
 #define BUTTON_MS 20u         /* a button is pressed once it has been so for this long */
 #define HELD_MS 1500u         /* START held this long releases at once */

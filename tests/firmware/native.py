@@ -85,6 +85,10 @@ class Sim:
         """Bytes at 57,600 bit/s."""
         self.lib.sim_send(self.p, link, data, len(data))
 
+    def put(self, data: bytes, link: int = LINK_PC) -> None:
+        """Bytes that are there at once; no time goes by."""
+        self.lib.sim_put(self.p, link, data, len(data))
+
     def remote(self, buttons: int) -> None:
         self.lib.sim_remote(self.p, buttons)
 

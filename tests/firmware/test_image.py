@@ -39,6 +39,11 @@ def goals_of(data: bytes) -> list[tuple[int, int]]:
     return [by_id[i] for i in IDS]
 
 
+def same(row: tuple[tuple[int, int], ...], sent: list[tuple[int, int]]) -> bool:
+    """Whether a table's (goals, speeds) are what was sent; for speed 0, "at once", one that takes the dwell or holds is sent."""
+    return all(goal == g and (s == speed or (speed == 0 < s <= 45)) for (goal, speed), (g, s) in zip(row, sent))
+
+
 def play(poses: int, seed: int = 0) -> Robot:
     """A walk of so many poses with telemetry, remote and uploads going on; every byte and every time is looked at."""
     robot = Robot(seed)
@@ -67,7 +72,7 @@ def play(poses: int, seed: int = 0) -> Robot:
     assert np.abs(times - expected).max() <= 50 * MICROSECOND
     playing = {4}  # the built-in table, until another is seen
     for k, (_, data) in enumerate(sent):
-        playing = {t for t in (playing if k % 4 else set(valid)) if valid[t][k % 4] == tuple(goals_of(data))}
+        playing = {t for t in (playing if k % 4 else set(valid)) if same(valid[t][k % 4], goals_of(data))}
         assert playing, f"pose {k}"
     elapsed = (times[-1] - times[0]) / SECOND
     assert logs >= 40 * elapsed
@@ -150,7 +155,7 @@ def test_power_on_ramps_slowly_from_where_the_joints_are() -> None:
 def test_a_missing_servo_keeps_torque_off() -> None:
     robot = Robot()
     robot.servos[9].power(False)
-    robot.run(600)
+    robot.run(2300)
     states = [m for m in robot.messages() if isinstance(m, StateMessage)]
     assert (states[-1].state, states[-1].reason, states[-1].servo) == (ControllerState.LIMP, "a servo is silent", 9)
     assert not robot.ear.poses

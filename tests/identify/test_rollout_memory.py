@@ -1,5 +1,7 @@
 """Rollouts are remembered: in memory within bounds, on disk so that a killed run goes on, of servo logs as of filmed takes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,7 +75,8 @@ def test_models_that_differ_in_anything_have_other_keys(tmp_path):
 
 def test_a_diagnosis_of_servo_logs_that_was_killed_rolls_nothing_out_again(tmp_path, monkeypatch):
     session = record(tmp_path, [EffectSpec("coulomb_friction", ("j",), {"torque": 0.02})])
-    without = sorted(set(known_effects()) - {"coulomb_friction", "viscous_friction"})
+    session = replace(session, takes=session.takes[:1])
+    without = sorted(set(known_effects()) - {"coulomb_friction"})
     plays, played, most = servo_logs.servo_angles, [], np.inf
 
     def counted(jobs):
@@ -90,8 +93,8 @@ def test_a_diagnosis_of_servo_logs_that_was_killed_rolls_nothing_out_again(tmp_p
     (tmp_path / "whole").mkdir()
     (tmp_path / "killed").mkdir()
     whole, all_of_them = diagnosed(tmp_path / "whole"), len(played)
-    assert all_of_them > 300
-    most = 200
+    assert all_of_them > 150
+    most = 100
     with pytest.raises(KeyboardInterrupt):
         diagnosed(tmp_path / "killed")
     before_the_end, most = len(played), np.inf

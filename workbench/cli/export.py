@@ -39,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.device import export
+    from workbench.device.tables.firmware_tables import check_servos
     from workbench.motion import load_motion
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
@@ -48,7 +49,8 @@ def run(args: argparse.Namespace) -> int:
     cycles = motion.often(args.cycles, 3)
     check_model("export", model)
     check_motion("export", motion, cycles, args.yes)
-    motion.as_table()  # refused before the simulation
+    check_servos(motion, model)  # refused before the simulation
+    motion.as_table()
     uncertified = uncertified_by(args.motion, motion, model)
     if uncertified is not None and not args.force:
         raise uncertified

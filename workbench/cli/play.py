@@ -45,6 +45,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.files import InputError
     from workbench.motion import load_motion
     from workbench.robot.servo_registers import save_registers
+    from workbench.robot.servo_units import known_units
 
     if (args.motion is None) == (args.finish is None):
         raise InputError(None, "expected either MOTION or --finish JOURNAL")
@@ -54,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    known_units(model, motion.joints)
     refuse_broken_limits(motion.as_table(), model, args.force)
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)

@@ -45,11 +45,13 @@ def run(args: argparse.Namespace) -> int:
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
+    from workbench.robot.servo_units import known_units
     from workbench.view.report.comparison import write_comparison
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     cycles = motion.often(args.cycles, 10)
+    known_units(model, motion.joints)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None

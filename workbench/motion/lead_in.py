@@ -22,11 +22,11 @@ def paced(commands: Commands, count: Array, speed_unit: Array, slow: float = SLO
     Such a joint gets the speed that brings it there within the dwell; a speed is rounded up to whole counts, speed_unit (n,)
     [rad/s]. Where one would have to be faster than `slow` [rad/s] for the very first pose, a command is put in front that takes
     all joints there first, the farthest at `slow`, and all else comes later by as much. A way of at most a count of position,
-    count (n,) [rad], is none; one that the joint has not finished, as the pose before was too short, is one. A joint whose torque
-    is off, or comes on with the command, is left as it is.
+    count (n,) [rad], is none. A joint whose torque is off, or comes on with the command, is left as it is.
     """
+    before = np.vstack([np.zeros(len(commands.joints)), commands.goals[:-1]])
     on = commands.enabled & np.vstack([commands.enabled[:1], commands.enabled[:-1]])
-    way = np.where(on, np.abs(commands.goals - commands.reference(commands.times - 1e-9)), 0.0)
+    way = np.where(on, np.abs(commands.goals - before), 0.0)
     at_once = (commands.speeds == 0) & (way > 1.01 * count)
     if not at_once.any():
         return commands

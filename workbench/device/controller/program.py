@@ -14,6 +14,7 @@ from workbench.files import InputError
 from workbench.files.resources import resource_dir
 from workbench.motion import load_motion
 from workbench.robot import RobotModel
+from workbench.robot.servo_units import known_units
 
 COMPILER = "arm-none-eabi-gcc"
 
@@ -35,6 +36,7 @@ def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: b
     if Path(motion).suffix == ".table":
         return read_table_file(motion), ()
     loaded = load_motion(motion, model)
+    known_units(model, loaded.joints)
     table = loaded.as_table()
     violations = refuse_broken_limits(table, model, force, None, "not loaded")
     return TableFile(table, bounds_of(table, model), cycles or 0, cycles is not None), tuple(violations)

@@ -16,6 +16,7 @@ from workbench.motion import PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, ServoConstants
 from workbench.robot.ranges import joint_ranges
+from workbench.robot.servo_units import maker_of
 
 Array = NDArray[np.float64]
 
@@ -136,8 +137,14 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
             yield Violation("torque", joint, value, limit, "N m", text)
         rms, advised = float(np.sqrt(np.nanmean(torque**2))), RECOMMENDED * servo.torque_at_full_duty
         if rms > advised:
-            text = f"torque of {rms:.2f} N m (RMS) is above a fifth of the stall torque, {advised:.2f} N m (ROBOTIS's rule)"
+            text = (f"torque of {rms:.2f} N m (RMS) is above a fifth of the stall torque, {advised:.2f} N m "
+                    f"({_rule(servo.model)})")
             yield Violation("torque", joint, rms, advised, "N m", text, warning=True)
+
+
+def _rule(model: str) -> str:
+    """Whose advice the share of the stall torque is: ROBOTIS gives it for its own servos."""
+    return "ROBOTIS's rule" if maker_of(model) == "ROBOTIS" else "ROBOTIS's rule for its own servos; ask the maker of this one"
 
 
 def _available(servo: ServoConstants, torque: Array, speed: Array) -> Array:
