@@ -27,6 +27,7 @@ from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explain, is_by_logs
 from workbench.identify.evidence.leftover import left_over
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
@@ -89,25 +90,37 @@ class _Settings:
     thorough: bool
     without: frozenset[str]
     began: float
+    previous: RobotModel | None = None
 
     def searches(self, effect: str) -> bool:
         """Whether an effect of that name is looked for."""
         return effect not in self.without
 
+    @property
+    def options(self) -> EvidenceOptions:
+        """Of the search of servo logs."""
+        return EvidenceOptions(drift=None if self.previous is None else SinceThen())
+
     def provenance(self) -> dict[str, object]:
         """What the results say of them."""
-        return {"without": sorted(self.without)} if self.without else {}
+        since = {} if self.previous is None else {"model before": self.previous.sha256}
+        return since | ({"without": sorted(self.without)} if self.without else {})
 
 
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
-                     thorough: bool = False, without: Sequence[str] = ()) -> DiagnosisResult:
+                     thorough: bool = False, without: Sequence[str] = (), previous: RobotModel | None = None) -> DiagnosisResult:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
-    effects that are known not to be there, and are not looked for; InputError where one is no effect. Rollouts are the compiled
-    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model."""
+    effects that are known not to be there, and are not looked for; InputError where one is no effect. previous: the robot as an
+    earlier diagnosis left it, whose servos and effects are then nominal, so that findings are what is new; InputError where that
+    is another robot. Rollouts are the compiled station's where it knows the physics, unless Drake says otherwise of the nominal
+    or of the final model."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
-    settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic())
+    settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic(), previous)
+    if previous is not None:
+        session.with_model(previous)  # refuses another robot
+        session = session.with_model(session.model.with_physics(previous.servos, previous.effects))
     try:
         return _diagnosed(session, config, settings, {"rollouts by": "the compiled station"})
     except EnginesPartError as why:
@@ -189,7 +202,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
     """Steps 4 to 6 of servo logs, by evidence. engine: whose rollouts these are, and how far it is from Drake."""
     progress = settings.progress
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
-    explained = explain(evaluator, known, pool, progress, thorough=settings.thorough)
+    explained = explain(evaluator, known, pool, progress, settings.options, settings.thorough)
     fitted = explained.model
     progress("judging the engine", None)
     final = {BESIDE_DRAKE.format("final"): judged(evaluator, fitted, "final")}
@@ -204,7 +217,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
     left = left_over(evidence, after, floors)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(findings or left), findings, left),
-        model=fitted.with_effects((*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
+        model=explained.calibrated.with_effects((*fitted.effects, *(m.spec for m in missed))), nominal=session.model, gap=gap,
         findings=findings, rejected=explained.losers(), unexplained=left,
         posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - settings.began) | settings.provenance()

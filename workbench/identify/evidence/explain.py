@@ -23,6 +23,8 @@ from workbench.identify.evidence.nuisance import (
     nominal_value,
     turned_horn,
     uncertain_numbers,
+    uncertain_since,
+    with_known,
 )
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
@@ -33,6 +35,7 @@ from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
+from workbench.identify.evidence.tied import as_torque
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
@@ -68,6 +71,15 @@ class Explanation:
         return self.rollouts.model([p.best.hypothesis for p in self.posteriors])
 
     @property
+    def calibrated(self) -> RobotModel:
+        """The same, with how well its servos' numbers are known now."""
+        sds: dict[Uncertain, float] = {}
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            variances = np.diag(p.best.covariance(region, self.options))
+            sds |= {n: n.sd * math.sqrt(v) for n, v in zip(p.best.hypothesis.numbers, variances)}
+        return with_known(self.model, sds)
+
+    @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
         return tuple(r for p in self.posteriors
@@ -85,11 +97,13 @@ class Explanation:
                 if (of_all := self.robot.rivals.get(c.key)) is not None:
                     share = 1.0 / (1.0 + math.exp(min(of_all[1], 700.0)))
                     others.append(Alternative(of_all[0].name, of_all[0].where, 1.0 - share))
+                tie = as_torque(region, self.options, p.best, c)
+                share *= 1.0 if tie is None else tie.share
                 others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
                 fit, validation = (change(evidence, c.where, before, after, use) for use in ("fit", "validate"))
                 out.append(Finding(
                     c.name, c.where, share * p.named[c.name, c.where], estimates(c, x, covariance[s, s]), fit, validation,
-                    tuple(others[:1]), c.effect.sentence(c.spec(x)),
+                    tuple(others[:1]), c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence),
                     family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
@@ -254,7 +268,8 @@ def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidenc
 
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
             ) -> Region:
-    numbers = uncertain_numbers(nominal, joint, False, options.sheet)
+    numbers = (uncertain_numbers(nominal, joint, False, options.sheet) if options.drift is None
+               else uncertain_since(nominal, joint, False, options.drift))
     return region_of([joint], evidence, numbers, _acting(pool, joint, nominal), options)
 
 

@@ -162,9 +162,14 @@ class Prior:
         """Log density [nats]."""
         z = (theta - self.center) / self.scale
         v = self.freedom
-        at_center = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * v) + np.log(2.0) * self.one_sided
-        student = at_center - (v + 1) / 2 * np.log1p(z * z / v)
-        return float(np.sum(np.where(self.normal, -0.5 * z * z - 0.5 * np.log(2 * np.pi), student) - np.log(self.scale)))
+        return float(np.sum(self.at_center - np.where(self.normal, 0.5 * z * z, (v + 1) / 2 * np.log1p(z * z / v))))
+
+    @property
+    def at_center(self) -> Array:
+        """Log density of each number (k,) where it is largest [nats]."""
+        v = self.freedom
+        student = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * v) + np.log(2.0) * self.one_sided
+        return np.asarray(np.where(self.normal, -0.5 * np.log(2 * np.pi), student) - np.log(self.scale))
 
     def precision(self, theta: Array) -> Array:
         """How sharply it tells each number (k,), as reweighted least squares have it."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
-from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -25,6 +25,14 @@ UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_frictio
          "command_filter": "s", "derivative_gain": "s/rad", "load_friction": "1", ZERO: "rad"}
 """The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
 apart."""
+
+
+def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
+    """The same of a robot that was diagnosed before, whose constants carry the standard deviations of that."""
+    servo = model.servo(joint)
+    known = {name: drift.of(name, servo.share_known(name)) for name in UNITS if name != ZERO}
+    out = [Uncertain(joint, name, sd) for name, sd in known.items() if nominal_value(servo, name) > 0]
+    return out if zeroed else [*out, Uncertain(joint, ZERO, drift.of(ZERO, 0.0))]
 
 
 def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
@@ -69,6 +77,19 @@ def _scaled(servo: ServoConstants, name: str, by: float) -> ServoConstants:
     if name == "back_emf":
         return replace(servo, no_load_speed=servo.no_load_speed / by)
     return replace(servo, **{name: getattr(servo, name) * by})  # type: ignore[arg-type]
+
+
+def with_known(model: RobotModel, sds: Mapping[Uncertain, float]) -> RobotModel:
+    """The robot whose servo constants carry how well they are known now: sds, of the logarithm, by number."""
+    servos = {j: model.servo(j) for j in model.joints}
+    for number, sd in sds.items():
+        servo = servos[number.joint]
+        if number.name in OF_SHEET:
+            servos[number.joint] = replace(servo, **{OF_SHEET[number.name][0]: sd})  # type: ignore[arg-type]
+        elif number.name != ZERO:
+            known = dict(servo.sd) | {number.name: sd * nominal_value(servo, number.name)}
+            servos[number.joint] = replace(servo, sd=tuple(sorted(known.items())))
+    return model.with_physics(servos, model.effects)
 
 
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:

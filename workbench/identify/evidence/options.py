@@ -2,7 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SinceThen:
+    """By how much a robot that was diagnosed may have changed since, without anything to report: standard deviations of the
+    logarithm, `zero` [rad]. widened: times the standard deviations of the last diagnosis, as those are formal ones.
+
+    torque, back-EMF: one STS3215 differed by 3 to 6 % per duty between days at 28, 34 and 37 deg C. friction: grease and wear,
+    20 to 40 % there. law: what firmware does, which does not drift; how logs are stamped may. zero: a link taken off and put on
+    again."""
+
+    widened: float = 3.0
+    torque: float = 0.06
+    friction: float = 0.3
+    law: float = 0.02
+    zero: float = math.radians(0.3)
+
+    def of(self, name: str, sd: float) -> float:
+        """Standard deviation of a number that was known to `sd`."""
+        own = {"torque_at_full_duty": self.torque, "back_emf": self.torque, "zero": self.zero} | dict.fromkeys(
+            ("coulomb_friction", "viscous_friction", "load_friction"), self.friction)
+        return math.hypot(self.widened * sd, own.get(name, self.law))
 
 
 @dataclass(frozen=True)
@@ -32,10 +55,13 @@ class EvidenceOptions:
     (`RolloutEvaluator.work`), after which nothing more is tried unless the search is to be thorough: about an hour of a
     processor, several times what twelve logs of a servo need.
 
+    drift: where the nominal robot is one that was diagnosed before, what may have changed since; None: it is one as drawn.
+
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
-    effect to take it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name, and refuted:
-    the share of an effect's typical size that it then rules out, which no recording would show.
+    effect to take it out, odds of twenty. alike: share of what an effect does from which on other torques that do as much stand
+    for it. sure: standard errors by which a servo's own register must refute a name, and refuted: the share of an effect's
+    typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -61,6 +87,8 @@ class EvidenceOptions:
     most_work: float = 2e6
     occam: float = 7.0
     veto: float = 3.0
+    alike: float = 0.5
+    drift: SinceThen | None = None
     sure: float = 3.0
     refuted: float = 0.3
 

@@ -13,15 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.session_takes import RegisteredTake
+from workbench.identify.options import PROBLEM
 from workbench.simulation.steady import JointStates
 
 Array = NDArray[np.float64]
-SPAN = 0.06
-"""Of positions from which a state is told [s]: about a servo's rise time, six samples of a log at 100 Hz."""
-ORDER, LEAST = 3, 5
-"""Of the polynomial through them, and positions that it takes at least: over so long the acceleration of a servo changes."""
-KEPT = 256
-"""States that are kept, as a session's takes are played again and again, and schedules are known by them."""
 _known: OrderedDict[tuple[int, float], tuple[RegisteredTake, JointStates]] = OrderedDict()
 
 
@@ -30,7 +25,7 @@ def recorded_states(take: RegisteredTake, horizon: float) -> JointStates:
     key = (id(take), horizon)
     if key not in _known:
         _known[key] = (take, _read(take, horizon))
-        while len(_known) > KEPT:
+        while len(_known) > PROBLEM.states_kept:
             _known.popitem(last=False)
     return _known[key][1]
 
@@ -43,8 +38,8 @@ def _read(take: RegisteredTake, horizon: float) -> JointStates:
         column, values = take.model.joints.index(joint), recorded.q[:, recorded.column(joint)]
         seen = np.isfinite(values)
         for k, t in enumerate(times):
-            near = seen & (np.abs(since - t) <= SPAN / 2 + 1e-9)
-            if near.sum() >= LEAST:
-                fit = np.polynomial.polynomial.polyfit(since[near] - t, values[near], ORDER if near.sum() > LEAST else ORDER - 1)
+            near = seen & (np.abs(since - t) <= PROBLEM.state_span / 2 + 1e-9)
+            if near.sum() > PROBLEM.state_order:
+                fit = np.polynomial.polynomial.polyfit(since[near] - t, values[near], PROBLEM.state_order)
                 q[k, column], v[k, column] = fit[0], fit[1]
     return JointStates(times, q, v)
