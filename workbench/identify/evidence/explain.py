@@ -4,7 +4,7 @@ others."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,14 +16,12 @@ from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.nested import told_from_nothing
 from workbench.identify.evidence.nuisance import (
-    UNITS,
-    ZERO,
     Uncertain,
     as_mapping,
-    nominal_value,
     turned_horn,
     uncertain_numbers,
     uncertain_since,
+    what_changed,
     with_known,
 )
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
@@ -292,13 +290,3 @@ def _acting(pool: Sequence[Candidate], joint: str, model: RobotModel) -> list[Ca
         return [c for c in pool if c.where or c.name not in own]
     link = model.kinematics.frames[joint].child
     return [c for c in pool if c.where in ((joint,), (link,))]
-
-
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
-    """Nominal and recalibrated values, those that went furthest first."""
-    out = []
-    for number, by in z.items():
-        nominal = 0.0 if number.name == ZERO else nominal_value(model.servo(number.joint), number.name)
-        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
-    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
