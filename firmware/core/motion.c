@@ -48,6 +48,7 @@ void ramp_to_neutral(struct robot *r, uint8_t state, uint8_t after) {
 void begin_play(struct robot *r) {
     if (upload_ready(&r->upload)) upload_take(&r->upload);
     r->pose = r->cycle = 0;
+    r->stop_asked = r->ending = false;
     r->next_pose = r->now + POSE_GUARD_MS; /* on the tick, as all that follow: what is under way on the bus is over by then */
 }
 
@@ -58,12 +59,12 @@ static uint32_t speed_of_way(uint32_t way, uint32_t dwell_ms) {
 }
 
 /* What is sent where the table says 0, "at once": a servo that is told so and is not there goes as fast as it can. Instead its way
-   from the last goal takes the pose's dwell; without one it holds, and comes back from wherever it is pushed at the ramp's speed. */
+   from the last goal takes the pose's dwell; without one it goes on at the speed that it had, as it may still be under way. */
 static uint16_t speed_to_send(const struct robot *r, uint32_t pose, uint32_t j, uint16_t from) {
     const uint8_t *t = playing(r);
     uint32_t speed = table_speed(t, pose, j), way = distance(table_goal(t, pose, j), from);
     if (speed) return (uint16_t)speed;
-    speed = way ? speed_of_way(way, table_dwell(t, pose)) : RAMP_SPEED;
+    speed = way ? speed_of_way(way, table_dwell(t, pose)) : r->speeds[j];
     if (way && speed < RAMP_SLOWEST) speed = RAMP_SLOWEST;
     return (uint16_t)(speed < table_fastest(t, j) ? speed : table_fastest(t, j));
 }
@@ -91,33 +92,54 @@ void play_from_neutral(struct robot *r, uint8_t reason) {
     if (!startable(r)) ramp_to_pose(r, 0);
 }
 
-/* Where a cycle has ended: another table, another cycle, or neutral. True where the next pose is to be sent now. */
+/* Another table takes over in the walk: at its loop if that is near enough, else (where the PC allows it) from its beginning, after a
+   ramp to where that begins. True where its next pose is to be sent now. */
+static bool take_over(struct robot *r, bool reachable) {
+    upload_take(&r->upload);
+    r->cycle = 0;
+    r->table_fault = TABLE_OK;
+    r->pose = table_start(playing(r));
+    if (reachable) return true;
+    if (table_start(playing(r)))
+        ramp_to_neutral(r, STATE_RAMP, STATE_PLAY);
+    else
+        ramp_to_pose(r, table_loop_end(playing(r)) - 1u);
+    return false;
+}
+
+static void wind_up(struct robot *r) {
+    if (!r->stop_asked) r->reason = REASON_ENDED;
+    r->ending = true;
+    r->pose = table_loop_end(playing(r));
+}
+
+/* Where a cycle has ended: another table, another cycle, the stop, or neutral. True where the next pose is to be sent now. */
 static bool turn_over(struct robot *r) {
-    r->pose = 0;
     r->cycle++;
-    if (upload_ready(&r->upload)) {
+    if (upload_ready(&r->upload) && !r->stop_asked) {
         bool reachable = table_reachable(r->upload.spare, r->goals);
-        if (reachable || (r->upload.flags & UPLOAD_RAMPS)) {
-            upload_take(&r->upload);
-            r->cycle = 0;
-            r->table_fault = TABLE_OK;
-            if (!reachable) ramp_to_pose(r, table_poses(playing(r)) - 1u);
-            return reachable;
-        }
+        if (reachable || (r->upload.flags & UPLOAD_RAMPS)) return take_over(r, reachable);
         upload_drop(&r->upload);
         r->table_fault = TABLE_UNREACHABLE;
         r->state_told = false;
     }
-    if ((table_flags(playing(r)) & TABLE_STOPS) && r->cycle >= table_cycles(playing(r))) {
-        r->reason = REASON_ENDED;
-        ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
-        return false;
-    }
+    r->pose = table_start(playing(r));
+    if ((table_flags(playing(r)) & TABLE_STOPS) && r->cycle >= table_cycles(playing(r))) wind_up(r);
     return true;
 }
 
+/* Whether r->pose is the next pose to send; where all have been, the way to neutral begins. */
+static bool pose_follows(struct robot *r) {
+    const uint8_t *t = playing(r);
+    if (!r->ending && r->pose == table_loop_end(t) && !turn_over(r)) return false;
+    if (!r->ending && r->stop_asked && r->pose == table_start(playing(r))) wind_up(r);
+    if (r->pose < table_poses(playing(r))) return true;
+    ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
+    return false;
+}
+
 static void pose_due(struct robot *r) {
-    if (r->pose >= table_poses(playing(r)) && !turn_over(r)) return;
+    if (!pose_follows(r)) return;
     for (uint32_t j = 0; j < r->joints; j++) {
         r->speeds[j] = speed_to_send(r, r->pose, j, r->goals[j]);
         r->goals[j] = table_goal(playing(r), r->pose, j);

@@ -45,11 +45,13 @@ struct servo {
     bool verified;         /* was read to have the goal and speed that were sent last */
     bool off;              /* was read to have torque off since it was told */
     bool fresh;            /* answered in this round */
+    uint32_t heard;        /* when it answered last [ms] */
 };
 
 struct links {
     struct ring rx, tx;
     struct frame_reader reader;
+    uint32_t heard;        /* when its last byte came [ms] */
 };
 
 enum { LINK_PC, LINK_ZIGBEE, LINKS };
@@ -59,6 +61,7 @@ struct bridge {
     bool whole;            /* a packet waits for the bus */
     bool asked;            /* what is under way on the bus is the PC's */
     bool moved;            /* torque or goals went through: silence ends in a ramp */
+    bool off;              /* torque was to be off when it began; those that do not hear yet are told again */
     uint32_t heard;
 };
 
@@ -83,6 +86,7 @@ struct robot {
     bool state_told;
 
     uint32_t pose, cycle, next_pose; /* of the table that plays */
+    bool stop_asked, ending; /* it is to end with its stop; that plays */
     bool send_goals, send_release, send_limits, sending_read;
     bool gentle;       /* the first way to neutral: torque is limited */
     uint8_t came_from; /* the state before CHECK */
@@ -137,6 +141,7 @@ void commands_tick(struct robot *r);                                          /*
 void commands_bytes(struct robot *r);
 void tell_state(struct robot *r);                                             /* telemetry.c */
 void tell_log(struct robot *r);
+bool reason_light(uint8_t reason, uint32_t now, bool tens);
 void bridge_begin(struct robot *r);                                           /* bridge.c */
 void bridge_feed(struct robot *r, uint8_t byte);
 void bridge_send(struct robot *r);

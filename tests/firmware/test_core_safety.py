@@ -217,7 +217,7 @@ def test_no_joint_is_sent_to_the_first_pose_at_once(far: int, ramps: bool) -> No
     assert sim.get("position", 7) in range(far - 2, far + 3)
 
 
-def test_speed_nought_never_goes_out_and_zero_way_holds_at_the_ramps_speed() -> None:
+def test_speed_nought_never_goes_out_and_without_a_way_the_last_speed_stays() -> None:
     sim = Sim(TABLE)
     sim.play()
     seen = set()

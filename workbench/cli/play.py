@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_cycles, add_model, add_out, load_model
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser)
     add_cycles(parser, 3)
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
@@ -56,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     known_units(model, motion.joints)
+    check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)

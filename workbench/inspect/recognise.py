@@ -247,7 +247,7 @@ def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
 def _yaml(path: Path) -> Inspection:
     content = read_yaml(path)
     if not isinstance(content, Mapping):
-        raise InputError(path, "expected keys with values")
+        raise InputError(path, "expected a mapping")
     if "takes" in content or "predict" in content:
         return _session(path)
     if not {"effects", "servos", "robot"}.isdisjoint(content):
