@@ -63,9 +63,9 @@ def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple
     return standing(rollouts, found), found
 
 
-def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report
-             ) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was begun searched to its end. step: of rollouts by which it is judged.
+def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report,
+             horizon: float | None = None) -> tuple[Rollouts, tuple[Found, ...]]:
+    """What was begun searched to its end. step, horizon [s]: of rollouts by which it is judged; None: `_judging_horizon`.
 
     How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
     something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
@@ -73,7 +73,7 @@ def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: E
     leave. It explores in windows, and judges by whole logs only where these tell as much (`_judging_horizon`).
     """
     rollouts, states = _all_levels(rollouts.around_here(PROBLEM.coarse, options.horizon), list(found), options, True, report)
-    here = rollouts.around_here(step, _judging_horizon(rollouts, states, options))
+    here = rollouts.around_here(step, _judging_horizon(rollouts, states, options) if horizon is None else horizon)
     rollouts, states = _all_levels(here, states, options, False, report)
     return rollouts, tuple(states)
 
