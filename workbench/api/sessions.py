@@ -21,7 +21,7 @@ from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.motion import Motion, save_motion
 from workbench.recording import Take
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, load_model
 from workbench.simulation import SimulationConfig
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison
@@ -65,14 +65,16 @@ class DiagnoseOptions:
 
     jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
     folder that keeps every rollout, so that a run that was killed continues; None: nothing is kept. without: names of effects
-    (docs/effects.md) that are known to be absent, and are not searched for. engine: "auto" (compiled rollouts that Drake judges)
-    or "drake" (all rollouts by Drake, much slower). InputError for fewer than one process or another engine.
+    (docs/effects.md) that are known to be absent, and are not searched for. previous: model.yaml of an earlier diagnosis of this
+    robot, which is then nominal: findings are what is new. engine: "auto" (compiled rollouts that Drake judges) or "drake" (all
+    rollouts by Drake, much slower). InputError for fewer than one process or another engine.
     """
 
     jobs: int = 2
     thorough: bool = False
     resume: Path | None = None
     without: tuple[str, ...] = ()
+    previous: Path | None = None
     engine: Literal["auto", "drake"] = "auto"
 
     def __post_init__(self) -> None:
@@ -171,7 +173,8 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
     """
     options = options or DiagnoseOptions()
     session = _loaded(session)
-    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without,
+    previous = None if options.previous is None else load_model(options.previous)
+    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without, previous,
                              options.engine)
     diagnosis, motion = with_next_experiment(found, options.jobs, progress)
     return DiagnosisResult(diagnosis, session, found.takes, motion)

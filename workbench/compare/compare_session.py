@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
 from workbench.compare.options import COMPARE
@@ -21,6 +23,8 @@ from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.compiled import covers
 from workbench.simulation.steady import BaseStates
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,8 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["finer"] = _finer(own)
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
-        jobs += [(i, kind, _job(run, c)) for kind, configs in variants.items() for c in configs]
+        jobs += [(i, kind, _job(run, c, _instants(run, own) if kind == "finer" else None))
+                 for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     progress("simulating", 0.0)
     done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
@@ -107,7 +112,7 @@ def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: 
     known = [i for i, job in enumerate(nominal) if _finer(job.config) and covers(job) is None]
     takes = zip(known, simulate_batch([nominal[i] for i in known], n_jobs))
     judged = {i for i, take in takes if _apart(take, done[i].nominal) < COMPARE.engines_apart}
-    jobs = [(i, _job(run, c)) for i, run in enumerate(runs)
+    jobs = [(i, _job(run, c, _instants(run, c))) for i, run in enumerate(runs)
             for c in _finer(replace(config, base=run.base, engine="auto" if i in judged else config.engine))]
     jobs.sort(key=lambda job: -_cost(job[1]))
     finer: dict[int, list[Take]] = {}
@@ -116,8 +121,9 @@ def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: 
     return [replace(r, finer=tuple(finer.get(i, ()))) for i, r in enumerate(done)]
 
 
-def _job(run: Run, config: SimulationConfig) -> Job:
-    return Job(run.model, config, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start, steadied=run.steadied)
+def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:
+    return Job(run.model, config, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start, steadied=run.steadied,
+               times=times)
 
 
 def _finer(config: SimulationConfig) -> list[SimulationConfig]:
@@ -133,6 +139,16 @@ def _apart(one: Take, other: Take) -> float:
     if any(a.shape != b.shape for a, b in pairs):
         return np.inf
     return max(float(np.max(np.abs(a - b), initial=0.0)) for a, b in pairs)
+
+
+def _instants(run: Run, config: SimulationConfig) -> Array | None:
+    """Of the log, where a floor is known by angles alone, as of a held robot: what tells no torques may be the compiled station's
+    where servos are switched off, too."""
+    if run.base != "fixed" or run.duration is None:
+        return None
+    lead = 0.0 if run.start is not None else COMPARE.lead
+    rows = np.arange(-round(lead / config.logged_every), math.floor(run.duration / config.logged_every + 1e-6) + 1)
+    return np.asarray(rows * config.logged_every, dtype=float)
 
 
 def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from workbench.identify.estimators.geometry import Geometry, geometry_of
 from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.identify.explained import Explained, Problem
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
@@ -33,7 +34,7 @@ from workbench.identify.proposals import candidates
 from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.ties import ObservationModel, Tie, observation_models
-from workbench.identify.rollouts import RolloutEvaluator
+from workbench.identify.rollouts.evaluator import RolloutEvaluator
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
 from workbench.recording.take import Take
@@ -64,26 +65,39 @@ class _Settings:
     thorough: bool
     without: frozenset[str]
     began: float
+    previous: RobotModel | None = None
 
     def searches(self, effect: str) -> bool:
         """Whether an effect of that name is looked for."""
         return effect not in self.without
 
+    @property
+    def options(self) -> EvidenceOptions:
+        """Of the search of servo logs."""
+        return EvidenceOptions(drift=None if self.previous is None else SinceThen())
+
     def provenance(self) -> dict[str, object]:
         """What the results say of them."""
-        return {"without": sorted(self.without)} if self.without else {}
+        since = {} if self.previous is None else {"model before": self.previous.sha256}
+        return since | ({"without": sorted(self.without)} if self.without else {})
 
 
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
-                     thorough: bool = False, without: Sequence[str] = (), engine: str = "auto") -> DiagnosisResult:
+                     thorough: bool = False, without: Sequence[str] = (), previous: RobotModel | None = None,
+                     engine: str = "auto") -> DiagnosisResult:
     """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
-    effects that are known not to be there, and are not looked for; InputError where one is no effect. Rollouts are the compiled
+    effects that are known not to be there, and are not looked for; InputError where one is no effect. previous: the robot as an
+    earlier diagnosis left it, whose servos and effects are then nominal, so that findings are what is new; InputError where that
+    is another robot. Rollouts are the compiled
     station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model, or `engine` is
     "drake"."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
-    settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic())
+    settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic(), previous)
+    if previous is not None:
+        session.with_model(previous)  # refuses another robot
+        session = session.with_model(session.model.with_physics(previous.servos, previous.effects))
     if engine == "drake":
         return _diagnosed(session, replace(config, engine="drake"), settings, {"rollouts by": "Drake"})
     try:
@@ -129,7 +143,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     if gap and is_by_logs(evidence):
         search = explained_by_evidence
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
-                           progress))
+                           progress, settings.options))
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)
@@ -148,7 +162,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
         verdict=verdict_of(bool(gap) and not slight, findings, left),
-        model=fitted.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
+        model=found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()

@@ -11,18 +11,20 @@ if TYPE_CHECKING:
     from workbench.identify.conclusions import ReadOff, Residuals
     from workbench.identify.estimators.dropped_again import TakesAsPlayed
     from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
     from workbench.identify.results.ties import Tie
-    from workbench.identify.rollouts import RolloutEvaluator
+    from workbench.identify.rollouts.evaluator import RolloutEvaluator
     from workbench.robot import Posterior, RobotModel
 
 
 @dataclass(frozen=True)
 class Problem:
     """What is to be explained. nominal: the robot with what was read off; residuals: what it leaves, by take; pool: effects that
-    may act; played: commands that never arrived, which a search may read again; thorough: without a limit of work."""
+    may act; played: commands that never arrived, which a search may read again; thorough: without a limit of work; options: of a
+    search of servo logs."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -31,6 +33,7 @@ class Problem:
     played: TakesAsPlayed
     thorough: bool
     progress: Progress
+    options: EvidenceOptions
 
 
 class Explained(Protocol):
@@ -39,6 +42,10 @@ class Explained(Protocol):
     @property
     def model(self) -> RobotModel:
         """The robot with the effects that were found, beside the commands that never arrived."""
+
+    @property
+    def calibrated(self) -> RobotModel:
+        """The same, with how well its servos' numbers are known now."""
 
     @property
     def missed(self) -> Sequence[DroppedCommands]:

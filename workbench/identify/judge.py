@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.identify.options import PROBLEM
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 COMPILED = "the compiled station"

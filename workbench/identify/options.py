@@ -32,6 +32,12 @@ class ProblemOptions:
     there is told by a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
     pose_frames: int = 7
     """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
+    state_span: float = 0.06
+    """Of positions of a servo log from which a state is told that a window starts from [s]: about a servo's rise time."""
+    state_order: int = 3
+    """Of the polynomial through them: over so long a servo's acceleration changes."""
+    states_kept: int = 256
+    """Takes and horizons of which states are kept, as they are played again and again."""
     block: float = 0.4
     """Length of a stretch [s]."""
     uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")

@@ -15,7 +15,7 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 

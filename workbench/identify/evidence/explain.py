@@ -13,7 +13,7 @@ from workbench.compare.session_takes import Progress
 from workbench.identify.evidence.checks import checks, drifts, refuted
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
-from workbench.identify.evidence.nuisance import uncertain_numbers
+from workbench.identify.evidence.nuisance import uncertain_numbers, uncertain_since
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import posterior_of
@@ -35,9 +35,9 @@ def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:
     return all(e.take.spec.base == "fixed" and not e.take.recorded.zeroed for e in evidence)
 
 
-def explained_by_evidence(problem: Problem, options: EvidenceOptions | None = None) -> Explanation:
+def explained_by_evidence(problem: Problem) -> Explanation:
     """Searches each joint's effects by evidence."""
-    options = options or EvidenceOptions()
+    options = problem.options
     whole, nominal, progress = problem.evaluator, problem.nominal, problem.progress
     evaluator = whole.on(_begun(whole.evidence, options.seconds))
     evidence = evaluator.evidence
@@ -109,7 +109,9 @@ def _looked_at(e: TakeEvidence, until: float) -> TakeEvidence:
 
 def _region(joint: str, evidence: Sequence[TakeEvidence], nominal: RobotModel, pool: Sequence[Candidate], options: EvidenceOptions
             ) -> Region:
-    return region_of([joint], evidence, uncertain_numbers(nominal, joint, zeroed=False), _acting(pool, joint, nominal), options)
+    numbers = (uncertain_numbers(nominal, joint, False, options.sheet) if options.drift is None
+               else uncertain_since(nominal, joint, False, options.drift))
+    return region_of([joint], evidence, numbers, _acting(pool, joint, nominal), options)
 
 
 def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Found]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,14 +14,15 @@ from workbench.compare.metrics import rms
 from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import UNITS, ZERO, Uncertain, as_mapping, nominal_value, turned_horn
+from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, what_changed, with_known
 from workbench.identify.evidence.step_errors import extrapolated
+from workbench.identify.evidence.tied import as_torque
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
 
@@ -62,6 +63,15 @@ class Explanation:
         return self.rollouts.model([p.best.hypothesis for p in self.posteriors])
 
     @property
+    def calibrated(self) -> RobotModel:
+        """The same, with how well its servos' numbers are known now."""
+        sds: dict[Uncertain, float] = {}
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            variances = np.diag(p.best.covariance(region, self.options))
+            sds |= {n: n.sd * math.sqrt(v) for n, v in zip(p.best.hypothesis.numbers, variances)}
+        return with_known(self.model, sds)
+
+    @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
         return tuple(r for p in self.posteriors
@@ -80,12 +90,15 @@ class Explanation:
                 if (of_all := self.robot.rivals.get(c.key)) is not None:
                     share /= 1.0 + math.exp(min(of_all[1], 700.0))
                     others.append(Alternative(of_all[0].name, of_all[0].where, CONCLUSIONS.surest - share))
+                tie = as_torque(region, self.options, p.best, c)
+                share *= 1.0 if tie is None else tie.share
                 others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
                 where = (*c.where, *(place for _, places in elsewhere for place in places))
                 fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
                 out.append(Finding(
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
-                    estimates(c, x, covariance[s, s]), fit, validation, tuple(others[:1]), c.effect.sentence(c.spec(x)),
+                    estimates(c, x, covariance[s, s]), fit, validation, tuple(others[:1]),
+                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence),
                     family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
 
@@ -186,13 +199,3 @@ class Explanation:
                     hypotheses[k] = other.hypothesis
                     out.append(Tie(self.model, self.rollouts.model(hypotheses), rival[1]))
         return tuple(out)
-
-
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
-    """Nominal and recalibrated values, those that went furthest first."""
-    out = []
-    for number, by in z.items():
-        nominal = 0.0 if number.name == ZERO else nominal_value(model.servo(number.joint), number.name)
-        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
-    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from workbench.identify.fitting.fits import Search
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
-    from workbench.identify.rollouts import RolloutEvaluator
+    from workbench.identify.rollouts.evaluator import RolloutEvaluator
 
 Array = NDArray[np.float64]
 

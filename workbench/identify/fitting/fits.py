@@ -16,7 +16,7 @@ from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest, t
 from workbench.identify.fitting.responses import Part, ResponseBank
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.ties import Tie
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
 from workbench.identify.selection.forward import select
@@ -49,6 +49,11 @@ class Selected:
     def model(self) -> RobotModel:
         """The robot with its effects."""
         return self.fit.model(self.search.nominal)
+
+    @property
+    def calibrated(self) -> RobotModel:
+        """The same: the nominal law is taken as it is."""
+        return self.model
 
     @property
     def missed(self) -> tuple[DroppedCommands, ...]:

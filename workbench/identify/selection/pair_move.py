@@ -18,7 +18,7 @@ from workbench.identify.fitting.fits import Report, Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.identify.selection.acceptance import is_acceptable, too_little_left
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
 from workbench.identify.selection.candidate_fit import CandidateFit

@@ -14,7 +14,7 @@ from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blo
 from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest, take_of
 from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel

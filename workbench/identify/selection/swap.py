@@ -20,7 +20,7 @@ from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.fitting.responses import scan
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.identify.selection.best_subsets import (
     Response,
     begun_again,
