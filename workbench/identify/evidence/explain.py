@@ -21,12 +21,12 @@ from workbench.identify.evidence.nuisance import (
     turned_horn,
     uncertain_numbers,
     uncertain_since,
-    what_changed,
     with_known,
 )
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.plausible import at_their_end
 from workbench.identify.evidence.posterior import RegionPosterior, posterior_of
+from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.region import Region, region_of
 from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
