@@ -14,7 +14,8 @@ from workbench.compare.metrics import rms
 from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, what_changed, with_known
+from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, with_known
+from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
 from workbench.identify.options import CONCLUSIONS, PROBLEM

@@ -9,7 +9,6 @@ from dataclasses import replace
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.results.findings import Recalibrated
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -96,13 +95,3 @@ def with_known(model: RobotModel, sds: Mapping[Uncertain, float]) -> RobotModel:
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:
     """Standard deviations by number."""
     return dict(zip(numbers, map(float, z), strict=True))
-
-
-def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
-    """Nominal and recalibrated values, those that went furthest first."""
-    out = []
-    for number, by in z.items():
-        nominal = 0.0 if number.name == ZERO else nominal_value(model.servo(number.joint), number.name)
-        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
-    return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))
