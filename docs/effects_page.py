@@ -53,6 +53,14 @@ SEEN: dict[str, Seen] = {
         "`τ = −sign(ω) (τ_C + torque)`; at rest it holds up to `τ_C + torque`",
         "Slow reversals stick; the joint stops short of its goal from either side.",
         "dead_band, load_friction"),
+    "command_filter": Seen(
+        "`T df/dt = goal − f`, `T = T₀ + time`; ref moves to f",
+        "Steps come rounded, and everything later by the time constant; joints at rest show nothing.",
+        "command_delay, goal_ramp"),
+    "damping_gain": Seen(
+        "`duty = duty(e) − (k₀ + gain) ω`, cut at ±1",
+        "The joint is slower where duty is not full, with torque on alone; at full duty it is as fast as ever.",
+        "viscous_friction, which also acts with torque off"),
     "dead_band": Seen(
         "`d = |e| − (margin₀ + margin)`",
         "The joint stops short of its goal by a constant angle, with little torque.",
@@ -69,6 +77,10 @@ SEEN: dict[str, Seen] = {
         "`τ = −sign(ω) τ_C (1 + s sign(ω))`, `s = (ratio − 1)/(ratio + 1)`",
         "One direction of travel lags more than the other; at rest the error depends on where it came from.",
         "coulomb_friction, parallel_spring"),
+    "goal_ramp": Seen(
+        "`|d ref/dt| ≤ speed`",
+        "Large steps come late in proportion to their size; small and slow ones show nothing.",
+        "command_delay, a weak supply, command_filter"),
     "ground_friction": Seen(
         "`|F_t| ≤ friction · F_n` at each foot",
         "The robot goes less far, or turns; joints are as they should be.",
@@ -106,6 +118,10 @@ SEEN: dict[str, Seen] = {
         "`τ = −stiffness · q`",
         "The error grows with the angle, load or not (a taut cable).",
         "servo_gain, payload"),
+    "minimum_duty": Seen(
+        "`duty = sign(e) (p₀ + duty + gain · d)` outside the dead zone",
+        "The joint comes closer to its goal before it stops, and may hum there.",
+        "servo_gain, less coulomb_friction"),
     "payload": Seen(
         "`m = m₀ + mass`, `c = (m₀ c₀ + mass · position)/m`, the inertia with that of the point",
         "Joints above it err with gravity and acceleration; walks change.",

@@ -49,6 +49,10 @@ def commands() -> Commands:
     ("reflected_inertia", {"inertia": 0.003}, "inertia", lambda old: old + 0.003),
     ("dead_band", {"margin": 1.5}, "margin", lambda old: old + 1.5 * DEG),
     ("servo_gain", {"ratio": 0.7}, "gain", lambda old: old * 0.7),
+    ("minimum_duty", {"duty": 0.04}, "punch", lambda old: old + 0.04),
+    ("command_filter", {"time": 0.02}, "lag", lambda old: old + 0.02),
+    ("damping_gain", {"gain": 0.03}, "derivative", lambda old: old + 0.03),
+    ("goal_ramp", {"speed": 180.0}, "ramp", lambda old: np.full_like(old, np.pi)),
 ])
 def test_a_servos_constant_changes_at_its_joint_alone(nominal, name, parameters, field, expected):
     law = physics_of(with_effect(name, ("flm", "tail"), **parameters)).law

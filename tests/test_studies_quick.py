@@ -13,7 +13,7 @@ from tests.shared_data import shared
 ROOT = Path(__file__).parents[1]
 STUDIES = sorted(name for path in (ROOT / "studies").rglob("*.py")
                  for name in re.findall(r'run_study\("(\w+)"', path.read_text(encoding="utf-8")))
-RECORDINGS = {"evidence": "data/xl330", "xl330": "data/xl330"}
+RECORDINGS = {"evidence": "data/xl330", "sts3215": "data/sts3215", "xl330": "data/xl330"}
 """Recordings that are not distributed, by the study that needs them."""
 
 

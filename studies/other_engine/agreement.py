@@ -49,6 +49,8 @@ FIXED = (
     E("joint_stop", "flm", lower=-10.0, upper=12.0), E("zero_offset", "flm", angle=6.0),
     E("parallel_spring", "flm", stiffness=0.6),
     E("command_delay", "flm", delay=0.02), E("timing_drift", per_pose=0.006), E("clock_rate", ratio=1.015), E("speed_order"),
+    E("goal_ramp", "flm", speed=40.0), E("command_filter", "flm", time=0.06), E("damping_gain", "flm", gain=0.1),
+    E("minimum_duty", "flm", duty=0.1),
     E("loose_mount", "flm", play=4.0, axis=(1.0, 0.0, 0.0)), E("payload", "flb_link", mass=0.08, position=(0.01, 0.0, -0.05)),
     E("com_shift", "flm_link", offset=(0.03, 0.0, 0.0)), E("ground_tilt", forward=15.0, left=-10.0),
 )

@@ -84,7 +84,7 @@ class _Run:
         self.joints, self.servos, self.model = robot.joints, hidden.servos, model
         self.drive = Drive(hidden.servos, hidden.steps)
         self.data = mujoco.MjData(model)
-        self.reference = Reference(len(self.joints))
+        self.reference = Reference(len(self.joints), hidden.servos.ramp, hidden.servos.lag)
         self.position = np.array([model.joint(j).qposadr[0] for j in self.joints])
         self.dof = np.array([model.joint(j).dofadr[0] for j in self.joints])
         self.feet = {link.name: model.body(link.name).id for link in robot.links if link.shapes}
@@ -136,7 +136,7 @@ class _Run:
         where less than the motor's torque acts."""
         servos, data, model, on = self.servos, self.data, self.model, self.reference.enabled
         q, v = data.qpos[self.position], data.qvel[self.dof]
-        duty = np.where(on, servos.duty(self.reference.at(t) - self.drive.sensed(q)), 0.0)
+        duty = np.where(on, servos.duty(self.reference.at(t) - self.drive.sensed(q), v), 0.0)
         damping, on_link = self.damping, None
         if self.drive.effects:
             now = Instant(t, model.opt.timestep, q, v, self.series @ data.qpos, duty, self.load, self.motor, self.rubbed)

@@ -32,33 +32,47 @@ class ServoBank:
         self.viscous = column("viscous_friction")
         self.coulomb = column("coulomb_friction")
         self.inertia = column("reflected_inertia")
+        self.derivative = column("derivative_gain")
+        self.ramp = np.where(column("goal_ramp") > 0, np.deg2rad(column("goal_ramp")), np.inf)
+        self.lag = column("command_filter")
+        plain = np.where(proportional, column("minimum_duty"), 0.0)
+        self.punch, self.slope = self.punch + plain, self.slope * (1 - plain)  # the gain beyond the dead zone is as given
+        self.margin = self.margin + np.where(proportional, np.deg2rad(column("dead_zone")), 0.0)
 
-    def duty(self, error: Array) -> Array:
-        """Duty, -1 to 1, at an error goal - position [rad], (..., n)."""
+    def duty(self, error: Array, speed: Array | float = 0.0) -> Array:
+        """Duty, -1 to 1, at an error goal - position [rad] and a joint speed [rad/s], (..., n)."""
         beyond = np.abs(error) - self.margin
-        size = np.minimum(1.0, self.punch + (1 - self.punch) * beyond / self.slope)
-        return np.where(beyond > 0, np.copysign(size, error), 0.0)
+        size = np.where(beyond > 0, self.punch + (1 - self.punch) * beyond / self.slope, 0.0)
+        return np.clip(np.copysign(size, error) - self.derivative * speed, -1.0, 1.0)
 
     def motor_torque(self, error: Array, speed: Array, enabled: Array | bool = True) -> Array:
         """Torque of the motor at the joint [N m] at a joint speed [rad/s]: the torque-speed line scaled by duty."""
-        return np.where(enabled, self.duty(error) * self.full_torque - self.back_emf * speed, 0.0)
+        return np.where(enabled, self.duty(error, speed) * self.full_torque - self.back_emf * speed, 0.0)
 
 
 class Reference:
-    """What each servo steers to: from its last reference to the goal, at the moving speed (0 = at once)."""
+    """What each servo steers to: from its last reference to the goal, at the moving speed (0 = at once) or its own ramp, behind
+    its own low-pass filter. Asked at times that do not go back."""
 
-    def __init__(self, n: int) -> None:
-        self._since, self._from, self._goal = 0.0, np.zeros(n), np.zeros(n)
+    def __init__(self, n: int, ramp: Array | float = np.inf, lag: Array | float = 0.0) -> None:
+        self._now, self._goal, self._smooth, self._at = 0.0, np.zeros(n), np.zeros(n), np.zeros(n)
+        self._ramp, self._lag = ramp, np.broadcast_to(np.asarray(lag, dtype=float), n)
         self._speed, self.enabled = np.full(n, np.inf), np.ones(n, dtype=bool)
 
     def command(self, t: float, goal: Array, speed: Array, enabled: NDArray[np.bool_], position: Array) -> None:
         """A command at time t [s]; a servo that is just enabled starts from its `position`."""
-        self._from = np.where(enabled & ~self.enabled, position, self.at(t))
-        self._since, self._goal, self.enabled = t, np.asarray(goal, dtype=float), np.asarray(enabled, dtype=bool)
-        self._speed = np.where(np.asarray(speed) > 0, speed, np.inf)
+        self._at = np.where(enabled & ~self.enabled, position, self.at(t))
+        self._now, self._goal, self.enabled = t, np.asarray(goal, dtype=float), np.asarray(enabled, dtype=bool)
+        self._speed = np.minimum(np.where(np.asarray(speed) > 0, speed, np.inf), self._ramp)
 
     def at(self, t: float) -> Array:
         """The reference (n,) [rad] at t, not before the last command [s]."""
-        elapsed = t - self._since
+        elapsed = t - self._now
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = np.where(self._lag > 0, np.exp(-elapsed / self._lag), 0.0)
+        smooth = self._goal + (self._smooth - self._goal) * left
         reach = self._speed * elapsed if elapsed > 0 else np.where(np.isinf(self._speed), np.inf, 0.0)
-        return self._from + np.minimum(np.maximum(self._goal - self._from, -reach), reach)
+        at = self._at + np.minimum(np.maximum(smooth - self._at, -reach), reach)
+        if self._lag.any():  # the ramp chases a goal that moves: step by step
+            self._now, self._smooth, self._at = t, smooth, at
+        return at

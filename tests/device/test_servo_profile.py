@@ -17,7 +17,8 @@ VIRTUAL = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215
 def test_the_shipped_families():
     assert set(servo_profiles()) == {"AX-12A", "MX-28", "XL-330", "XL-430", "STS3215"}
     constants = servo_profile("AX-12A").constants()
-    assert replace(constants, sd=()) == ServoConstants()
+    assert replace(constants, sd=(), torque_tolerance=None, back_emf_tolerance=None) == ServoConstants()
+    assert constants.share_known("torque_at_full_duty") == constants.share_known("back_emf") == 0.5
     for key in ("supply_voltage", "no_load_speed", "coulomb_friction", "viscous_friction", "reflected_inertia"):
         assert constants.share_known(key) == pytest.approx(ServoConstants().share_known(key), abs=0.01), key
     assert constants.share_known("compliance_slope") == 0
@@ -91,3 +92,13 @@ def test_a_profile_that_is_wrong_is_named_with_its_place(tmp_path, old, new, sai
     path.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=rf"servo\.yaml: {said}"):
         load_profile(path)
+
+
+def test_a_feetech_ramps_its_goals_and_rubs_under_load():
+    servo = servo_profile("STS3215").constants()
+    assert servo.ramp == pytest.approx(5.1, abs=0.1)
+    assert servo.goal_delay == 0.02
+    assert {servo.share_known(k) for k in ("goal_delay", "minimum_duty")} == {0.5}
+    assert servo.share_known("load_friction") == pytest.approx(0.6)
+    assert servo.punch_duty == 0.015
+    assert servo.margin == pytest.approx(2 * math.pi / 4096, rel=1e-3)

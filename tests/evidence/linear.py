@@ -44,7 +44,7 @@ class Linear(Rollouts):
     does: Mapping[str, np.ndarray] = field(default_factory=dict)
     sticks: float = 0.0
 
-    def around_here(self, step):
+    def around_here(self, step, horizon=None):
         return replace(self, step=step)
 
     def answers(self, wants):

@@ -12,10 +12,10 @@ from workbench.effects.base import Registers
 from workbench.effects.registry import effect_named
 from workbench.effects.sdf import SdfRobot
 from workbench.files import InputError
-from workbench.identify.evidence.explain import what_changed
 from workbench.identify.evidence.hypothesis import Uncertain, start
 from workbench.identify.evidence.nuisance import recalibrated, uncertain_numbers
 from workbench.identify.evidence.plausible import at_their_end
+from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.parameters import Candidate
 from workbench.robot import ServoConstants
 from workbench.robot.servo_constants import SHARES_KNOWN, load_servo_constants

@@ -28,7 +28,7 @@ class Robot(Rollouts):
     truth: tuple[np.ndarray, ...] = ()
     does: Mapping[tuple[int, str], np.ndarray] = field(default_factory=dict)
 
-    def around_here(self, step):
+    def around_here(self, step, horizon=None):
         return replace(self, step=step)
 
     def answers(self, wants):

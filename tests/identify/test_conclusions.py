@@ -19,6 +19,8 @@ from workbench.identify.selection.model_comparison import NamePosterior, Rival
 FRAME = {0: np.ones((1, 1))}
 EVERY = np.ones(1, dtype=bool)
 SEEN = [SimpleNamespace(joints=("knee",), channels=("knee",), sigma=np.ones(1), uses={"fit": EVERY, "validate": EVERY})]
+SD90 = CONCLUSIONS.z90 * CONCLUSIONS.wider
+"""Half of an interval, in standard deviations of a fit."""
 
 
 def test_where_a_mass_is_errs_with_its_moment_and_with_the_mass_together():
@@ -27,11 +29,11 @@ def test_where_a_mass_is_errs_with_its_moment_and_with_the_mass_together():
     x = np.array([4.0, 4.0, 8.0, -4.0])
     alone = estimates(c, x, np.diag([0.0, 0.04, 0.0, 0.0]))["position"]
     assert alone.value == pytest.approx((0.02, 0.04, -0.02))
-    assert alone.high[0] - alone.value[0] == pytest.approx(CONCLUSIONS.z90 * 0.2 / 4 * 0.02, rel=1e-3)
+    assert alone.high[0] - alone.value[0] == pytest.approx(SD90 * 0.2 / 4 * 0.02, rel=1e-3)
     assert alone.high[1] - alone.value[1] == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.least_relative * 0.04, rel=1e-3)
     same_place = 0.25 * np.outer(x, x) / 16
     together = estimates(c, x, same_place)
-    assert together["mass"].high - together["mass"].value == pytest.approx(CONCLUSIONS.z90 * 0.5 * 0.05, rel=1e-3)
+    assert together["mass"].high - together["mass"].value == pytest.approx(SD90 * 0.5 * 0.05, rel=1e-3)
     assert together["position"].high[0] - 0.02 == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.least_relative * 0.02, rel=1e-3)
 
 

@@ -57,7 +57,7 @@ def test_where_along_its_axis_a_mass_swings_is_not_known(rod):
     x = np.array([0.0, 0.0, 4.0])
     told = estimates(c, x, np.diag([0.01, 0.0, 0.0]))
     mass, at = told["mass"], told["position"]
-    assert (mass.high - mass.value) / mass.value == pytest.approx(CONCLUSIONS.z90 * 0.1 * np.log(2), rel=1e-3)
+    assert (mass.high - mass.value) / mass.value == pytest.approx(CONCLUSIONS.z90 * CONCLUSIONS.wider * 0.1 * np.log(2), rel=1e-3)
     assert np.isinf(at.high[1])
     assert np.isfinite(at.high[0])
     assert np.isfinite(at.high[2])

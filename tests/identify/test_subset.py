@@ -70,7 +70,7 @@ def test_what_is_looked_at_is_where_most_is_missing_and_no_more_than_asked(two, 
 
 def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(two):
     model, evaluator, residuals = two
-    early, never = (share._until(e, until) for e, until in zip(evaluator.evidence, (1.0, 0.0)))
+    early, never = (e.looked_at(until) for e, until in zip(evaluator.evidence, (1.0, 0.0)))
     other, before = evaluator.on([early, never]), evaluator.rollouts
     told = other.residuals([RolloutRequest(model, (0, 1))])[0]
     assert other.rollouts - before == 1
@@ -78,9 +78,22 @@ def test_a_take_that_is_not_looked_at_costs_nothing_and_one_that_is_ends_early(t
     assert np.isnan(told[0][early.since > 1.0]).all()
     well_before = early.moving & (early.since < 0.9)
     # the start shifts by what may be seen, which is less
-    np.testing.assert_allclose(told[0][well_before], residuals[0][well_before], atol=0.1)
+    np.testing.assert_allclose(told[0][well_before], residuals[0][:len(early.since)][well_before], atol=0.1)
     floors = floors_everywhere([early, never], {0: np.ones(len(early.channels)), 1: np.zeros(len(never.channels))})
     np.testing.assert_allclose(floors[1] * never.sigma, early.sigma)
+
+
+def test_a_take_is_cropped_to_what_is_looked_at_and_says_the_same_to_the_bit(two):
+    model, evaluator, _ = two
+    e = evaluator.evidence[0]
+    cropped = e.looked_at(1.2)
+    assert cropped.since[-1] < 1.2 + PROBLEM.late + 3 * e.frame_time < e.since[-1]
+    assert len(cropped.take.recorded.q) == len(cropped.recorded) == len(cropped.offset) == len(cropped.uses["fit"])
+    whole = replace(e, until=1.2, uses={use: mask & (e.since <= 1.2) for use, mask in e.uses.items()})
+    left = [evaluator.on([of]).residuals([RolloutRequest(model, (0,))])[0][0] for of in (cropped, whole)]
+    np.testing.assert_array_equal(left[0], left[1][:len(left[0])])
+    assert np.isfinite(left[0]).any()
+    assert not np.isfinite(left[1][len(left[0]):]).any()
 
 
 @pytest.mark.parametrize("long", [1.0, 60.0])

@@ -12,6 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from workbench.effects.apply import physics_of
 from workbench.effects.base import Effect
 from workbench.robot import EffectSpec, RobotModel
+from workbench.servo import TermBank
 from workbench.simulation import Job, Simulation, SimulationConfig
 from workbench.simulation.compiled.arrays import Log, State, work_for
 from workbench.simulation.compiled.machine import Machine, machine_of
@@ -24,10 +25,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Step:
-    """State of the plant x and of the bank before a step, the goal while it lasts, and the plant's state after it."""
+    """State of the plant x and of the bank (lagging: the goal behind its filter) before a step, the goal while it lasts, and the
+    plant's state after it."""
 
     x: Array
     reference: Array
+    lagging: Array
     memory: Array
     goal: Array
     on: Array
@@ -61,10 +64,12 @@ def drake_steps(model: RobotModel, config: SimulationConfig, seed: int, count: i
             sim._command(goal, random.uniform(0.0, 6.0, n) * (random.uniform(size=n) > 0.2), on)
         x = plant.GetPositionsAndVelocities(context).copy()
         reference = bank_context.get_discrete_state(0).CopyToVector()
-        remembers = bank_context.num_discrete_state_groups() > 1
+        bank = sim._bank()[0]
+        lagging = bank_context.get_discrete_state(bank._filtered).CopyToVector() if bank._lags else reference
+        remembers = isinstance(bank, TermBank)
         memory = bank_context.get_discrete_state(1).CopyToVector() if remembers else np.zeros(4 * n + 1)
         sim.simulator.AdvanceTo((k + 1) * config.time_step)
-        yield Step(x, reference, memory, goal + physics_of(model).zero, on, k * config.time_step,
+        yield Step(x, reference, lagging, memory, goal + physics_of(model).zero, on, k * config.time_step,
                    plant.GetPositionsAndVelocities(context).copy())
 
 
@@ -84,7 +89,7 @@ class CompiledSteps:
         start = 7 if self.free else 0
         joints = len(m.servos.joint)
         state = State(base=base, q=step.x[start:start + n].copy(), v=step.x[start + n:].copy(), reference=step.reference.copy(),
-                      goal=step.goal.copy(), reach=np.full(joints, np.inf), on=step.on > 0.5,
+                      goal=step.goal.copy(), lagging=step.lagging.copy(), reach=np.full(joints, np.inf), on=step.on > 0.5,
                       memory=np.ascontiguousarray(step.memory[:-1].reshape(4, -1)), stepped=step.memory[-1:].copy())
         schedule = schedule_of(self.config, None, 0.0, self.config.time_step, step.time, None)
         none = np.zeros((0, joints))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
 from workbench.compare import compare_session as comparing
 from workbench.compare.prediction import predict_session
@@ -15,11 +16,12 @@ from workbench.compare.session_takes import LeftOut, no_progress
 from workbench.experiment.next_experiment import with_next_experiment
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.judge import COMPILED
 from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.motion import Motion, save_motion
 from workbench.recording import Take
-from workbench.robot import RobotModel
+from workbench.robot import RobotModel, load_model
 from workbench.simulation import SimulationConfig
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison
@@ -63,17 +65,23 @@ class DiagnoseOptions:
 
     jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
     folder that keeps every rollout, so that a run that was killed continues; None: nothing is kept. without: names of effects
-    (docs/effects.md) that are known to be absent, and are not searched for. InputError for fewer than one process.
+    (docs/effects.md) that are known to be absent, and are not searched for. previous: model.yaml of an earlier diagnosis of this
+    robot, which is then nominal: findings are what is new. engine: "auto" (compiled rollouts that Drake judges) or "drake" (all
+    rollouts by Drake, much slower). InputError for fewer than one process or another engine.
     """
 
     jobs: int = 2
     thorough: bool = False
     resume: Path | None = None
     without: tuple[str, ...] = ()
+    previous: Path | None = None
+    engine: Literal["auto", "drake"] = "auto"
 
     def __post_init__(self) -> None:
         if self.jobs < 1:
             raise InputError(None, f"jobs: expected 1 or more processes, got {self.jobs}")
+        if self.engine not in ("auto", "drake"):
+            raise InputError(None, f"engine: expected 'auto' or 'drake', got {self.engine!r}")
 
 
 @dataclass(frozen=True)
@@ -108,8 +116,10 @@ class DiagnosisResult:
             save_motion(self.next_motion, paths[-1])
         if self.session.predict:
             (folder / "predict").mkdir(exist_ok=True)
+            judged = self.diagnosis.provenance.get("engine", {}).get("rollouts by") == COMPILED  # on these very models
+            config = SimulationConfig(contact_period=0, engine="auto" if judged else "drake")
             paths += predict_session(self.session, self.model, folder / "predict", progress, nominal=self.session.model,
-                                     n_jobs=jobs).paths
+                                     config=config, n_jobs=jobs).paths
         return paths
 
     def _repr_html_(self) -> str:
@@ -134,11 +144,13 @@ class PredictionResult:
 
 
 def compare_session(session: Session | str | PathLike[str], config: SimulationConfig | None = None,
-                    model: RobotModel | None = None, *, progress: Progress = no_progress, jobs: int = 2) -> ComparisonResult:
+                    model: RobotModel | None = None, *, progress: Progress = no_progress, jobs: int = 2,
+                    finer_steps: Literal["judged", "drake"] = "judged") -> ComparisonResult:
     """Simulates, registers and compares every take of a session (or of a session.yaml).
 
     config: of the rollouts, their base as each take says. model: another model of the robot than the session's, such as a
-    diagnosed one. progress: called with the stage and the share done. jobs: processes that simulate.
+    diagnosed one. progress: called with the stage and the share done. jobs: processes that simulate. finer_steps: of the
+    numerical floor, by the compiled station where Drake judged it to do the same ("judged"), or all by Drake.
 
     Returns errors (RMS after the first command) of each joint [rad] and of the base [m], with noise and numerical floor, and the
     takes in SI units and radians, world x forward, y left, z up. A damaged take is left out and named in `comparison.left_out`;
@@ -146,7 +158,8 @@ def compare_session(session: Session | str | PathLike[str], config: SimulationCo
     """
     session = _loaded(session)
     session = session if model is None else session.with_model(model)
-    return ComparisonResult(comparing.compare_session(session, config, progress=progress, n_jobs=jobs), session)
+    return ComparisonResult(comparing.compare_session(session, config, progress=progress, n_jobs=jobs, finer_steps=finer_steps),
+                            session)
 
 
 def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | None = None, *,
@@ -160,7 +173,9 @@ def diagnose(session: Session | str | PathLike[str], options: DiagnoseOptions | 
     """
     options = options or DiagnoseOptions()
     session = _loaded(session)
-    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without)
+    previous = None if options.previous is None else load_model(options.previous)
+    found = diagnose_session(session, progress, options.jobs, options.resume, options.thorough, options.without, previous,
+                             options.engine)
     diagnosis, motion = with_next_experiment(found, options.jobs, progress)
     return DiagnosisResult(diagnosis, session, found.takes, motion)
 

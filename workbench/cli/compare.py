@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from workbench.cli.check import add_yes, check_files, check_session, say_left_out
-from workbench.cli.options import PUPPY, add_cycles, add_model, add_out, load_model, positive
+from workbench.cli.options import PUPPY, add_cycles, add_engine, add_model, add_out, load_model, positive
 
 STAGES = ("reading", "simulating", "registering", "comparing", "drawing")
 
@@ -29,6 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_cycles(parser, 1)
     add_yes(parser)
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
+    add_engine(parser, "the finer steps of a session's numerical floor compiled where Drake judged that to be the same")
     add_out(parser)
     parser.set_defaults(run=run)
 
@@ -51,7 +52,8 @@ def run(args: argparse.Namespace) -> int:
             if args.model != PUPPY:
                 session = session.with_model(load_model(args.model, args.packages))
             told = check_session("compare", session, args.yes)
-            result = compare_session(session, config, progress=progress, jobs=args.jobs)
+            result = compare_session(session, config, progress=progress, jobs=args.jobs,
+                                     finer_steps="drake" if args.engine == "drake" else "judged")
             comparison, written = result.comparison, result.save(folder, progress)
         else:
             model = load_model(args.model, args.packages)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from workbench.cli.check import add_yes, check_session, say_left_out
-from workbench.cli.options import add_out, positive
+from workbench.cli.options import add_engine, add_out, positive
 
 if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
@@ -38,17 +38,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
                         help="exclude this effect (a name from docs/effects.md) from the search, because you know it is absent; "
                         "repeatable")
+    parser.add_argument("--model", metavar="FILE", dest="previous",
+                        help="model.yaml of an earlier diagnosis of this robot: its servos and effects are nominal, as well as "
+                        "they were known then, and findings are what is new")
+    add_engine(parser, "compiled rollouts, judged by Drake")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """Diagnoses, predicts and writes."""
-    options = {"thorough": args.thorough, "memory": args.memory, "without": tuple(args.without), "yes": args.yes}
+    options = {"thorough": args.thorough, "memory": args.memory, "without": tuple(args.without), "yes": args.yes,
+               "previous": args.previous, "engine": args.engine}
     return diagnose_and_report(args.session, args.out, args.jobs, **options)
 
 
 def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: bool = False, memory: str | None = None,
-                        without: tuple[str, ...] = (), yes: bool = False) -> int:
+                        without: tuple[str, ...] = (), yes: bool = False, previous: str | None = None,
+                        engine: Literal["auto", "drake"] = "auto") -> int:
     """Diagnoses the session at `path`, writes the results into `out` and prints the verdict; returns the exit code.
 
     The other arguments are the options of the verb `diagnose`."""
@@ -58,11 +64,11 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     from workbench.cli.progress import Progress
     from workbench.compare.session import load_session
 
-    session = load_session(path)
+    session, before = load_session(path), None if previous is None else Path(previous)
     told = check_session("diagnose", session, yes)
     with (output_directory(out, need=16 << 20) as folder, Progress("diagnose", stages=STAGES) as progress,
           rollout_memory(out, session, memory) as kept):
-        result = diagnose(session, DiagnoseOptions(jobs, thorough, kept, without), progress=progress)
+        result = diagnose(session, DiagnoseOptions(jobs, thorough, kept, without, before, engine), progress=progress)
         paths = result.save(folder, progress, jobs)
     diagnosis = result.diagnosis
     say_left_out("diagnose", diagnosis.left_out, told)

@@ -46,6 +46,12 @@ def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None
         help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))
 
 
+def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
+    """--engine: whose rollouts; auto: what the default does."""
+    parser.add_argument("--engine", choices=("auto", "drake"), default="auto",
+                        help=f"auto: {auto}; drake: all rollouts by Drake, much slower (default: auto)")
+
+
 def _folder(text: str) -> Path:
     """A folder's path, for argparse; empty is a shell variable that nobody set, not here."""
     if not text:

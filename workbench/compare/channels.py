@@ -44,7 +44,7 @@ def channels_of(take: Take, names: tuple[str, ...]) -> Array:
 
 
 def body_channels(take: Take) -> Array:
-    """Gains in path (in the heading's frame) and heading over GAIN_SPAN, height, roll and pitch: (N, 6) [m, rad]."""
+    """Gains in path (in the heading's frame) and heading over `COMPARE.gain_span`, height, roll and pitch: (N, 6) [m, rad]."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     n = len(take)

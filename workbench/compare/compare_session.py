@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
 from workbench.compare.options import COMPARE
@@ -17,7 +21,10 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
+from workbench.simulation.compiled import covers
 from workbench.simulation.steady import BaseStates
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,8 +50,10 @@ class Run:
 
 
 def compare_session(session: Session, config: SimulationConfig | None = None, *, progress: Progress = no_progress,
-                    n_jobs: int = 2) -> Comparison:
-    """Simulates, registers and compares every take. config: of the nominal rollout, its base set by each take.
+                    n_jobs: int = 2, finer_steps: Literal["judged", "drake"] = "judged") -> Comparison:
+    """Simulates, registers and compares every take. config: of the nominal rollout, its base set by each take; by default
+    Drake's. finer_steps: those that give the numerical floor are the compiled station's where that does as Drake does at the
+    nominal step ("judged"), or Drake's in any case.
 
     A damaged take is left out and named in the result; InputError where none remains. The rollouts of all takes, steps and
     contact models run over `n_jobs` processes. progress: called with (what, share done or None).
@@ -53,7 +62,8 @@ def compare_session(session: Session, config: SimulationConfig | None = None, *,
     config = config or SimulationConfig(engine="drake")
     progress("reading recordings", None)
     takes, unreadable = read_takes(session)
-    rollouts = roll_out([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
+    rolled = roll_out_judged if finer_steps == "judged" and config.engine == "drake" else roll_out
+    rollouts = rolled([run_of(t) for t in takes], config, progress=progress, n_jobs=n_jobs)
     nominal = {t.spec.name: r.nominal for t, r in zip(takes, rollouts)}
     registered, unregistered = register_takes(session, takes, nominal, progress)
     by_name = dict(zip(nominal, rollouts))
@@ -66,19 +76,18 @@ def compare_session(session: Session, config: SimulationConfig | None = None, *,
 
 
 def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progress = no_progress, n_jobs: int = 2,
-             floors: bool = True) -> list[Rollouts]:
-    """Simulates each run; with `floors` also at finer steps and, where the robot stands on the ground, with the other contact."""
+             floors: bool = True, finer: bool = True) -> list[Rollouts]:
+    """Simulates each run; with `floors` also at finer steps (unless not `finer`) and, where the robot stands on the ground, with
+    the other contact."""
     jobs: list[tuple[int, str, Job]] = []
     for i, run in enumerate(runs):
         own = replace(config, base=run.base)
         variants = {"nominal": [own], "finer": [], "other_contact": []}
-        if floors and own.time_step > 0:
-            # what is written down stays on the same times
-            variants["finer"] = [replace(own, time_step=own.time_step / k, log_period=own.logged_every) for k in (2, 4)]
+        if floors and finer:
+            variants["finer"] = _finer(own)
         if floors and run.base == "free":
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
-        jobs += [(i, kind, Job(run.model, c, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start,
-                          steadied=run.steadied))
+        jobs += [(i, kind, _job(run, c, _instants(run, own) if kind == "finer" else None))
                  for kind, configs in variants.items() for c in configs]
     jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     progress("simulating", 0.0)
@@ -91,6 +100,55 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
                 mine[kind].append(take)
         out.append(Rollouts(mine["nominal"][0], tuple(mine["finer"]), tuple(mine["other_contact"])))
     return out
+
+
+def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: Progress = no_progress, n_jobs: int = 2
+                    ) -> list[Rollouts]:
+    """As `roll_out`, but for the finer steps of runs of which the compiled station covers the nominal one and agrees with Drake:
+    these are the compiled station's."""
+    done = roll_out(runs, config, progress=progress, n_jobs=n_jobs, finer=False)
+    progress("simulating finer steps", None)
+    nominal = [_job(run, replace(config, base=run.base, engine="auto")) for run in runs]
+    known = [i for i, job in enumerate(nominal) if _finer(job.config) and covers(job) is None]
+    takes = zip(known, simulate_batch([nominal[i] for i in known], n_jobs))
+    judged = {i for i, take in takes if _apart(take, done[i].nominal) < COMPARE.engines_apart}
+    jobs = [(i, _job(run, c, _instants(run, c))) for i, run in enumerate(runs)
+            for c in _finer(replace(config, base=run.base, engine="auto" if i in judged else config.engine))]
+    jobs.sort(key=lambda job: -_cost(job[1]))
+    finer: dict[int, list[Take]] = {}
+    for (i, _), take in zip(jobs, simulate_batch([job for _, job in jobs], n_jobs)):
+        finer.setdefault(i, []).append(take)
+    return [replace(r, finer=tuple(finer.get(i, ()))) for i, r in enumerate(done)]
+
+
+def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:
+    return Job(run.model, config, run.commands, run.duration, COMPARE.lead, name=run.name, start=run.start, steadied=run.steadied,
+               times=times)
+
+
+def _finer(config: SimulationConfig) -> list[SimulationConfig]:
+    """Half and a quarter of a step; what is written down stays on the same times."""
+    if config.time_step <= 0:
+        return []
+    return [replace(config, time_step=config.time_step / k, log_period=config.logged_every) for k in (2, 4)]
+
+
+def _apart(one: Take, other: Take) -> float:
+    """The largest difference of two rollouts' angles and base positions [rad, m]; infinite where they are not alike."""
+    pairs = [(one.q, other.q), *([] if one.p_WB is None or other.p_WB is None else [(one.p_WB, other.p_WB)])]
+    if any(a.shape != b.shape for a, b in pairs):
+        return np.inf
+    return max(float(np.max(np.abs(a - b), initial=0.0)) for a, b in pairs)
+
+
+def _instants(run: Run, config: SimulationConfig) -> Array | None:
+    """Of the log, where a floor is known by angles alone, as of a held robot: what tells no torques may be the compiled station's
+    where servos are switched off, too."""
+    if run.base != "fixed" or run.duration is None:
+        return None
+    lead = 0.0 if run.start is not None else COMPARE.lead
+    rows = np.arange(-round(lead / config.logged_every), math.floor(run.duration / config.logged_every + 1e-6) + 1)
+    return np.asarray(rows * config.logged_every, dtype=float)
 
 
 def provenance(model: RobotModel, config: SimulationConfig, seconds: float) -> dict[str, Any]:

@@ -26,8 +26,8 @@ from workbench.recording.mocap.tracks import check_assets, tracks_of
 from workbench.recording.recording import Recording
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-from workbench.simulation import Simulation, SimulationConfig, Start
-from workbench.simulation.batch import Job, simulate_batch
+from workbench.simulation import SimulationConfig, Start
+from workbench.simulation.batch import Job, run_job, simulate_batch
 
 Array = NDArray[np.float64]
 
@@ -48,10 +48,10 @@ def predict_session(session: Session, model: RobotModel, out_dir: Path, progress
     """Plays each of the session's `predict` entries on `model` and writes OUT_DIR/NAME.csv, as the recording would look.
 
     nominal: another model, whose predictions are written to NAME.nominal.csv beside. config: of the rollouts, their base as each
-    entry says. yaw [rad]: of the session, where it is known already; else found from its takes, as a start file, in which the
-    robot stands still, does not tell it. A captured take becomes a Motive CSV: `frames` frames at the start file's rate and
-    units, its assets, axes, pivots and clock. A prediction of `commands` becomes a joint log with their times, from the state
-    in their first row. InputError where a file does not fit, there is nothing to predict, or no yaw can be found.
+    entry says; by default Drake's. yaw [rad]: of the session, where it is known already; else found from its takes, as a start
+    file, in which the robot stands still, does not tell it. A captured take becomes a Motive CSV: `frames` frames at the start
+    file's rate and units, its assets, axes, pivots and clock. A prediction of `commands` becomes a joint log with their times,
+    from the state in their first row. InputError where a file does not fit, there is nothing to predict, or no yaw can be found.
     """
     config = config or SimulationConfig(contact_period=0, engine="drake")  # nobody asks for contact forces
     if not session.predict:
@@ -152,9 +152,8 @@ def predict_log(session: Session, spec: PredictSpec, path: Path, config: Simulat
         raise InputError(spec.commands, f"position.{model.joints[0]}: a start away from neutral needs base fixed")
     start = Start(np.nan_to_num(first["position"]), np.nan_to_num(first["velocity"]), logged=True) if known else None
     since = log.time - log.time[0]
-    simulation = Simulation(model, replace(config, base=spec.base))
-    take = simulation.run(log.commands, float(since[-1]) + config.logged_every, COMPARE.lead, start=start,
-                          name=spec.name).as_logged()
+    take = run_job(Job(model, replace(config, base=spec.base), log.commands, float(since[-1]) + config.logged_every, COMPARE.lead,
+                       name=spec.name, start=start)).as_logged()
     commanded = [j for j in model.joints if f"goal.{j}" in log.channels]
     channels = {name: values for name, values in log.channels.items() if name.startswith(("goal.", "enabled."))}
     channels |= {f"position.{j}": np.interp(since, take.time, take.q[:, take.column(j)]) for j in commanded}

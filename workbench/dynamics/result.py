@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
@@ -94,6 +93,8 @@ def save_inverse_dynamics(result: InverseDynamicsResult, path: str | Path) -> Pa
     about = {"name": result.name, "base": result.base, "problems": list(result.problems), "loads": _without_nan(loads)}
     out = io.StringIO()
     out.write(f"{HEADER}\n# {json.dumps(about)}\n{_UNITS}\n")
+    import pandas as pd
+
     pd.DataFrame(columns).to_csv(out, index=False, float_format="%.9g")
     return write_whole(path, out.getvalue())
 

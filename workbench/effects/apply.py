@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import Effect, check_places, si_values
 from workbench.effects.registry import effect_named
+from workbench.effects.schedules import delayed
 from workbench.effects.sdf import SdfRobot
 from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
-from workbench.servo import ServoLaw, ServoTerm
+from workbench.servo import ServoLaw, ServoTerm, nominal_terms
 
 Array = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ class Physics:
     """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
     coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
     tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
-    hard ends were added, which continuous plants ignore. terms: of the servos, beyond their constants."""
+    hard ends were added, which continuous plants ignore. terms: of the servos, by effects."""
 
     description: str | None
     law: ServoLaw
@@ -38,6 +39,11 @@ class Physics:
     moved: bool
     ends: bool
     terms: tuple[ServoTerm, ...] = ()
+
+    @property
+    def servo_terms(self) -> tuple[ServoTerm, ...]:
+        """All that servos do beyond constants, by the nominal law and by effects."""
+        return (*nominal_terms(self.law), *self.terms)
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
@@ -82,7 +88,8 @@ def physics_of(model: RobotModel) -> Physics:
             sdf = sdf or SdfRobot(model.path)
             effect.description(sdf, spec, model)
     return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
-                   sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends, tuple(terms))
+                   sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends,
+                   tuple(terms))
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
@@ -90,7 +97,10 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:
-    """What reaches the servos of commands that were sent."""
+    """What the servos act on of commands that were sent: as late as the nominal law has it, and as effects change it."""
+    late = np.array([model.servo(j).goal_delay for j in commands.joints])
+    for delay in np.unique(late[late > 0]).tolist():
+        commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)
     for effect, spec, values in resolved(model):
         commands = effect.commands(commands, spec.where, values, model)
     return commands

@@ -31,11 +31,16 @@ Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measure
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
 """Effects that do nearly the same, until data separate them: where no member is sure, the family may be."""
+Tie = Literal["gravity against torque", "less torque at full duty"]
+"""What servo logs tell as one number: angles do not change if all torques and inertias grow alike, so that only gravity over
+torque is known; and a torque that ends early, bends or sags with duty does the same."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
 """Ways to read an effect off the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
+REACH = 2.0
+"""Times what one in a hundred passes: further than that no number plausibly goes."""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 
@@ -47,7 +52,9 @@ class Parameter:
     them. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
     takes the place of a value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording
     goes below, as every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left
-    out; empty: it is always given."""
+    out; empty: it is always given. seldom_beyond: what one servo (or robot) in a hundred passes that has the effect at all, of a
+    vector its length, with the reason beside it; priors and reach follow from it. logarithmic: a ratio whose size is its
+    logarithm, so that 2 and 1/2 are as far."""
 
     name: str
     unit: str
@@ -60,12 +67,18 @@ class Parameter:
     replaces: bool = False
     resolution: float = 0.0
     option: str = ""
+    seldom_beyond: float = math.nan
+    logarithmic: bool = False
 
     def typical_beside(self, neutral: float) -> float:
         """The typical value, which is less than usual where it replaces the robot's own (a weak supply, a slippery floor); where
         that is so near, or less, that the step between them would show nothing of this, one beyond."""
         near = self.replaces and self.typical > (1 - NEAR) * neutral
         return BEYOND * neutral if near else self.typical
+
+    def distance(self, value: float, neutral: float) -> float:
+        """How far a value is from neutral: of a ratio the size of its logarithm."""
+        return abs(math.log(value / neutral)) if self.logarithmic else abs(value - neutral)
 
 
 @dataclass(frozen=True)
@@ -111,6 +124,8 @@ class Effect:
     engines are."""
     includes: ClassVar[tuple[str, ...]] = ()
     """Effects at the same place whose freedom it has, so that these say nothing beside it."""
+    tied: ClassVar[Tie | None] = None
+    """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
     steady_pull: ClassVar[bool] = False
     """Whether it pulls at the robot with a steady force: of several such, beside the one the others only make up for how roughly
     that was fitted."""
@@ -148,9 +163,16 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """How far its numbers may lie from neutral on this robot, in the units of docs/formats.md, a vector by its length: a
-        search moves no number further, and of servo logs it refutes what wants to go there."""
-        return math.inf
+        """How far its numbers may lie from neutral on this robot (`Parameter.distance`), in the units of docs/formats.md, a
+        vector by its length: a search moves no number further, and of servo logs it refutes what wants to go there. REACH times
+        what one in a hundred passes, where all parameters say that; an effect that vanishes at infinity has no end."""
+        neutral = iter(self.neutral(model))
+        away = []
+        for p in self.parameters:
+            at = [next(neutral) for _ in range(3 if p.vector else 1)]
+            if not p.shapes:
+                away.append(p.distance(p.seldom_beyond, 0.0 if p.vector else at[0]))
+        return REACH * max(away) if away and all(map(math.isfinite, away)) else math.inf
 
     def description(self, sdf: SdfRobot, spec: EffectSpec, model: RobotModel) -> None:
         """Changes the robot's SDF."""

@@ -27,26 +27,39 @@ def without_poses(commands: Commands, column: int, missed: Iterable[int]) -> Com
 
 
 def delayed(commands: Commands, columns: Iterable[int], late: float) -> Commands:
-    """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last."""
+    """The commands of some columns `late` seconds later; between its own instants, a joint keeps its last. Until the first one
+    it is in neutral, or, where commands had begun before, at the first one's goal."""
     columns = list(columns)
     if not late:
         return commands
     if len(columns) == len(commands.joints):
-        return replace(commands, times=commands.times + late, end=commands.end + late)
+        later = replace(commands, times=commands.times + late, end=commands.end + late)
+        return _since(later, commands.times[0]) if commands.begun and late > 0 else later
     own = [commands.goals[:, columns], commands.speeds[:, columns], commands.enabled[:, columns]]
     changes = np.zeros(len(commands.times), dtype=bool)  # else instants double with each joint
     for values, neutral in zip(own, (0.0, 0.0, True)):
-        changes |= (values != np.vstack([np.full_like(values[:1], neutral), values[:-1]])).any(axis=1)
+        earlier = values[:1] if commands.begun else np.full_like(values[:1], neutral)
+        changes |= (values != np.vstack([earlier, values[:-1]])).any(axis=1)
     changes[:1] |= late < 0
     times = np.union1d(commands.times, commands.times[changes] + late)
     times = times[np.diff(times, prepend=-np.inf) > SAME]
     now, before = (np.searchsorted(commands.times, times - s + SAME, side="right") - 1 for s in (0.0, late))
-    still, first, shifted = (now < 0)[:, None], np.maximum(now, 0), np.maximum(before, 0)  # still in neutral
+    first, shifted = np.maximum(now, 0), np.maximum(before, 0)
+    waits = not commands.begun  # in neutral
+    neutral_now, neutral_before = (now < 0)[:, None] & waits, (before < 0)[:, None] & waits
 
     def held(rows: np.ndarray, neutral: float) -> np.ndarray:
-        out = np.where(still, neutral, rows[first])
-        out[:, columns] = np.where(before[:, None] < 0, neutral, rows[shifted][:, columns])
+        out = np.where(neutral_now, neutral, rows[first])
+        out[:, columns] = np.where(neutral_before, neutral, rows[shifted][:, columns])
         return out
 
     return Commands(times, commands.joints, held(commands.goals, 0.0), held(commands.speeds, 0.0),
-                    held(commands.enabled, True).astype(bool), commands.end + late, commands.poses[first])
+                    held(commands.enabled, True).astype(bool), commands.end + late, commands.poses[first],
+                    commands.begun)
+
+
+def _since(commands: Commands, time: float) -> Commands:
+    """Commands whose first goals are there from `time` [s] on."""
+    rows = np.concatenate([[0], np.arange(len(commands.times))])
+    return replace(commands, times=np.concatenate([[time], commands.times]), goals=commands.goals[rows],
+                   speeds=commands.speeds[rows], enabled=commands.enabled[rows], poses=commands.poses[rows])

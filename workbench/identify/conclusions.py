@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.ledger import in_file_units
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import PointMass
-from workbench.identify.problem import TakeEvidence, joint_error, ratios
+from workbench.identify.problem import TakeEvidence, in_file_units, joint_error, ratios
 from workbench.identify.results.findings import (
     Alternative,
     Change,
@@ -27,11 +26,13 @@ from workbench.identify.results.findings import (
 )
 from workbench.identify.results.reasons import Dependence, Outdone, Reason, ScreenedOut, Signal, TooLittle, WorseInPlace
 from workbench.identify.results.ties import Tie
-from workbench.identify.selection.candidate_fit import CandidateFit
-from workbench.identify.selection.model_comparison import NamePosterior, Rival
-from workbench.identify.selection.record import SelectionStep
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
+
+if TYPE_CHECKING:
+    from workbench.identify.selection.candidate_fit import CandidateFit
+    from workbench.identify.selection.model_comparison import NamePosterior, Rival
+    from workbench.identify.selection.record import SelectionStep
 
 Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
@@ -70,7 +71,7 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NameP
     alternatives = tuple(Alternative(r.candidate.name, r.candidate.where, r.probability) for r in posterior.rivals
                          if r not in elsewhere and r.probability >= 0.01)[:1]
     own = fit.slices()[i]
-    numbers = estimates(c, x, CONCLUSIONS.wider**2 * fit.covariance[own, own])
+    numbers = estimates(c, x, fit.covariance[own, own])
     confidence = posterior.probability + sum(r.probability for r in elsewhere)
     others = [r for r in posterior.rivals if r not in elsewhere]
     return Finding(
@@ -99,7 +100,9 @@ def _elsewhere(c: Candidate, posterior: NamePosterior) -> list[Rival]:
 
 
 def estimates(c: Candidate, x: Array, covariance: Array) -> dict[str, Estimate]:
-    """Values and 90 % bounds in the units of docs/formats.md; numbers that were read off, not fitted, have no bounds."""
+    """Values and 90 % bounds in the units of docs/formats.md, `CONCLUSIONS.wider` than the covariance alone says; numbers that
+    were read off, not fitted, have no bounds."""
+    covariance = CONCLUSIONS.wider**2 * covariance
     half = CONCLUSIONS.z90 * np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore"):
         ends = np.array([c.values(x - np.nan_to_num(half, posinf=1e9)), c.values(x + np.nan_to_num(half, posinf=1e9))])
@@ -239,13 +242,21 @@ def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
     for k in np.flatnonzero(spread):
         covariance[k] = covariance[:, k] = 0.0
         covariance[k, k] = spread[k] ** 2
+    return with_read_off(Posterior(tuple(names), mean, covariance), read_off)
+
+
+def with_read_off(fitted: Posterior, read_off: Sequence[ReadOff]) -> Posterior:
+    """With numbers that no fit identified: where the model has them already with their variance, else one more each."""
+    names, mean, covariance = list(fitted.names), fitted.mean, fitted.covariance
     for r in read_off:
-        names += list(parameter_names([r.spec]))
-        mean = np.append(mean, r.mean)
-        wider = np.zeros((len(mean), len(mean)))
-        wider[:-1, :-1] = covariance
-        wider[-1, -1] = r.variance
-        covariance = wider
+        (name,) = parameter_names([r.spec])
+        if name not in names:
+            names, mean = [*names, name], np.append(mean, r.mean)
+            covariance = np.pad(covariance, ((0, 1), (0, 1)))
+        k = names.index(name)
+        covariance = covariance.copy()
+        covariance[k, :] = covariance[:, k] = 0.0
+        covariance[k, k] = r.variance
     return Posterior(tuple(names), mean, covariance)
 
 

@@ -10,8 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from workbench.identify.options import PROBLEM
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+
+COMPILED = "the compiled station"
+"""Whose rollouts a diagnosis stands on where Drake agrees."""
 
 
 class EnginesPartError(ArithmeticError):
@@ -19,14 +22,17 @@ class EnginesPartError(ArithmeticError):
 
 
 def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
-    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel of the takes' beginnings.
-    0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`; name: of the model, for its
-    text."""
+    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel, of one take nearly whole
+    and of the others' beginnings. 0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`;
+    name: of the model, for its text."""
     if evaluator.config.engine == "drake":
         return 0.0
     drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)
-    everywhere = [RolloutRequest(model, tuple(range(len(evaluator.evidence))), until=PROBLEM.engines_compared)]
-    (ours,), (theirs,) = evaluator.residuals(everywhere), drake.residuals(everywhere)
+    takes = range(len(evaluator.evidence))
+    whole = next((i for i in takes if evaluator.any_floating((i,))), 0)
+    questions = [RolloutRequest(model, (whole,), until=PROBLEM.engines_compared_whole),
+                 RolloutRequest(model, tuple(i for i in takes if i != whole), until=PROBLEM.engines_compared)]
+    ours, theirs = ({i: r for answer in e.residuals(questions) for i, r in answer.items()} for e in (evaluator, drake))
     worst = 0.0
     for i, residual in ours.items():
         apart = np.square(residual - theirs[i])

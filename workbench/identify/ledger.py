@@ -11,7 +11,7 @@ from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
 from workbench.effects.base import Layer
 from workbench.identify.options import PROBLEM
-from workbench.identify.problem import TakeEvidence, channel_gaps, ratios, smoothed
+from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, smoothed
 from workbench.identify.results.findings import GapEntry
 
 Array = NDArray[np.float64]
@@ -73,11 +73,6 @@ def _late(e: TakeEvidence, residual: Array, joints: Sequence[str]) -> set[str]:
         if len(r) and float(np.sum((r - lag @ size) ** 2)) < 0.35 * float(r @ r):
             mostly.add(c)
     return mostly if len(mostly) > 0.6 * len(joints) else set()
-
-
-def in_file_units(value: float, channel: str) -> tuple[float, str]:
-    """A channel's value [m or rad] in the units of docs/formats.md."""
-    return (value, "m") if channel in ("forward", "left", "height") else (float(np.rad2deg(value)), "deg")
 
 
 def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:

@@ -32,6 +32,12 @@ class ProblemOptions:
     there is told by a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
     pose_frames: int = 7
     """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
+    state_span: float = 0.06
+    """Of positions of a servo log from which a state is told that a window starts from [s]: about a servo's rise time."""
+    state_order: int = 3
+    """Of the polynomial through them: over so long a servo's acceleration changes."""
+    states_kept: int = 256
+    """Takes and horizons of which states are kept, as they are played again and again."""
     block: float = 0.4
     """Length of a stretch [s]."""
     uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")
@@ -74,8 +80,12 @@ class ProblemOptions:
     """Rollouts that are held in memory [MiB], those used last; others are read again from disk, where a folder keeps them."""
     engines_apart: float = 0.1
     """Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
-    engines_compared: float = 20.0
-    """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all."""
+    engines_compared: float = 3.0
+    """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all. In fourteen
+    diagnoses they differed by 8e-7 sigma at most."""
+    engines_compared_whole: float = 20.0
+    """So much of one take is [s], of a walk where there is one, for what comes late, as a stop that is reached or a motor that
+    fades."""
     heavy_trunk: float = 0.09
     """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
 

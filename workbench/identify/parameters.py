@@ -22,7 +22,8 @@ Key = tuple[str, tuple[str, ...]]
 @dataclass(frozen=True)
 class Candidate:
     """An effect at a place. Its numbers are fitted as sizes x: 0 where the effect vanishes, 1 at the typical value; linear in the
-    value, or in its inverse where it vanishes at infinity (a stiffness, a ceiling); of a number that only shapes an effect (the
+    value, in its logarithm where it is a logarithmic ratio, or in its inverse where it vanishes at infinity (a stiffness, a
+    ceiling); of a number that only shapes an effect (the
     speed at which friction fades) x is the number of doublings. fixed: by number, whether it is no matter of fitting (an axis
     that was read off the recording). reach: how far numbers go from neutral. options: parts of the effect that are there;
     numbers of others are none of its numbers. spread: standard deviations of numbers that were read off, in the formats page's
@@ -110,13 +111,14 @@ class Candidate:
             elif math.isinf(n):
                 value = t / max(size, t / p.high)
             else:
-                value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else n + size * (t - n)
+                value = n * 2.0 ** min(size, FIT.most_doubled) if p.shapes else _at(p, size, n, t)
             out.append(float(np.clip(value, p.low, p.high)))
         return out
 
     def sizes(self, values: Sequence[float]) -> Array:
         """The sizes of finite neutral values at these numbers, in the units of docs/formats.md, as far as they may go."""
-        x = [(v - n) / (t - n) for v, n, t, fixed in zip(values, self.neutral, self.typical, self.fixed) if not fixed]
+        x = [_size(p, v, n, t) for p, v, n, t, fixed in zip(self.parameters, values, self.neutral, self.typical, self.fixed)
+             if not fixed]
         return np.asarray(np.clip(x, *self.bounds()))
 
     def bounds(self) -> tuple[Array, Array]:
@@ -130,10 +132,21 @@ class Candidate:
             elif p.shapes:
                 ends = [math.log2(end / n) if end > 0 else -10.0 for end in (p.low, p.high)]
             else:
-                ends = [(end - n) / (t - n) for end in (max(p.low, n - self.reach), min(p.high, n + self.reach))]
+                near, far = (n * math.exp(-self.reach), n * math.exp(min(self.reach, 100.0))) if p.logarithmic else (
+                    n - self.reach, n + self.reach)
+                ends = [_size(p, end, n, t) for end in (max(p.low, near), min(p.high, far))]
             low.append(min(ends))
             high.append(max(ends))
         return np.array(low), np.array(high)
+
+    def seldom(self) -> Array:
+        """Of the sizes, those that one in a hundred passes where the effect is there at all; NaN where nobody says."""
+        out = []
+        for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
+            if not fixed:
+                x = t / p.seldom_beyond if math.isinf(n) else math.nan if p.shapes else _size(p, p.seldom_beyond, n, t)
+                out.append(abs(x))
+        return np.array(out)
 
     def probes(self) -> list[Array]:
         """Sizes at which each number that shows from neutral on is alone typical: not those that shape an effect, nor a vector
@@ -164,6 +177,20 @@ class Candidate:
 
     def __str__(self) -> str:
         return f"{self.effect.name}({','.join(self.where)})"
+
+
+def _at(p: Parameter, size: float, neutral: float, typical: float) -> float:
+    """The value of a number at a size."""
+    if p.logarithmic:
+        return neutral * math.exp(min(size * math.log(typical / neutral), 100.0))
+    return neutral + size * (typical - neutral)
+
+
+def _size(p: Parameter, value: float, neutral: float, typical: float) -> float:
+    """The size of a number at a value."""
+    if p.logarithmic:
+        return math.log(value / neutral) / math.log(typical / neutral)
+    return (value - neutral) / (typical - neutral)
 
 
 def both_ways(middle: Array, ways: Sequence[Array]) -> list[Array]:

@@ -44,6 +44,10 @@ class PointMass(Candidate):
         low[1:], high[1:] = -FIT.most_moment, FIT.most_moment
         return low, high
 
+    def seldom(self) -> Array:
+        """Not known of moments."""
+        return np.full(self.size, np.nan)
+
     def probes(self) -> list[Array]:
         """Sizes at which each number is alone typical."""
         return [np.array([1.0, *(FIT.away * np.eye(4)[k, 1:])]) for k in range(4)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,16 @@ class TakeEvidence:
     def moving(self) -> Mask:
         """Frames after the first command."""
         return np.asarray(self.since >= 0.0)
+
+    def looked_at(self, until: float) -> TakeEvidence:
+        """The take of which models are asked until then [s after the first command], cropped to that, so that neither time nor
+        memory grows with what is not looked at; and to what a shifted start may need beyond."""
+        frames = int(np.searchsorted(self.since, until + max(PROBLEM.late, LOOP), side="right")) + 1
+        early = self.since[:frames] <= until
+        rough = self.rough[:frames] if isinstance(self.rough, np.ndarray) and self.rough.ndim == 2 else self.rough
+        return replace(self, take=replace(self.take, recorded=self.take.recorded.first(frames)), recorded=self.recorded[:frames],
+                       offset=self.offset[:frames], contact=self.contact[:frames], rough=rough, until=until,
+                       uses={use: mask[:frames] & early for use, mask in self.uses.items()})
 
     def zero(self, joint: str) -> float:
         """Where a joint's recorded angle is zero, on its servo's scale [rad]."""
@@ -180,3 +190,8 @@ def joint_error(evidence: Sequence[TakeEvidence], joints: Sequence[str], residua
     parts = [np.square((residuals[i] * e.sigma)[e.uses[use]][:, [e.channels.index(j) for j in joints if j in e.channels]]).ravel()
              for i, e in enumerate(evidence)]
     return float(np.rad2deg(np.sqrt(np.nanmean(np.concatenate(parts)))))
+
+
+def in_file_units(value: float, channel: str) -> tuple[float, str]:
+    """A channel's value [m or rad] in the units of docs/formats.md."""
+    return (value, "m") if channel in ("forward", "left", "height") else (float(np.rad2deg(value)), "deg")

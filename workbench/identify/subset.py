@@ -46,7 +46,7 @@ def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
     ends = [float(e.since[-1]) for e in evidence]
     fitted = [i for i, e in enumerate(evidence) if e.uses["fit"].any()]
     if sum(ends[i] for i in fitted) <= PROBLEM.long:
-        return [e if i in fitted else _until(e, 0.0) for i, e in enumerate(evidence)]
+        return [e if i in fitted else e.looked_at(0.0) for i, e in enumerate(evidence)]
     power = {i: _power(evidence[i], residuals[i]) for i in fitted}
     names = list(dict.fromkeys(c for e in evidence for c in e.channels))
     by_name = {i: _by_name(p, evidence[i].channels, names) for i, p in power.items()}
@@ -62,7 +62,7 @@ def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
         shown = {i: _shown(evidence[i], shares[i], until[i]) for i in fitted}
         best, end = max(steps, key=lambda s: (_shown(evidence[s[0]], shares[s[0]], s[1]) - shown[s[0]]) / (s[1] - until[s[0]]))
         until[best] = float(end)
-    return [_until(e, until[i]) for i, e in enumerate(evidence)]
+    return [e.looked_at(until[i]) for i, e in enumerate(evidence)]
 
 
 def _power(e: TakeEvidence, residual: Array) -> Array:
@@ -83,11 +83,6 @@ def _by_name(values: Array, channels: Sequence[str], names: Sequence[str]) -> Ar
 def _shown(e: TakeEvidence, shares: Array, until: float) -> float:
     """What a take is worth if it is looked at until then: the root favours what was not seen yet."""
     return float(np.sum(np.sqrt(shares[e.since <= until].sum(axis=0))))
-
-
-def _until(e: TakeEvidence, until: float) -> TakeEvidence:
-    early = e.since <= until
-    return replace(e, until=until, uses={use: mask & early for use, mask in e.uses.items()})
 
 
 def subset_used(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:

@@ -18,8 +18,9 @@ class Commands:
 
     times: (K,) [s], increasing. joints: (n,) names. goals: (K, n) [rad], zero = servo centre. speeds: (K, n) [rad/s],
     0 = at once. enabled: (K, n) torque enable. end: when the last command's dwell is over [s].
-    poses: (K,) index of the pose in its table, for the phase of the gait; -1 where there is none. InputError where shapes differ
-    or times do not increase.
+    poses: (K,) index of the pose in its table, for the phase of the gait; -1 where there is none. begun: whether the first goals
+    had been sent long before, as in a log that begins in motion; else joints are in neutral until the first command. InputError
+    where shapes differ or times do not increase.
     """
 
     times: Array
@@ -29,6 +30,7 @@ class Commands:
     enabled: NDArray[np.bool_]
     end: float
     poses: NDArray[np.int_]
+    begun: bool = False
 
     def __post_init__(self) -> None:
         shape = (len(self.times), len(self.joints))
@@ -55,7 +57,7 @@ class Commands:
         new[1:] = ((np.diff(goals, axis=0) != 0) | (on[1:] != on[:-1])).any(axis=1)
         since = np.asarray(time, dtype=float) - time[0]
         return Commands(since[new], joints, goals[new], np.zeros_like(goals[new]), on[new], float(since[-1]),
-                        np.full(int(new.sum()), -1))
+                        np.full(int(new.sum()), -1), begun=True)
 
     def reference(self, t: Array) -> Array:
         """The servos' ramped reference (N, n) [rad] at times t (N,), at first neutral (docs/formats.md, section 4)."""
@@ -87,7 +89,7 @@ class Commands:
             if j in self.joints:
                 c = self.joints.index(j)
                 goals[:, i], speeds[:, i], enabled[:, i] = self.goals[:, c], self.speeds[:, c], self.enabled[:, c]
-        return Commands(self.times, joints, goals, speeds, enabled, self.end, self.poses)
+        return Commands(self.times, joints, goals, speeds, enabled, self.end, self.poses, self.begun)
 
 
 def _ramp(step: Array, speed: Array, elapsed: Array | float) -> Array:

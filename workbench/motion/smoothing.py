@@ -9,9 +9,6 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
-from scipy.signal import cont2discrete, lfilter, oaconvolve
 
 from workbench.motion.motion import Motion
 
@@ -48,6 +45,8 @@ def interpolate(
     knots: "smooth", a spline with two continuous derivatives (at rest at both ends, or periodic); "rest", velocity zero
     at every knot, which is what MATLAB's cubicpolytraj does unless it is given velocities.
     """
+    from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
     if knots == "rest":
         curve: CubicHermiteSpline | CubicSpline = CubicHermiteSpline(time, angles, np.zeros_like(angles))
     elif periodic:  # first and last row agree up to rounding, which the spline insists on exactly
@@ -97,6 +96,8 @@ def low_pass(trajectory: Trajectory, time_constant: float) -> Trajectory:
     T = time_constant
     u = trajectory.q - trajectory.q[0]
 
+    from scipy.signal import cont2discrete, lfilter  # a second of imports, which most verbs do without
+
     def respond(*numerator: float) -> Array:
         b, a, _ = cont2discrete((numerator, (T**2, 2 * T, 1.0)), trajectory.step, method="foh")  # type: ignore[call-overload]
         return np.asarray(lfilter(np.ravel(b), a, u, axis=0))
@@ -107,6 +108,8 @@ def low_pass(trajectory: Trajectory, time_constant: float) -> Trajectory:
 
 def inconsistency(trajectory: Trajectory) -> Array:
     """How far the angle strays from the integral of the velocity, peak to peak (n,) [rad]; 0 if v is the derivative."""
+    from scipy.integrate import cumulative_trapezoid
+
     integral = cumulative_trapezoid(trajectory.v, dx=trajectory.step, axis=0, initial=0)
     return np.asarray(np.ptp(trajectory.q - integral, axis=0))
 
@@ -116,6 +119,8 @@ def _local_polynomial(y: Array, window: int, order: int, derivative: int, step: 
 
     In abscissae scaled to -1..1: scipy's savgol_filter, unscaled, silently returns zeros from order 5 and 1001 samples on.
     """
+    from scipy.signal import oaconvolve
+
     if window % 2 == 0 or not 0 < order < window <= len(y):
         raise ValueError(f"window: expected an odd number above the order {order} and at most {len(y)} samples, got {window}")
     if derivative > order:

@@ -21,3 +21,7 @@ class BodyTrack:
     p: Array
     quat: Array
     error: Array | None = None
+
+    def first(self, frames: int) -> BodyTrack:
+        """Its first frames."""
+        return BodyTrack(self.p[:frames], self.quat[:frames], None if self.error is None else self.error[:frames])

@@ -87,6 +87,19 @@ class Take:
             return self
         return replace(self, q=self.q - np.nanmean(self.q[self.resting], axis=0), zeroed=True)
 
+    def first(self, frames: int) -> Take:
+        """Its first frames."""
+        def cut(column: Array | None) -> Array | None:
+            return None if column is None else column[:frames]
+
+        return replace(
+            self, time=self.time[:frames], q=self.q[:frames], q_sigma=cut(self.q_sigma), v=cut(self.v), p_WB=cut(self.p_WB),
+            quat_WB=cut(self.quat_WB), torque=cut(self.torque), off_axis=cut(self.off_axis), servo_q=cut(self.servo_q),
+            mended=None if self.mended is None else self.mended[:frames],
+            contact={foot: force[:frames] for foot, force in self.contact.items()},
+            bodies={name: track.first(frames) for name, track in self.bodies.items()},
+            links={name: track.first(frames) for name, track in self.links.items()})
+
     def resampled(self, time: Array) -> Take:
         """The take at other times (M,) [s] on its own clock, linear between samples, NaN outside and in gaps."""
         from workbench.recording import quaternions as quat

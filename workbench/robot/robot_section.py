@@ -10,9 +10,9 @@ from workbench.files import InputError
 from workbench.files.yaml_file import Fields
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
-from workbench.robot.servo_constants import ServoConstants, load_servo_constants, servo_constants
+from workbench.robot.servo_constants import KEYS, ServoConstants, load_servo_constants, servo_constants
 
-_CONSTANTS = set(ServoConstants().constants())
+_CONSTANTS = set(KEYS)
 
 
 def read_model(top: Fields) -> RobotModel:

@@ -23,8 +23,15 @@ class ServoConstants:
 
     model: name of the servo. stall_torque [N m] and no_load_speed [rad/s] at rated_voltage [V]; supply_voltage [V].
     coulomb_friction [N m], viscous_friction [N m s/rad] and reflected_inertia [kg m^2] at the joint. Either compliance_slope and
-    compliance_margin (counts of 300/1023 deg) and punch (of 1023), or proportional_gain (duty per radian). sd: standard deviation
-    of a constant, by key, in its unit; of others the share in SHARES_KNOWN. InputError names the key and what was expected.
+    compliance_margin (counts of 300/1023 deg) and punch (of 1023), or proportional_gain (duty per radian), with minimum_duty at
+    the edge of the dead_zone [deg each side of the goal].
+
+    What more real servos do, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which the
+    servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
+    rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tolerance,
+    back_emf_tolerance: standard deviation of the natural logarithm of torque at full duty and of back-EMF; None: what stall
+    torque, supply and no-load speed say. sd: standard deviation of a constant, by key, in its unit; of others the share in
+    SHARES_KNOWN. InputError names the key and what was expected.
     """
 
     model: str = "AX-12A"
@@ -39,6 +46,15 @@ class ServoConstants:
     compliance_margin: float | None = 1
     punch: float | None = 32
     proportional_gain: float | None = None
+    minimum_duty: float = 0.0
+    dead_zone: float = 0.0
+    goal_delay: float = 0.0
+    goal_ramp: float = 0.0
+    command_filter: float = 0.0
+    derivative_gain: float = 0.0
+    load_friction: float = 0.0
+    torque_tolerance: float | None = None
+    back_emf_tolerance: float | None = None
     sd: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -46,6 +62,9 @@ class ServoConstants:
         if self.proportional_gain is None:
             if any(v is None for v in compliance):
                 raise InputError(None, "expected compliance_slope, compliance_margin and punch, or proportional_gain")
+            for name, instead in (("minimum_duty", "punch"), ("dead_zone", "compliance_margin")):
+                if getattr(self, name):
+                    raise InputError(None, f"{name} goes with proportional_gain; beside compliance_slope expected {instead}")
         elif any(v is not None for v in compliance):
             raise InputError(None, "proportional_gain excludes compliance_slope, compliance_margin and punch")
         for f in fields(self):
@@ -56,7 +75,7 @@ class ServoConstants:
                 if not isinstance(v, str):
                     raise InputError(None, "model: expected the servo's name as text")
                 continue
-            if v is None and f.name in _LAW:
+            if v is None and f.name in (*_LAW, *TOLERANCES):
                 continue
             if isinstance(v, bool) or not isinstance(v, (int, float)) or not math.isfinite(v):
                 raise InputError(None, f"{f.name}: expected a number, got {v!r}")
@@ -70,7 +89,7 @@ class ServoConstants:
     @property
     def margin(self) -> float:
         """Half width of the dead band [rad]."""
-        return (self.compliance_margin or 0.0) * COUNT
+        return (self.compliance_margin or 0.0) * COUNT + math.radians(self.dead_zone)
 
     @property
     def gain(self) -> float:
@@ -83,7 +102,12 @@ class ServoConstants:
     @property
     def punch_duty(self) -> float:
         """Duty at the edge of the margin."""
-        return (self.punch or 0.0) / 1023
+        return (self.punch or 0.0) / 1023 + self.minimum_duty
+
+    @property
+    def ramp(self) -> float:
+        """Speed of the servo's own goal [rad/s]; infinite where it follows at once."""
+        return math.radians(self.goal_ramp) if self.goal_ramp else math.inf
 
     @property
     def torque_at_full_duty(self) -> float:
@@ -96,15 +120,22 @@ class ServoConstants:
         return self.stall_torque / self.no_load_speed
 
     def share_known(self, key: str) -> float:
-        """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0."""
+        """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0. Besides the keys
+        "torque_at_full_duty" and "back_emf", of which a tolerance is the standard deviation of the natural logarithm."""
+        if key in _TOLERANCE_OF and getattr(self, _TOLERANCE_OF[key]) is not None:
+            return float(getattr(self, _TOLERANCE_OF[key]))
+        if key == "torque_at_full_duty":
+            return math.hypot(self.share_known("stall_torque"), self.share_known("supply_voltage"))
+        if key == "back_emf":
+            return self.share_known("no_load_speed")
         value, given = float(getattr(self, key) or 0.0), dict(self.sd)
         if key not in given:
             return SHARES_KNOWN.get(key, 0.0)
         return given[key] / value if value else 0.0
 
     def constants(self) -> dict[str, Any]:
-        """By key, None where the other position law's."""
-        return {key: getattr(self, key) for key in _KEYS}
+        """By key, None where the other position law's; what only some servos do is left out where this one does not."""
+        return {key: getattr(self, key) for key in KEYS if key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key]}
 
     def written(self) -> dict[str, Any]:
         """As servo.yaml has it."""
@@ -119,9 +150,10 @@ class ServoConstants:
                 changes.setdefault(key, None)
         elif any(changes.get(k) is not None for k in ("compliance_slope", "compliance_margin", "punch")):
             changes.setdefault("proportional_gain", None)
-        unknown = sorted(set(changes) - set(_KEYS))
+            changes = {"minimum_duty": 0.0, "dead_zone": 0.0} | changes
+        unknown = sorted(set(changes) - set(KEYS))
         if unknown:
-            raise InputError(None, f"unknown key '{unknown[0]}'; known: {', '.join(_KEYS)}")
+            raise InputError(None, f"unknown key '{unknown[0]}'; known: {', '.join(KEYS)}")
         return replace(self, **changes)
 
 
@@ -146,13 +178,21 @@ SHARES_KNOWN = {"supply_voltage": 0.10, "no_load_speed": 0.10, "coulomb_friction
                 "reflected_inertia": 0.15}
 """How well a hobby servo's numbers are known where its servo.yaml does not say: supply and motor constant to what servos of one
 type differ by and a battery loses, friction to a factor of 1.6, as it changes with wear and grease."""
-_KEYS = tuple(f.name for f in fields(ServoConstants) if f.name != "sd")
+KEYS = tuple(f.name for f in fields(ServoConstants) if f.name != "sd")
+"""Of servo.yaml."""
+TOLERANCES = ("torque_tolerance", "back_emf_tolerance")
+_TOLERANCE_OF = {"torque_at_full_duty": "torque_tolerance", "back_emf": "back_emf_tolerance"}
+_OPTIONAL = {f.name: f.default for f in fields(ServoConstants) if f.name in (
+    "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", *TOLERANCES)}
 _LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
 _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
            "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
            "reflected_inertia": (10.0, "kg m^2"), "compliance_slope": (1023.0, "counts"),
            "compliance_margin": (1023.0, "counts"), "punch": (1023.0, "of 1023"),
-           "proportional_gain": (1e4, "duty per radian")}
+           "proportional_gain": (1e4, "duty per radian"), "minimum_duty": (1.0, "(full duty)"), "dead_zone": (90.0, "deg"),
+           "goal_delay": (1.0, "s"), "goal_ramp": (1e5, "deg/s"), "command_filter": (1.0, "s"),
+           "derivative_gain": (100.0, "duty per rad/s"), "load_friction": (2.0, "of the load"),
+           "torque_tolerance": (3.0, "(of the logarithm)"), "back_emf_tolerance": (3.0, "(of the logarithm)")}
 """Ten times beyond what any servo of a small robot has; what is larger is another unit or a slip."""
 _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
            "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
@@ -178,8 +218,8 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
     if not isinstance(content, Mapping):
         raise InputError(path, f"{at}expected a mapping of servo constants")
     for key in content:
-        if key not in _KEYS:
-            raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(_KEYS))}")
+        if key not in KEYS:
+            raise InputError(path, f"{at}unknown key '{key}'; expected one of {', '.join(sorted(KEYS))}")
     missing = sorted(_REQUIRED - set(content))
     if missing:
         raise InputError(path, f"{at}key '{missing[0]}' is missing")

@@ -11,6 +11,8 @@ from workbench.files import InputError
 from workbench.robot.servo_constants import ServoConstants
 
 LAW_KEYS = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
+MORE_KEYS = ("minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction")
+"""Of the nominal law of servos that do more."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class ServoProfile:
     output a count. supply: voltages [V] at which it works. full_torque: count of max_torque and torque_limit that limits
     nothing. bit_rates: bit/s by value of baud_rate. return_delay_unit [s]. eeprom_below: address where RAM begins. law:
     registers behind the keys of the nominal law. nominal: those keys, and how well they are known of a servo nobody measured.
+    tolerances: of torque and back-EMF, as in servo.yaml.
     alarms, refusals: what the bits of an answer's error byte mean, of the servo's state and of the instruction; with protocol
     2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
     control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
@@ -116,6 +119,7 @@ class ServoProfile:
     alarms: Mapping[int, str]
     refusals: Mapping[int, str]
     position_mode: Mapping[str, int]
+    tolerances: Mapping[str, float] = field(default_factory=dict)
     table_unit: float | None = None
     unlock: Switch | None = None
     watchdog: tuple[str, float] | None = None
@@ -153,5 +157,5 @@ class ServoProfile:
     def constants(self) -> ServoConstants:
         """The nominal law of a servo nobody measured, and how well it is known."""
         keys: dict[str, Any] = dict.fromkeys(LAW_KEYS)
-        return ServoConstants(model=self.name, **keys | {k: u.value for k, u in self.nominal.items()},
+        return ServoConstants(model=self.name, **keys | {k: u.value for k, u in self.nominal.items()} | dict(self.tolerances),
                               sd=tuple((k, u.sd) for k, u in self.nominal.items()))

@@ -13,11 +13,12 @@ from workbench.files import InputError
 from workbench.files.plug_ins import with_plug_ins
 from workbench.files.resources import resource_dir
 from workbench.files.yaml_file import Fields, top_of
-from workbench.robot.servo_profile import LAW_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
+from workbench.robot.servo_constants import TOLERANCES
+from workbench.robot.servo_profile import LAW_KEYS, MORE_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
 
 ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
-                 "reflected_inertia", *LAW_KEYS)
+                 "reflected_inertia", *LAW_KEYS, *MORE_KEYS)
 _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
            "min_voltage_limit", "torque_enable", "goal_position", "moving_speed", "torque_limit", "max_torque",
            "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
@@ -28,7 +29,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
-                 "unlock", "watchdog", "marker", "maker", "group_read")
+                  "unlock", "watchdog", "marker", "maker", "group_read", *TOLERANCES)
     position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
     registers = _registers(_needed(top, "registers"))
     profile = ServoProfile(
@@ -43,6 +44,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         bit_rates=_bit_rates(_needed(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
         eeprom_below=top.required("eeprom_below", top.whole("eeprom_below")), registers=registers,
         law=_law(_needed(top, "law"), registers), nominal=_nominal(_needed(top, "nominal")),
+        tolerances={key: v for key in TOLERANCES if (v := top.number(key, least=0)) is not None},
         alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
         marker=_marker(top, registers), maker=top.text("maker") or "",

@@ -2,8 +2,10 @@
 
 from workbench.servo.bank import AddServos, SetServoPhysics
 from workbench.servo.law import ServoLaw
+from workbench.servo.rubbing import Rubbing, nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers
 
-__all__ = ["AddServos", "Instant", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank", "TermNumbers"]
+__all__ = ["AddServos", "Instant", "Rubbing", "ServoBank", "ServoLaw", "ServoTerm", "SetServoPhysics", "TermBank", "TermNumbers",
+           "nominal_terms"]

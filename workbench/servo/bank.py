@@ -15,6 +15,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 from workbench.files import InputError
 from workbench.robot import RobotModel
 from workbench.servo.law import ServoLaw
+from workbench.servo.rubbing import nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import ServoTerm, most_friction
@@ -60,7 +61,7 @@ def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction
     """
     joints = servo_joints(plant, model)
     law = law or ServoLaw.of([model.servo(j.name()) for j in joints])
-    most = most_friction(terms, law)
+    most = most_friction((*nominal_terms(law), *terms), law)
     for i, joint in enumerate(joints):
         actuator = find_actuator(plant, joint)
         joint.set_default_damping(float(law.damping[i]))
@@ -85,7 +86,8 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
     default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
     CENIC's does not: it steps over them and slides on without friction). `law`: in place of the model's nominal constants.
-    `terms`: what servos do beyond the law. In a discrete plant they take `period` to be its step, and make its output ports
+    `terms`: what servos do beyond the law. A goal_delay of the model is in the commands of `simulate`, not in the bank: who sends
+    goals himself sends them that much later. In a discrete plant they take `period` to be its step, and make its output ports
     unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that varies
     needs bristles or a discrete plant. InputError for a plant that is finalized, lacks a joint, or does not go with `friction`,
     and for a model with effects, which MakeStation takes.
@@ -101,6 +103,7 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     if plant.is_finalized():
         raise InputError(None, "the plant is finalized already; AddServos changes its joints and finalizes it itself")
     law = SetServoPhysics(plant, model, friction, law, terms)
+    terms = (*nominal_terms(law), *terms)
     most, period = most_friction(terms, law), period or plant.time_step() or 1e-3
     varies = bool((most > law.coulomb).any())
     if varies and friction == "implicit" and plant.time_step() == 0:

@@ -16,7 +16,9 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class ServoLaw:
     """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m] and that per
-    volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]."""
+    volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]; derivative gain
+    [duty per rad/s], speed of the goal's ramp [rad/s] (infinite: none), time constant of the goal's lag [s], and friction as a
+    share of the load. A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
 
     gain: Array
     margin: Array
@@ -27,6 +29,10 @@ class ServoLaw:
     coulomb: Array
     inertia: Array
     torque_per_volt: Array
+    derivative: Array
+    ramp: Array
+    lag: Array
+    load_friction: Array
 
     @staticmethod
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
@@ -37,22 +43,27 @@ class ServoLaw:
 
         return ServoLaw(column("gain"), column("margin"), column("punch_duty"), column("torque_at_full_duty"),
                         column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"),
-                        column("stall_torque") / column("rated_voltage"))
+                        column("stall_torque") / column("rated_voltage"), column("derivative_gain"), column("ramp"),
+                        column("command_filter"), column("load_friction"))
 
     @property
     def damping(self) -> Array:
         """All that a joint loses per speed while its servo is on: back-EMF and viscous friction [N m s/rad]."""
         return self.back_emf + self.viscous
 
-    def duty(self, error: Array) -> Array:
-        """Duty of the H-bridge, -1 to 1, for the error reference - measured [rad]; shapes (..., n)."""
+    def duty(self, error: Array, velocity: Array | float = 0.0) -> Array:
+        """Duty of the H-bridge, -1 to 1, for the error reference - measured [rad] at a velocity [rad/s]; shapes (..., n)."""
         beyond = np.abs(error) - self.margin
-        size = np.minimum(self.punch + self.gain * beyond, 1.0)
-        return np.copysign(np.where(beyond > 0, size, 0.0), error)
+        if not self.derivative.any():
+            size = np.minimum(self.punch + self.gain * beyond, 1.0)
+            return np.copysign(np.where(beyond > 0, size, 0.0), error)
+        size = np.where(beyond > 0, self.punch + self.gain * beyond, 0.0)
+        return np.asarray(np.clip(np.copysign(size, error) - self.derivative * velocity, -1.0, 1.0))
 
     def motor_torque(self, error: Array, velocity: Array, enabled: NDArray[np.bool_] | bool = True) -> Array:
         """Torque of the motor at the joint [N m], before friction: duty torque less back-EMF, 0 with torque disabled."""
-        return np.asarray(np.where(enabled, self.duty(error) * self.full_torque - self.back_emf * velocity, 0.0), dtype=float)
+        torque = self.duty(error, velocity) * self.full_torque - self.back_emf * velocity
+        return np.asarray(np.where(enabled, torque, 0.0), dtype=float)
 
     def rest_error(self, torque: Array) -> Array:
         """Error reference - measured [rad] at which duty alone balances `torque` [N m] (without friction)."""

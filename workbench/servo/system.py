@@ -38,9 +38,10 @@ class ServoBank(LeafSystem):
         torque_enable  (n) 0 or 1 ->+-----------+--> reference         (n)   rad: the ramped goal
 
     moving_speed and torque_enable may stay unconnected: at once, and all on. The reference advances every `period` seconds
-    (discrete state, n). Back-EMF and viscous friction act as joint damping of the plant, Coulomb friction as its joints'
-    actuators (implicit) or as bristles of this system (continuous state, n; after Dahl 1968), which both hold at rest, so
-    that generalized_force holds what remains.
+    (discrete state, n) towards the goal, or, where the law has a lag, towards the goal behind a first-order filter (discrete
+    state, n), by no more than the law's own ramp. Back-EMF and viscous friction act as joint damping of the plant, Coulomb
+    friction as its joints' actuators (implicit) or as bristles of this system (continuous state, n; after Dahl 1968), which both
+    hold at rest, so that generalized_force holds what remains.
     Build it with AddServos, which sets all that on the plant.
     """
 
@@ -64,12 +65,16 @@ class ServoBank(LeafSystem):
         self._reference = self.DeclareDiscreteState(n)
         self._slope = law.gain * law.full_torque  # of the law as torque over |error|, before it is cut
         self._offset = law.punch * law.full_torque - self._slope * law.margin
+        self._derives, self._lags = bool(law.derivative.any()), bool(law.lag.any())
+        self._own_step = law.ramp * period
         self._cached_command = self.DeclareCacheEntry(
             "command", ValueProducer(allocate=lambda: AbstractValue.Make((np.zeros(n), np.zeros(n), np.zeros(n), None)),
                                      calc=lambda context, value: value.set_value(self._calc_command(context))),
             {self._goal.ticket(), self._speed.ticket(), self._enable.ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._advance)
         state = {self._state.ticket(), self._enable.ticket(), self.xd_ticket()} | self._declare_terms(plant)
+        if self._lags:
+            self._filtered = int(self.DeclareDiscreteState(n))
         force_state = state | ({self.xc_ticket()} if bristles else set())
         self.DeclareVectorOutputPort("generalized_force", nv, self._calc_force, force_state)
         self.DeclareVectorOutputPort("motor_torque", n, self._calc_motor_torque, state)
@@ -90,15 +95,30 @@ class ServoBank(LeafSystem):
     def SetReference(self, context: Context, reference: Array) -> None:
         """Puts the ramp at `reference` (n,) [rad], as after power-on at a known pose."""
         context.SetDiscreteState(0, np.asarray(reference, dtype=float))
+        if self._lags:
+            context.SetDiscreteState(self._filtered, np.asarray(reference, dtype=float))
 
     def ShiftRamp(self, context: Context, seconds: float) -> None:
         """Moves the ramp on, or back where `seconds` is negative: a command that comes between two periods has gone on for a
         while when the next begins, and the one before has gone too far. A ramp that has arrived does not go back."""
         goal, down, up, on = self._command(context)
         reference, share = context.get_discrete_state(0).CopyToVector(), abs(seconds) / self._period
+        if self._lags:
+            lagging = context.get_discrete_state(self._filtered).CopyToVector()
+            slow, passed = self.law.lag > 0, self._passed(abs(seconds))
+            goal = np.where(slow, lagging + passed * (goal - lagging) if seconds > 0 else lagging, goal)
         step = np.minimum(np.maximum(goal - reference, down * share), up * share)
         moves = True if on is None else on
         context.SetDiscreteState(0, np.where(moves, reference + np.copysign(1.0, seconds) * step, reference))
+        if self._lags:
+            sent, left = self._command(context)[0], np.where(slow, 1.0 - passed, 1.0)
+            back = np.where(slow, (lagging - passed * sent) / left, sent)
+            context.SetDiscreteState(self._filtered, goal if seconds > 0 else back)
+
+    def _passed(self, seconds: float) -> Array:
+        """Share of a step of the goal (n,) that is behind the filter after so long."""
+        with np.errstate(divide="ignore"):
+            return -np.expm1(-seconds / self.law.lag)
 
     def _command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
         """Goal (n,) [rad], how far down and up the ramp goes in a period (n,) [rad], and which servos are on (n,), None for all;
@@ -107,13 +127,17 @@ class ServoBank(LeafSystem):
 
     def _calc_command(self, context: Context) -> tuple[Array, Array, Array, NDArray[np.bool_] | None]:
         speed = self._speed.Eval(context) if self._speed.HasValue(context) else np.zeros(len(self.joints))
-        step = np.where(speed > 0, speed * self._period, np.inf)
+        step = np.minimum(np.where(speed > 0, speed * self._period, np.inf), self._own_step)
         on = self._enable.Eval(context) > 0.5 if self._enable.HasValue(context) else None
         return self._goal.Eval(context), -step, step, None if on is None or on.all() else on
 
     def _advance(self, context: Context, values: DiscreteValues) -> None:
         goal, down, up, on = self._command(context)
         reference = context.get_discrete_state(0).value()
+        if self._lags:
+            lagging = context.get_discrete_state(self._filtered).value()
+            goal = lagging + self._passed(self._period) * (goal - lagging)
+            values.set_value(self._filtered, goal)
         new = reference + np.minimum(np.maximum(goal - reference, down), up)
         if on is not None:  # the ramp starts at the measured position once torque is back
             new = np.where(on, new, self._state.Eval(context)[self._q])
@@ -125,6 +149,8 @@ class ServoBank(LeafSystem):
         size = np.abs(error)
         size = np.minimum(self._offset + self._slope * size, self.law.full_torque) * (size > self.law.margin)
         torque = np.copysign(size, error)
+        if self._derives:
+            torque = self.law.duty(error, x[self._x_v]) * self.law.full_torque
         on = self._command(context)[3]
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             torque = np.where(on, torque, self.law.back_emf * x[self._x_v])
@@ -155,6 +181,6 @@ class ServoBank(LeafSystem):
         output.SetFromVector(self.law.motor_torque(error, x[self._x_v], True if on is None else on))
 
     def _calc_duty(self, context: Context, output: BasicVector) -> None:
-        on = self._command(context)[3]
-        error = context.get_discrete_state(0).value() - self._state.Eval(context)[self._q]
-        output.SetFromVector(self.law.duty(error) * (1.0 if on is None else on))
+        on, x = self._command(context)[3], self._state.Eval(context)
+        error = context.get_discrete_state(0).value() - x[self._q]
+        output.SetFromVector(self.law.duty(error, x[self._x_v]) * (1.0 if on is None else on))

@@ -109,7 +109,7 @@ class TermBank(ServoBank):
     def _calc_parts(self, context: Context) -> _Parts:
         x, on, law = self._state.Eval(context), self._command(context)[3], self.law
         v = x[self._x_v]
-        duty = law.duty(context.get_discrete_state(0).value() - x[self._q])
+        duty = law.duty(context.get_discrete_state(0).value() - x[self._q], v)
         duty = duty if on is None else duty * on
         (last_v, _, load, held), stepped = self._remembered(context)
         begin = context.get_numeric_parameter(self._first_command).value()[0]

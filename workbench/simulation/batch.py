@@ -10,9 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
-from joblib import Parallel, delayed
-from joblib.parallel import get_active_backend
-
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.simulation.job import Job
@@ -42,6 +39,8 @@ def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
     What the compiled station covers runs in threads of this process, the rest in processes."""
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
+    from joblib.parallel import get_active_backend
+
     if get_active_backend()[0].__class__.__name__ != "LokyBackend":  # somebody's cluster
         return _in_processes(jobs, n_jobs)
     return _in_threads_and_processes(jobs, n_jobs)
@@ -62,6 +61,8 @@ def _in_threads_and_processes(jobs: Sequence[Job], n_jobs: int) -> Iterator[Take
 def _in_processes(jobs: Sequence[Job], n_jobs: int) -> Iterable[Take]:
     if not jobs:
         return
+    from joblib import Parallel, delayed
+
     with warnings.catch_warnings():  # joblib restarts a worker that has grown and says so: nothing is lost
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs")
         yield from Parallel(n_jobs=n_jobs, return_as="generator")(delayed(run_job)(job) for job in jobs)

@@ -12,7 +12,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Start
-from workbench.simulation.steady import BaseStates
+from workbench.simulation.steady import BaseStates, JointStates
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class Job:
     """One run: what Simulation.run takes, of a model in a configuration. times: (N,) [s] after the first command at which
-    the take is wanted, without torques and contact; the whole log if None. Less log is less traffic between processes."""
+    the take is wanted, without torques and contact; the whole log if None. Less log is less traffic between processes. restarts:
+    states that the servos of a held robot are put to (`servo_angles` alone)."""
 
     model: RobotModel
     config: SimulationConfig
@@ -34,6 +35,7 @@ class Job:
     start: Start | tuple[Array, Array] | None = None
     elapsed: float = 0.0
     steadied: BaseStates | None = None
+    restarts: JointStates | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "config", self.config.of(self.model))

@@ -145,9 +145,11 @@ def _add_drive(
         for port in ("motor_torque", "duty", "reference"):
             diagram.ExportOutput(bank.GetOutputPort(port), port)
     elif config.drive == "fast_servo":
-        if physics.terms:
-            raise InputError(None, "drive: an effect changes what servos do from instant to instant; expected drive 'servo'")
-        AddFastServos(diagram, plant, model, physics.law)
+        law = physics.law
+        if physics.servo_terms or law.lag.any() or law.derivative.any() or np.isfinite(law.ramp).any():
+            raise InputError(None, "drive: these servos do more than their position law (an effect, load friction, a goal "
+                             "ramp, a command filter or a derivative gain); expected drive 'servo'")
+        AddFastServos(diagram, plant, model, law)
     elif config.drive == "ideal":
         AddIdealDrive(builder, plant, model, physics.law)
     else:

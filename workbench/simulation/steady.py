@@ -36,6 +36,16 @@ class BaseStates:
     w: Array
 
 
+@dataclass(frozen=True)
+class JointStates:
+    """Where the servos of a held robot were. times: (K,) [s] after the first command; q, v: (K, n) [rad, rad/s] in the model's
+    order of joints, as their own sensors tell them; NaN where unseen, which are left alone."""
+
+    times: Array
+    q: Array
+    v: Array
+
+
 class BaseSetter:
     """Puts a free base where it was recorded. Make it while the robot rests before the first command.
 

@@ -74,8 +74,10 @@ class SteppedRun:
 def _followed(before: Commands | None, after: Commands, now: float) -> Commands:
     """A schedule on the run's clock: what was sent before `now` [s], then `after`."""
     if before is None:
-        return Commands(after.times + now, after.joints, after.goals, after.speeds, after.enabled, after.end + now, after.poses)
+        return Commands(after.times + now, after.joints, after.goals, after.speeds, after.enabled, after.end + now, after.poses,
+                        after.begun)
     kept = before.times < now - 1e-9
     rows = {f: np.concatenate([getattr(before, f)[kept], getattr(after, f)]) for f in ("goals", "speeds", "enabled", "poses")}
     return Commands(times=np.concatenate([before.times[kept], after.times + now]), joints=after.joints, end=after.end + now,
+                    begun=before.begun,
                     **rows)

@@ -198,9 +198,28 @@ def _inertia(bank: ServoBank, i: NDArray[np.int_], spec: EffectSpec) -> None:
     bank.inertia[i] += number(spec, "inertia")
 
 
+def _ramp(bank: ServoBank, i: NDArray[np.int_], spec: EffectSpec) -> None:
+    bank.ramp[i] = np.minimum(bank.ramp[i], angle(spec, "speed"))
+
+
+def _lag(bank: ServoBank, i: NDArray[np.int_], spec: EffectSpec) -> None:
+    bank.lag[i] += number(spec, "time")
+
+
+def _derivative(bank: ServoBank, i: NDArray[np.int_], spec: EffectSpec) -> None:
+    bank.derivative[i] += number(spec, "gain")
+
+
+def _minimum_duty(bank: ServoBank, i: NDArray[np.int_], spec: EffectSpec) -> None:
+    steepness = (1 - bank.punch[i]) / bank.slope[i]  # stays
+    bank.punch[i] += number(spec, "duty")
+    bank.slope[i] = (1 - bank.punch[i]) / steepness
+
+
 CONSTANTS: dict[str, Callable[[ServoBank, NDArray[np.int_], EffectSpec], None]] = {
     "coulomb_friction": _coulomb, "viscous_friction": _viscous, "supply_voltage": _voltage, "servo_gain": _gain,
-    "dead_band": _dead_band, "reflected_inertia": _inertia,
+    "dead_band": _dead_band, "reflected_inertia": _inertia, "goal_ramp": _ramp, "command_filter": _lag,
+    "damping_gain": _derivative, "minimum_duty": _minimum_duty,
 }
 
 

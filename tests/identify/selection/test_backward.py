@@ -1,4 +1,4 @@
-"""Effects that others make idle go, once the others have gone where they must: in a robot of one joint, as far as that is."""
+"""Effects that others make idle go, once the others have gone where they must."""
 
 import numpy as np
 import pytest
@@ -18,19 +18,16 @@ FOUND = {"torque_ceiling": [2.0], "parallel_spring": [3.0], "payload": [1.0, 0.2
 class Search(LinearSearch):
     """A step goes most of the way."""
 
-    single_joint, fixed_base = True, ()
+    fixed_base = ()
 
     def refitted(self, fit, takes, steps, free=None):
         end = self.run(self.refitting(fit, takes, steps))
         return self.evaluated(fit.sizes(fit.x + (0.9 if steps == 1 else 1.0) * (end.x - fit.x)))
 
 
-@pytest.mark.parametrize(("single_joint", "against", "stay"), [
-    (True, False, {"torque_ceiling", "payload"}), (False, False, set(FOUND)), (False, True, {"torque_ceiling", "payload"})])
-def test_a_load_takes_the_place_of_spring_and_zero_in_a_single_joint_or_where_fixed_base_takes_contradict_these(
-        monkeypatch, single_joint, against, stay):
+@pytest.mark.parametrize(("against", "stay"), [(False, set(FOUND)), (True, {"torque_ceiling", "payload"})])
+def test_a_load_takes_the_place_of_spring_and_zero_where_fixed_base_takes_contradict_these(monkeypatch, against, stay):
     search = Search(DOES, torque_ceiling=[2.0], payload=[1.0, 1.7, 0.0, 3.5])
-    search.single_joint = single_joint
     monkeypatch.setattr(backward, "contradicted_by_fixed_base", lambda *a: against)
     fit = search.evaluated([(candidate(name), np.array(x)) for name, x in FOUND.items()])
     kept = without_idle(search, fit)

@@ -79,10 +79,8 @@ def test_one_joint_may_err_for_itself_beside_what_is_right_everywhere(worn, ill,
     assert standing.probability == pytest.approx(sure)
 
 
-@pytest.mark.parametrize(("single_joint", "sure"), [(False, 0.9), (True, 0.18)])
-def test_all_that_a_single_joint_lacks_answers_for_what_is_left_in_it(worn, monkeypatch, single_joint, sure):
+def test_what_a_joint_lacks_is_for_its_own_effect_to_answer(worn, monkeypatch):
     _, search, _ = worn
-    monkeypatch.setattr(type(search), "single_joint", single_joint)
     monkeypatch.setattr(calibration, "SCHEDULING", replace(SCHEDULING, few=3))  # none of three may err for itself
     sag = Candidate.of(known_effects()["supply_sag"], (), (0.0,))
     stiff = Candidate.of(known_effects()["coulomb_friction"], ("one",), (NOMINAL,))
@@ -91,7 +89,7 @@ def test_all_that_a_single_joint_lacks_answers_for_what_is_left_in_it(worn, monk
     residual = np.zeros_like(fit.residuals[0])
     residual[:, e.channels.index("one")] = 7.0
     told = calibrated(search, replace(fit, residuals={0: residual}), [NamePosterior(0.9, ())] * 2, {0: np.zeros(len(e.channels))})
-    assert [t.probability for t in told] == pytest.approx([sure, 0.18])
+    assert [t.probability for t in told] == pytest.approx([0.9, 0.18])
 
 
 @pytest.mark.parametrize(("friction", "sure"), [(1.12, 0.45), (0.88, 0.45), (0.7, 0.9), (1.3, 0.9)])

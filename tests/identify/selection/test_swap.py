@@ -8,9 +8,9 @@ import pytest
 
 from tests.gap_linear import names, trial
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.selection import single_joint, swap
+from workbench.identify.selection import swap
 from workbench.identify.selection.best_subsets import worst_joint
-from workbench.identify.selection.options import SINGLE_JOINT
+from workbench.identify.selection.options import SUBSETS
 
 RNG = np.random.default_rng(8)
 FRICTION, PLAY, OTHER = RNG.normal(size=(3, 600))
@@ -74,16 +74,16 @@ def test_only_what_was_found_together_is_replaced_and_by_nothing_that_is_there(s
 def test_sets_are_replaced_until_none_is_better_unless_the_first_leaves_no_more_than_a_right_model(search, monkeypatch, right,
                                                                                                  replaced):
     first = [trial("viscous_friction"), trial("backlash")]
-    monkeypatch.setattr(single_joint, "several", lambda *a: [first])
-    monkeypatch.setattr(single_joint, "SINGLE_JOINT", replace(SINGLE_JOINT, right=right))
+    monkeypatch.setattr(swap, "several", lambda *a: [first])
+    monkeypatch.setattr(swap, "SUBSETS", replace(SUBSETS, right=right))
 
     def fitted(search, current, sets, takes):
         fits = [fit_of(search, **{t.candidate.name: {"viscous_friction": 1.5, "dead_band": 2.0}.get(t.candidate.name, 1.0)
                                   for t in s}) for s in sets]
         return sorted(zip(fits, sets), key=lambda f: f[0].cost["choose"])
 
-    monkeypatch.setattr(single_joint, "_fitted", fitted)
-    (fit, chosen), *rest = single_joint.together(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
+    monkeypatch.setattr(swap, "_fitted", fitted)
+    (fit, chosen), *rest = swap.best_sets(search, None, [trial(n) for n in DOES], (0,), {"knee": 5.0})
     assert {t.candidate.name for t in chosen} == {"viscous_friction", "dead_band" if replaced else "backlash"}
     assert bool(rest) is replaced
     assert fit.cost["choose"] <= min((f.cost["choose"] for f, _ in rest), default=np.inf)

@@ -19,7 +19,8 @@ class Backlash(Effect):
     places = ("joint",)
     under_load = True
     free_play = "gap"
-    parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE),)
+    # measured on hobby servos: 0.6 to 1.3 deg; worn ones are said to have "at least 2"
+    parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE, seldom_beyond=4.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"{', '.join(spec.where)} has {scalar(spec, 'gap'):.1f} deg of free play between servo and link."

@@ -17,7 +17,8 @@ class ClockRate(Effect):
     layer = "timing"
     places = ("robot",)
     family = "timing"
-    parameters = (Parameter("ratio", "1", 0.5, 2.0, 1.01),)
+    # an STM32's own oscillator (data sheet): 1 % at 25 deg C, up to 2.5 % over temperature; a crystal 0.01 %
+    parameters = (Parameter("ratio", "1", 0.5, 2.0, 1.01, seldom_beyond=1.015),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"A second of the commands takes {spec.parameters['ratio']:.4f} s of the recording."

@@ -19,6 +19,7 @@ class ComShift(Effect):
     places = ("link",)
     title = "centre of mass shift"
     family = "mass"
+    tied = "gravity against torque"
     moves_center = True
     parameters = (Parameter("offset", "m", -0.2, 0.2, 0.005, vector=True),)
 

@@ -19,7 +19,8 @@ class CommandDelay(Effect):
     places = ("joint", "robot",)
     family = "timing"
     like_a_late_start = True
-    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0)),)
+    # two rounds of a USB adapter whose latency timer is at its default of 16 ms, beside the servo's own
+    parameters = (Parameter("delay", "s", 0.0, 0.5, 0.01, resolution=LOOP / math.sqrt(3.0), seldom_beyond=0.04),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"Commands reach {', '.join(spec.where) or 'all servos'} {1000 * scalar(spec, 'delay'):.1f} ms late."

@@ -39,7 +39,8 @@ class FrictionAsymmetry(Effect):
     layer = "actuator"
     places = ("joint",)
     family = "friction"
-    parameters = (Parameter("ratio", "", 0.1, 10.0, 1.3),)
+    # 1.3 on an XL-330 (fit to the logs of Rhoban/bam)
+    parameters = (Parameter("ratio", "", 0.1, 10.0, 1.3, seldom_beyond=2.5, logarithmic=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
         ratio = scalar(spec, "ratio")

@@ -18,6 +18,7 @@ class GroundTilt(Effect):
     layer = "ground"
     places = ("robot",)
     family = "ground pull"
+    tied = "gravity against torque"
     steady_pull = True
     equivalent_to = ("tether_force",)
     parameters = (

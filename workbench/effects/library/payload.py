@@ -16,6 +16,7 @@ class Payload(Effect):
     layer = "inertia"
     places = ("link",)
     family = "mass"
+    tied = "gravity against torque"
     point_mass = True
     includes = ("com_shift",)
     reduces_to = "com_shift"

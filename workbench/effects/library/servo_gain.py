@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs
+from workbench.effects.base import Parameter, Registers, mean_of_logs
+from workbench.effects.servo_constant import ServoConstant
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import ServoLaw
 
 LEAST_DUTY, MOST_DUTY = 0.05, 0.9
 """Between them a law's steepness shows: less drowns in the counts of position, more may be cut."""
@@ -18,14 +16,15 @@ COUNTS = 0.01
 """Standard error that no register of duty goes below: it is read some milliseconds from the position."""
 
 
-class ServoGain(Effect):
+class ServoGain(ServoConstant):
     """The servo law is steeper or flatter than nominal (duty per error); punch unchanged."""
 
     name = "servo_gain"
-    layer = "actuator"
-    places = ("joint",)
+    field = "gain"
+    how = "multiply"
     family = "electrical"
-    parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8),)
+    # registers of steepness go in powers of two, as the AX-12A's compliance slope: one step
+    parameters = (Parameter("ratio", "1", 0.05, 5.0, 0.8, seldom_beyond=2.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"The position law of {', '.join(spec.where)} is {spec.parameters['ratio']:.2f} times as steep as nominal."
@@ -45,11 +44,6 @@ class ServoGain(Effect):
                 if good.sum() > 50:
                     ratios.append(float(duty[good] @ nominal[good] / (nominal[good] @ nominal[good])))
         return mean_of_logs(ratios, COUNTS)
-
-    def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
-        gain = law.gain.copy()
-        gain[columns] *= values["ratio"]
-        return replace(law, gain=gain)
 
 
 EFFECT = ServoGain()

@@ -40,6 +40,7 @@ class SupplySag(Effect):
     layer = "actuator"
     places = ("robot",)
     family = "electrical"
+    tied = "less torque at full duty"
     under_load = True
     parameters = (Parameter("drop", "V", 0.0, 5.0, 0.3),)
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.effects.base import Effect, Parameter
+from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs
 from workbench.effects.sdf import SdfRobot
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
@@ -16,6 +16,8 @@ from workbench.servo import ServoLaw
 STANDS = 1.5
 """Most voltage that a servo is run at, over what it is rated at or said to get: a full pack of two cells on
 a servo rated at 6 V is 1.4; more burns it."""
+REGISTER = 0.1
+"""A step of the voltage that servos measure [V]."""
 
 
 class SupplyVoltage(Effect):
@@ -25,6 +27,7 @@ class SupplyVoltage(Effect):
     layer = "actuator"
     places = ("robot",)
     family = "electrical"
+    tied = "gravity against torque"
     parameters = (Parameter("voltage", "V", 3.0, 20.0, 10.0, replaces=True),)
 
     def sentence(self, spec: EffectSpec) -> str:
@@ -36,6 +39,11 @@ class SupplyVoltage(Effect):
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
         (nominal,) = self.neutral(model)
         return STANDS * max(nominal, *(model.servo(j).rated_voltage for j in model.joints)) - nominal
+
+    def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
+        """The median that servos measured in each log, to a step of their registers."""
+        seen = [log.voltage[np.isfinite(log.voltage)] for log in logs if log.voltage is not None]
+        return mean_of_logs([float(np.median(v)) for v in seen if len(v)], REGISTER)
 
     def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
         return replace(law, full_torque=law.torque_per_volt * values["voltage"])

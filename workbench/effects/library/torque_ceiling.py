@@ -36,6 +36,7 @@ class TorqueCeiling(Effect):
     layer = "actuator"
     places = ("joint",)
     family = "electrical"
+    tied = "less torque at full duty"
     under_load = True
     parameters = (Parameter("torque", "N m", 0.005, 10.0, 0.4),)
 

@@ -37,6 +37,7 @@ class TorqueSaturation(Effect):
     layer = "actuator"
     places = ("joint",)
     family = "electrical"
+    tied = "less torque at full duty"
     under_load = True
     parameters = (Parameter("torque", "N m", 0.02, 1e8, 1.0),)
 

@@ -17,7 +17,8 @@ class ZeroOffset(Effect):
     hidden_by_zeroing = True
     moves_feet = True
     estimator = "turn about an axis"
-    parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE),)
+    # a horn one tooth off: 14.4 deg of 25 teeth
+    parameters = (Parameter("angle", "deg", -45.0, 45.0, 4.0, si=DEGREE, seldom_beyond=15.0),)
 
     def sentence(self, spec: EffectSpec) -> str:
         return f"{', '.join(spec.where)} stands {spec.parameters['angle']:.1f} deg off its servo's zero."

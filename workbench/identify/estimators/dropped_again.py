@@ -15,7 +15,7 @@ from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.parameters import with_effects
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 
@@ -48,8 +48,8 @@ def reestimated(search: Search, current: Fit, played: TakesAsPlayed) -> tuple[Se
 
 
 def with_commands_of(evidence: Sequence[TakeEvidence], others: Sequence[TakeEvidence]) -> list[TakeEvidence]:
-    """Takes played as others are, which are the same takes."""
-    return [replace(e, take=o.take) for e, o in zip(evidence, others)]
+    """Takes played as others are, which are the same takes, or as much of them as is looked at."""
+    return [replace(e, take=replace(e.take, commands=o.take.commands)) for e, o in zip(evidence, others)]
 
 
 def _poses(missed: Sequence[DroppedCommands]) -> Mapping[str, Mapping[int, tuple[int, ...]]]:

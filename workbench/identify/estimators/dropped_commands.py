@@ -14,7 +14,7 @@ from workbench.identify.estimators.dropped_in_motion import dropped_in_motion, e
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence, joint_error
 from workbench.identify.results.findings import Change, Estimate, Finding
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from workbench.effects.schedules import without_poses
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
+from scipy.stats import t as student_t
 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
@@ -18,8 +20,12 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
 Array = NDArray[np.float64]
-FAR = 2.0
+FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
+FREEDOM = 4.0
+"""Of the t of sizes: twelve degrees of play, where one servo in a hundred has four, cost nine nats more than one degree does."""
+SELDOM = float(student_t.ppf(0.995, FREEDOM))
+"""Scales that one in a hundred is from the center."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -119,42 +125,57 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Prior:
-    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Cauchy of sizes, half of it where they have one
-    sign. center (k,), scale (k,); normal, one_sided (k,)."""
+    """Of a hypothesis' numbers: normal of recalibrated ones and of doublings, Student's t of sizes, half of it where they have
+    one sign: with so many degrees of freedom, and so wide, where the effect says what one in a hundred passes, that one in a
+    hundred does; else Cauchy's. center (k,), scale (k,); normal, one_sided (k,); freedom (k,)."""
 
     center: Array
     scale: Array
     normal: NDArray[np.bool_]
     one_sided: NDArray[np.bool_]
+    freedom: Array
 
     @classmethod
     def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
         n = len(h.numbers)
         center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
+        freedom = [np.ones(n)]
         for c in h.effects:
             low, high = c.bounds()
-            shapes = c.shapes
+            shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
+            told = np.isfinite(seldom)
             center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
-            scale.append(np.where(shapes, options.doublings, 1.0 if c.read_off else options.width))
+            width = np.where(told, seldom / SELDOM, 1.0 if c.read_off else options.width)
+            scale.append(np.where(shapes, options.doublings, width))
+            freedom.append(np.where(told, FREEDOM, 1.0))
             normal.append(shapes)
             one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
-        return cls(*(np.concatenate(x) for x in (center, scale, normal, one_sided)))
+        return cls(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))
 
     def rows(self, theta: Array) -> Array:
         """Numbers of which half the squares are the log prior but for a constant."""
         z = (theta - self.center) / self.scale
-        return np.asarray(np.where(self.normal, z, np.copysign(np.sqrt(2 * np.log1p(z * z)), z)))
+        v = self.freedom
+        return np.asarray(np.where(self.normal, z, np.copysign(np.sqrt((v + 1) * np.log1p(z * z / v)), z)))
 
     def log(self, theta: Array) -> float:
         """Log density [nats]."""
         z = (theta - self.center) / self.scale
-        cauchy = -np.log(np.pi) - np.log1p(z * z) + np.log(2.0) * self.one_sided
-        return float(np.sum(np.where(self.normal, -0.5 * z * z - 0.5 * np.log(2 * np.pi), cauchy) - np.log(self.scale)))
+        v = self.freedom
+        return float(np.sum(self.at_center - np.where(self.normal, 0.5 * z * z, (v + 1) / 2 * np.log1p(z * z / v))))
+
+    @property
+    def at_center(self) -> Array:
+        """Log density of each number (k,) where it is largest [nats]."""
+        v = self.freedom
+        student = gammaln((v + 1) / 2) - gammaln(v / 2) - 0.5 * np.log(np.pi * v) + np.log(2.0) * self.one_sided
+        return np.asarray(np.where(self.normal, -0.5 * np.log(2 * np.pi), student) - np.log(self.scale))
 
     def precision(self, theta: Array) -> Array:
         """How sharply it tells each number (k,), as reweighted least squares have it."""
         z = (theta - self.center) / self.scale
-        return np.asarray(np.where(self.normal, 1.0, 2.0 / (1 + z * z)) / np.square(self.scale))
+        v = self.freedom
+        return np.asarray(np.where(self.normal, 1.0, (v + 1) / (v + z * z)) / np.square(self.scale))
 
 
 def log_odds(names: int, expected: float) -> float:

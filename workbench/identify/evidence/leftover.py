@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.conclusions import Residuals, unexplained
-from workbench.identify.ledger import in_file_units
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import TakeEvidence, in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import Dependence
 

@@ -51,8 +51,9 @@ class Probe:
 
 def extensions(region: Region, h: Hypothesis) -> list[Candidate]:
     """Effects that the hypothesis lacks, and its own with one option more."""
-    there = {(c.name, c.where) for c in h.effects}
-    out = [c for c in region.candidates if (c.name, c.where) not in there]
+    there, ties = {(c.name, c.where) for c in h.effects}, {c.effect.tied for c in h.effects}
+    out = [c for c in region.candidates
+           if (c.name, c.where) not in there and (c.effect.tied is None or c.effect.tied not in ties)]
     for c in h.effects:
         more = dict.fromkeys(p.option for p in c.effect.parameters if p.option and p.option not in c.options)
         out += [Candidate.of(c.effect, c.where, _neutral(c.effect), options=tuple(sorted((*c.options, name)))) for name in more]
@@ -104,7 +105,12 @@ def to_be_fitted(alone: Sequence[Move], both: Sequence[Move], options: EvidenceO
 def in_pairs(region: Region, options: EvidenceOptions, f: Fitted, moves: Sequence[Move]) -> list[Move]:
     """Two of the best moves at once, predicted by what each does alone."""
     return [_both(region, options, f, a, b) for a, b in combinations(moves[:options.paired], 2)
-            if a.added[0].key != b.added[0].key or a.added[0].key in {c.key for c in f.hypothesis.effects}]
+            if (a.added[0].key != b.added[0].key or a.added[0].key in {c.key for c in f.hypothesis.effects})
+            and not _are_tied(a.added[0], b.added[0])]
+
+
+def _are_tied(a: Candidate, b: Candidate) -> bool:
+    return a.effect.tied is not None and a.effect.tied == b.effect.tied and a.key != b.key
 
 
 def _both(region: Region, options: EvidenceOptions, f: Fitted, a: Move, b: Move) -> Move:

@@ -38,7 +38,7 @@ def told_from_nothing(region: Region, options: EvidenceOptions, best: Fitted) ->
         posterior = -0.5 * float(x @ np.linalg.solve(V, x)) - 0.5 * float(np.linalg.slogdet(2 * np.pi * V)[1])
         sign = prior.one_sided[made]  # of these the posterior ends at 0
         posterior -= float(np.sum(log_ndtr(np.abs(x) / np.sqrt(np.diag(V)))[sign]))
-        before = float(np.sum(np.log(2.0) * sign - np.log(np.pi * prior.scale[made])))
+        before = float(np.sum(prior.at_center[made]))
         odds = before - posterior + (1 + len(c.options)) * log_odds(len(region.candidates), options.expected)
         if odds < 0:
             out[c] = LessLikely(-odds)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 
 ZERO = "zero"
@@ -15,20 +16,33 @@ ZERO_SD = math.radians(1.15)
 """Of a joint's zero [rad], where a log's angles count from the servo's own: a tooth of a horn is 15 degrees, an arm is set on
 it by eye."""
 
+OF_SHEET = {"torque_at_full_duty": ("torque_tolerance", ("stall_torque", "supply_voltage")),
+            "back_emf": ("back_emf_tolerance", ("no_load_speed",))}
+"""Numbers that come from a data sheet, with what of servo.yaml says how well they are known: its tolerance, or standard
+deviations."""
 UNITS = {"torque_at_full_duty": "N m", "back_emf": "N m s/rad", "coulomb_friction": "N m", "viscous_friction": "N m s/rad",
-         "reflected_inertia": "kg m^2", ZERO: "rad"}
+         "reflected_inertia": "kg m^2", "goal_delay": "s", "goal_ramp": "deg/s", "minimum_duty": "1", "dead_zone": "deg",
+         "command_filter": "s", "derivative_gain": "s/rad", "load_friction": "1", ZERO: "rad"}
 """The numbers of a servo that are recalibrated. Torque at full duty is what supply and motor do together, which no log tells
 apart."""
 
 
-def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool) -> list[Uncertain]:
-    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
-    tells a zero."""
+def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
+    """The same of a robot that was diagnosed before, whose constants carry the standard deviations of that."""
     servo = model.servo(joint)
-    shares = {
-        "torque_at_full_duty": math.hypot(servo.share_known("stall_torque"), servo.share_known("supply_voltage")),
-        "back_emf": servo.share_known("no_load_speed"), "coulomb_friction": servo.share_known("coulomb_friction"),
-        "viscous_friction": servo.share_known("viscous_friction"), "reflected_inertia": servo.share_known("reflected_inertia")}
+    known = {name: drift.of(name, servo.share_known(name)) for name in UNITS if name != ZERO}
+    out = [Uncertain(joint, name, sd) for name, sd in known.items() if nominal_value(servo, name) > 0]
+    return out if zeroed else [*out, Uncertain(joint, ZERO, drift.of(ZERO, 0.0))]
+
+
+def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
+    """The numbers of one joint's servo that are not known exactly. zeroed: whether its angles count from rest, so that no log
+    tells a zero. sheet: standard deviation of the logarithm of torque and back-EMF of which nobody says how well they are
+    known."""
+    servo = model.servo(joint)
+    shares = {name: servo.share_known(name) for name in UNITS if name != ZERO}
+    shares |= {name: sheet for name, (tolerance, keys) in OF_SHEET.items()
+               if getattr(servo, tolerance) is None and not set(keys) & set(dict(servo.sd))}
     out = [Uncertain(joint, name, share) for name, share in shares.items() if share > 0 and nominal_value(servo, name) > 0]
     return out if zeroed else [*out, Uncertain(joint, ZERO, ZERO_SD)]
 
@@ -63,6 +77,19 @@ def _scaled(servo: ServoConstants, name: str, by: float) -> ServoConstants:
     if name == "back_emf":
         return replace(servo, no_load_speed=servo.no_load_speed / by)
     return replace(servo, **{name: getattr(servo, name) * by})  # type: ignore[arg-type]
+
+
+def with_known(model: RobotModel, sds: Mapping[Uncertain, float]) -> RobotModel:
+    """The robot whose servo constants carry how well they are known now: sds, of the logarithm, by number."""
+    servos = {j: model.servo(j) for j in model.joints}
+    for number, sd in sds.items():
+        servo = servos[number.joint]
+        if number.name in OF_SHEET:
+            servos[number.joint] = replace(servo, **{OF_SHEET[number.name][0]: sd})  # type: ignore[arg-type]
+        elif number.name != ZERO:
+            known = dict(servo.sd) | {number.name: sd * nominal_value(servo, number.name)}
+            servos[number.joint] = replace(servo, sd=tuple(sorted(known.items())))
+    return model.with_physics(servos, model.effects)
 
 
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:

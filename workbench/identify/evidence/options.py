@@ -2,7 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SinceThen:
+    """By how much a robot that was diagnosed may have changed since, without anything to report: standard deviations of the
+    logarithm, `zero` [rad]. widened: times the standard deviations of the last diagnosis, as those are formal ones.
+
+    torque, back-EMF: one STS3215 differed by 3 to 6 % per duty between days at 28, 34 and 37 deg C. friction: grease and wear,
+    20 to 40 % there. law: what firmware does, which does not drift; how logs are stamped may. zero: a link taken off and put on
+    again."""
+
+    widened: float = 3.0
+    torque: float = 0.06
+    friction: float = 0.3
+    law: float = 0.02
+    zero: float = math.radians(0.3)
+
+    def of(self, name: str, sd: float) -> float:
+        """Standard deviation of a number that was known to `sd`."""
+        own = {"torque_at_full_duty": self.torque, "back_emf": self.torque, "zero": self.zero} | dict.fromkeys(
+            ("coulomb_friction", "viscous_friction", "load_friction"), self.friction)
+        return math.hypot(self.widened * sd, own.get(name, self.law))
 
 
 @dataclass(frozen=True)
@@ -14,29 +37,38 @@ class EvidenceOptions:
     its size is looked for, from a tenth of a servo's count to a lost arm.
 
     The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
-    prior with heavy tails); doublings: standard deviation of a number that only shapes an effect, a factor of four either way.
-    expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having searched
-    many.
+    prior with heavy tails); sheet: standard deviation of the logarithm of torque at full duty and of back-EMF that a data sheet
+    says: of one servo that was weighed against (STS3215, 12 V) they are 2.5 and 1.9 times that; doublings: standard deviation of
+    a number that only shapes an effect, a factor of four either way. expected: effects that one joint's servo is thought to lack,
+    spread over all names that are tried; it pays for having searched many.
 
     The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
-    leave is correlated for longer. stride: of differences, in standard deviations of the prior or typical sizes: stick and slip
-    answers smaller ones with noise; spread: of the moves that tell the last slopes, likewise: half of what was known before.
-    iterations: most steps of a fit. beam: states that are extended, and moves of one effect that are fitted of each; refined:
-    moves of one or two that are, led of these by the same one; paired: of the best moves, those that are also predicted two at a
-    time. most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit
-    sees all. most_work [s]: of a puppy's rollouts at the search's step (`RolloutEvaluator.work`), after which nothing more is
-    tried unless the search is to be thorough: about an hour of a processor, several times what twelve logs of a servo need.
+    leave is correlated for longer. horizon [s]: of the windows, each from the recorded state, by which it explores: several times
+    as long as a servo takes to a goal, short of the seconds over which stick and slip part models that are alike. grown: times
+    the discrepancy over windows up to which that over whole logs may be, for these to judge. far: standard deviations that a
+    number of the nominal law may be recalibrated by; its prior prices them. stride: of differences, in standard deviations of the
+    prior or typical sizes: stick and slip answers smaller ones with noise; spread: of the moves that tell the last slopes,
+    likewise: half of what was known before. iterations: most steps of a fit. beam: states that are extended, and moves of one
+    effect that are fitted of each; refined: moves of one or two that are, led of these by the same one; paired: of the best
+    moves, those that are also predicted two at a time. most: effects of one joint. seconds: of all takes together that the search
+    looks at, their beginnings; the last fit sees all. most_work [s]: of a puppy's rollouts at the search's step
+    (`RolloutEvaluator.work`), after which nothing more is tried unless the search is to be thorough: about an hour of a
+    processor, several times what twelve logs of a servo need.
+
+    drift: where the nominal robot is one that was diagnosed before, what may have changed since; None: it is one as drawn.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
-    effect to take it out, odds of twenty. sure: standard errors by which a servo's own register must refute a name, and refuted:
-    the share of an effect's typical size that it then rules out, which no recording would show.
+    effect to take it out, odds of twenty. alike: share of what an effect does from which on other torques that do as much stand
+    for it. sure: standard errors by which a servo's own register must refute a name, and refuted: the share of an effect's
+    typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
     least_discrepancy: float = 1.5e-4
     most_discrepancy: float = 0.3
     width: float = 3.0
+    sheet: float = 0.5
     doublings: float = 2.0
     expected: float = 2.0
     stride: float = 0.15
@@ -48,10 +80,15 @@ class EvidenceOptions:
     paired: int = 10
     most: int = 6
     explored: float = 0.15
+    horizon: float = 0.5
+    grown: float = 1.5
+    far: float = 3.0
     seconds: float = 100.0
     most_work: float = 2e6
     occam: float = 7.0
     veto: float = 3.0
+    alike: float = 0.5
+    drift: SinceThen | None = None
     sure: float = 3.0
     refuted: float = 0.3
 

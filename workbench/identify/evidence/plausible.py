@@ -37,5 +37,5 @@ def _distances(c: Candidate, x: Array) -> Iterator[tuple[Parameter, float, float
     for p in c.given:
         n = 3 if p.vector else 1
         v, at = np.array(list(islice(values, n))), np.array(list(islice(neutral, n)))
-        away = float(np.linalg.norm(v - at))
+        away = float(np.linalg.norm(v - at)) if p.vector or not np.isfinite(at).all() else p.distance(float(v[0]), float(at[0]))
         yield p, float(np.linalg.norm(v)) if p.vector else float(v[0]), away

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from workbench.effects.base import Family
 from workbench.effects.registry import known_effects
 from workbench.identify.evidence.fit import Fitted
 from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.options import CONCLUSIONS
 
 Named = tuple[str, tuple[str, ...]]
 """An effect's name, and where it acts."""
@@ -30,9 +31,19 @@ class RegionPosterior:
         """The likeliest model."""
         return self.weights[0][0]
 
-    def rival(self, of: Named) -> tuple[Named, float] | None:
-        """What is likeliest where `of` is not: an effect that the best model does not have."""
-        kept = {(c.name, c.where) for c in self.best.hypothesis.effects}
+    def elsewhere(self, of: Named) -> dict[Named, float]:
+        """The same effect at other places, with the probability that it is there and not here, where that is a good part of what
+        it is here: the data cannot tell these places apart."""
+        kept, out = _names(self.best), dict[Named, float]()
+        for f, w in self.weights:
+            if of not in _names(f):
+                for other in {n for n in _names(f) - kept if n[0] == of[0]}:
+                    out[other] = out.get(other, 0.0) + w
+        return {other: w for other, w in out.items() if w >= CONCLUSIONS.same_elsewhere * self.named[of]}
+
+    def rival(self, of: Named, besides: Collection[Named] = ()) -> tuple[Named, float] | None:
+        """What is likeliest where `of` is not: an effect that the best model does not have, and that is none of `besides`."""
+        kept = _names(self.best) | set(besides)
         family = known_effects()[of[0]].family
         instead: dict[Named, float] = {}
         for f, w in self.weights:

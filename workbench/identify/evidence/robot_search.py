@@ -55,7 +55,7 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
         return at
     if first[0].shared.effects:
         report("the same without effects of the whole robot", None)
-        alone, alone_found = searched(start, found, rollouts.step, options, report)
+        alone, alone_found = searched(start, found, rollouts.step, options, report, at.rollouts.horizon)
     else:
         alone, alone_found = gone_on(replace(at.rollouts, shared=start.shared), at.found, options, report)
     of_alone = Whole(alone, (), options)

@@ -13,7 +13,7 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.nuisance import as_mapping, recalibrated
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -25,8 +25,8 @@ Wants = tuple[int, Hypothesis]
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
     errors: of the time step, which are subtracted; they are measured on `reference`, a model near those that are compared.
-    step: in steps of the search. shared: effects of the whole robot, which act in all regions. most_work: after
-    which nothing more is tried, as `RolloutEvaluator.work` counts it."""
+    step: in steps of the search. horizon [s]: of windows, each of which starts from the recorded state. shared: effects of the
+    whole robot, which act in all regions. most_work: after which nothing more is tried, as `RolloutEvaluator.work` counts it."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -35,6 +35,7 @@ class Rollouts:
     errors: StepErrors
     reference: RobotModel
     step: float = 1.0
+    horizon: float = math.inf
     shared: Hypothesis = field(default_factory=lambda: start(()))
     most_work: float = math.inf
 
@@ -58,15 +59,16 @@ class Rollouts:
         model = recalibrated(self.nominal, z)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
-    def around_here(self, step: float) -> Rollouts:
-        """The same at another step, whose error is measured on the current best model from now on: fits that are compared have to
-        be rolled out again."""
-        return replace(self, step=step, reference=self.model(self.standing))
+    def around_here(self, step: float, horizon: float | None = None) -> Rollouts:
+        """The same at another step, whose error is measured on the current best model from now on, and over another horizon [s]:
+        fits that are compared have to be rolled out again."""
+        return replace(self, step=step, horizon=self.horizon if horizon is None else horizon, reference=self.model(self.standing))
 
     def everywhere(self, states: Sequence[tuple[Hypothesis, Sequence[Hypothesis]]]) -> list[tuple[Array, ...]]:
         """Residuals (n,) of every region, of shared effects with a hypothesis for each region."""
         takes = tuple(sorted({p.take for region in self.regions for p in region.parts}))
-        questions = [RolloutRequest(replace(self, shared=shared).model(each), takes, self.step) for shared, each in states]
+        questions = [RolloutRequest(replace(self, shared=shared).model(each), takes, self.step, horizon=self.horizon)
+                     for shared, each in states]
         return [tuple(region.vector(r) for region in self.regions) for r in self._residuals(questions)]
 
     def answers(self, wants: Sequence[Wants]) -> list[Array]:
@@ -79,7 +81,7 @@ class Rollouts:
             here = {region: queue[row] for region, queue in queues.items() if row < len(queue)}
             hypotheses = [wants[here[i]][1] if i in here else h for i, h in enumerate(self.standing)]
             takes = tuple(sorted({p.take for i in here for p in self.regions[i].parts}))
-            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step))
+            questions.append(RolloutRequest(self.model(hypotheses), takes, self.step, horizon=self.horizon))
             shared.append(here)
         out: list[Array] = [np.empty(0)] * len(wants)
         for here, residuals in zip(shared, self._residuals(questions)):
@@ -89,7 +91,7 @@ class Rollouts:
 
     def _residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """In the limit of a step of zero."""
-        wrong = self.errors.at(self.reference, self.step) if questions else {}
+        wrong = self.errors.at(self.reference, self.step, self.horizon) if questions else {}
         return [{i: r - wrong[i] for i, r in answer.items()} for answer in self.evaluator.uncorrected(questions)]
 
 

@@ -57,26 +57,37 @@ def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tupl
 def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
-    rollouts = replace(rollouts, step=PROBLEM.coarse)
+    rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
     first = _all_of(rollouts, [_begun(r, options) for r in rollouts.regions])
     found = tuple(Found(r, {f.hypothesis.key: f}) for r, f in first)
     return standing(rollouts, found), found
 
 
-def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report
-             ) -> tuple[Rollouts, tuple[Found, ...]]:
-    """What was begun searched to its end. step: of rollouts by which it is judged.
+def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report,
+             horizon: float | None = None) -> tuple[Rollouts, tuple[Found, ...]]:
+    """What was begun searched to its end. step, horizon [s]: of rollouts by which it is judged; None: `_judging_horizon`.
 
     How long errors are correlated only the closest model tells, as what a poorer one leaves is correlated because it lacks
     something (so does Mallows' Cp take the noise from the largest model). So the search explores first, as if they were for no
     longer than `options.explored` and at a coarse step, and then judges what it fitted, and goes on, by what the closest fits
-    leave.
+    leave. It explores in windows, and judges by whole logs only where these tell as much (`_judging_horizon`).
     """
-    states = list(found)
-    for exploring in (True, False):
-        here = rollouts.around_here(PROBLEM.coarse if exploring else step)
-        rollouts, states = _all_levels(here, states, options, exploring, report)
+    rollouts, states = _all_levels(rollouts.around_here(PROBLEM.coarse, options.horizon), list(found), options, True, report)
+    here = rollouts.around_here(step, _judging_horizon(rollouts, states, options) if horizon is None else horizon)
+    rollouts, states = _all_levels(here, states, options, False, report)
     return rollouts, tuple(states)
+
+
+def _judging_horizon(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> float:
+    """By which horizon models are judged [s]: that of windows, or infinity, whole logs. What a right model leaves grows little
+    over a log, and then the whole log tells most, as no window starts from a noisy state; where stick and slip decide what is
+    left after seconds, it grows by several times, and is luck (`options.grown`)."""
+    if not np.isfinite(options.horizon):
+        return options.horizon
+    whole = rollouts.around_here(rollouts.step, np.inf)
+    left = whole.answers([(i, f.best.hypothesis) for i, f in enumerate(found)])
+    grown = [np.log(f.region.likelihood.discrepancy(r) / f.region.likelihood.discrepancy(f.best.r)) for f, r in zip(found, left)]
+    return np.inf if np.mean(grown) < np.log(options.grown) else options.horizon
 
 
 def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Report

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.identify.options import PROBLEM
-from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -34,17 +34,18 @@ class StepErrors:
 
     takes: tuple[int, ...]
     roll: Roll = field(repr=False)
-    _known: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
-    _ideal: dict[str, dict[int, Array]] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[str, float, float], dict[int, Array]] = field(default_factory=dict, repr=False)
+    _ideal: dict[tuple[str, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
-    def at(self, model: RobotModel, step: float) -> Residuals:
-        """By take what a model's rollouts at a step, in steps of the search, add to residuals (N, c) [sigma]; 0 where unknown."""
-        key = model.sha256
-        if (key, step) not in self._known:
+    def at(self, model: RobotModel, step: float, horizon: float = np.inf) -> Residuals:
+        """By take what a model's rollouts at a step, in steps of the search, add to residuals (N, c) [sigma]; 0 where unknown.
+        horizon [s]: of windows."""
+        key = (model.sha256, horizon)
+        if (*key, step) not in self._known:
             steps = (step,) if key in self._ideal else (step, 2 * PROBLEM.fine, PROBLEM.fine)
-            here, *finer = self.roll([RolloutRequest(model, self.takes, s) for s in steps])
+            here, *finer = self.roll([RolloutRequest(model, self.takes, s, horizon=horizon) for s in steps])
             if finer:
                 longer, shorter = finer
                 self._ideal[key] = {i: extrapolated(longer[i], shorter[i]) for i in self.takes}
-            self._known[key, step] = {i: np.nan_to_num(here[i] - self._ideal[key][i]) for i in self.takes}
-        return self._known[key, step]
+            self._known[*key, step] = {i: np.nan_to_num(here[i] - self._ideal[key][i]) for i in self.takes}
+        return self._known[*key, step]

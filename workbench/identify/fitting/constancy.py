@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.identify.fitting.fit import Fit, Slopes
-from workbench.identify.fitting.fits import Search
-from workbench.identify.ledger import in_file_units
 from workbench.identify.options import FIT
-from workbench.identify.parameters import Candidate
-from workbench.identify.problem import TakeEvidence
+from workbench.identify.problem import in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import ParameterDrift
-from workbench.identify.rollouts import RolloutEvaluator
+
+if TYPE_CHECKING:
+    from workbench.identify.fitting.fit import Fit, Slopes
+    from workbench.identify.fitting.fits import Search
+    from workbench.identify.parameters import Candidate
+    from workbench.identify.problem import TakeEvidence
+    from workbench.identify.rollouts.evaluator import RolloutEvaluator
 
 Array = NDArray[np.float64]
 
@@ -44,39 +47,57 @@ class Drift:
 
 
 def drifts(search: Search, fit: Fit) -> list[Drift]:
-    """Numbers that fixed-base takes identified (floating-base takes bend them), and tell differently early and late: a test of
-    constancy against a linear trend, with standard errors over stretches (J. Nyblom, JASA 84, 1989; clusters as in
-    `covariance_of`)."""
+    """Numbers that fixed-base takes identified (floating-base takes bend them), and tell differently early and late."""
     out: list[Drift] = []
     of_number = [(c, x, k) for c, x in fit.sizes() for k in range(c.size)]
     for s in fit.slopes:
-        if not set(s.takes) <= set(search.fixed_base):
-            continue
-        for n, change, error, rms in _trends(search.evaluator, fit, s):
-            c, x, k = of_number[n]
-            if c.read_off and c.effect.free_play:
-                continue  # a loose mount rattles by chance, and nothing else is seen across an axis
-            if not c.shapes[k] and abs(change) > FIT.drift * abs(x[k]):
-                way = np.eye(len(x))[k] * change / 2
-                low, high = c.bounds()
-                first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
-                out.append(Drift(c, k, first, last, abs(change) * rms, error * rms))
+        if set(s.takes) <= set(search.fixed_base):
+            for t in _trends(search.evaluator, fit, s):
+                c, x, k = of_number[int(s.numbers[t.column])]
+                found = drift(c, x, k, t)
+                out += [] if found is None else [found]
     return out
 
 
-def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[tuple[int, float, float, float]]:
-    """Numbers (indices of x) that surely change over a take, by how much, its standard error, and the RMS over sigma that a
-    change of one makes."""
+def drift(c: Candidate, x: Array, k: int, t: Trend) -> Drift | None:
+    """Of number k of an effect's sizes x, where a trend is a good part of it."""
+    if c.read_off and c.effect.free_play:
+        return None  # a loose mount rattles by chance, and nothing else is seen across an axis
+    if c.shapes[k] or not abs(t.change) > FIT.drift * abs(x[k]):
+        return None
+    way = np.eye(len(x))[k] * t.change / 2
+    low, high = c.bounds()
+    first, last = (c.values(np.clip(x + w, low, high))[k] for w in (-way, way))
+    return Drift(c, k, first, last, abs(t.change) * t.rms, t.error * t.rms)
+
+
+class Trend(NamedTuple):
+    """Of the number of one column of slopes: by how much it surely changes over a take, the standard error of that, and the RMS
+    over sigma that a change of one makes."""
+
+    column: int
+    change: float
+    error: float
+    rms: float
+
+
+def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[Trend]:
     r = evaluator.vector({i: fit.residuals[i] for i in s.takes}, "fit", s.joint)
     clocks = {}
     for i in s.takes:
         e = evaluator.evidence[i]
         clocks[i] = np.repeat((e.since / e.since[-1] - 0.5)[:, None], len(e.channels), axis=1)
-    clock = evaluator.vector(clocks, "fit", s.joint)
-    _, which = np.unique(evaluator.stretches(s.takes, "fit", s.joint), return_inverse=True)
-    for n, slope in zip(s.numbers.tolist(), s.J.T):
+    return trends(r, s.J, evaluator.vector(clocks, "fit", s.joint), evaluator.stretches(s.takes, "fit", s.joint))
+
+
+def trends(r: Array, J: Array, clock: Array, stretches: NDArray[np.int_]) -> Iterator[Trend]:
+    """Numbers that surely change over a take: a test of constancy against a linear trend, with standard errors over stretches
+    (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`). r (n,): what a fit leaves, over sigma; J (n, k): of r by the
+    numbers; clock (n,): -1/2 at a take's beginning, 1/2 at its end."""
+    _, which = np.unique(stretches, return_inverse=True)
+    for n, slope in enumerate(J.T):
         z = slope * clock
-        z = z - s.J @ np.linalg.lstsq(s.J, z, rcond=1e-9)[0]
+        z = z - J @ np.linalg.lstsq(J, z, rcond=1e-9)[0]
         power = float(z @ z)
         if power < 1e-9:
             continue
@@ -84,4 +105,4 @@ def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[tuple[
         by_stretch = np.asarray(np.bincount(which, weights=z * (r + change * z)), dtype=float)
         error = float(np.linalg.norm(by_stretch)) / power
         if abs(change) >= FIT.drift_sure * error and change**2 * power >= FIT.least_gain:
-            yield n, change, error, float(np.sqrt(power / int(np.count_nonzero(r))))
+            yield Trend(n, change, error, float(np.sqrt(power / int(np.count_nonzero(r)))))

@@ -16,7 +16,7 @@ from workbench.identify.fitting.levenberg_marquardt import fit_blocks, lowest, t
 from workbench.identify.fitting.responses import Part, ResponseBank
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
 
 Array = NDArray[np.float64]
@@ -48,11 +48,6 @@ class Search:
     def with_settled(self, settled: Fit | None) -> Search:
         """The same search with other effects settled."""
         return Search(self.evaluator, self.nominal, settled, self.responses)
-
-    @property
-    def single_joint(self) -> bool:
-        """Whether the robot has one joint, in which all that it lacks acts."""
-        return len(self.nominal.joints) == 1
 
     def is_settled(self, c: Candidate) -> bool:
         """Whether fixed-base takes identified its numbers."""
@@ -126,7 +121,7 @@ class Search:
         moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
         moving = current.numbers(moved)
         if not len(moving):
-            return self._told_held(current)
+            return self._with_settled_numbers(current)
         takes = self.telling([current.effects[i] for i in moved], takes)
         blocks = self._blocks(current, moved, takes)
         low, high = current.bounds()
@@ -161,7 +156,7 @@ class Search:
             covariance[np.ix_(numbers, numbers)] = covariance_of(self.evaluator, s, takes, joint, bent)
         slopes = tuple(Slopes(numbers, takes, s.J, joint) for s, (joint, numbers) in zip(solved, blocks.items()))
         (there,) = yield from self.evaluating(current.sizes(x))
-        return self._told_held(replace(there, covariance=covariance, slopes=slopes))
+        return self._with_settled_numbers(replace(there, covariance=covariance, slopes=slopes))
 
     def apart(self, c: Candidate, takes: tuple[int, ...]) -> bool:
         """Whether an effect shows in the channels of its own joint alone, on these takes."""
@@ -175,7 +170,7 @@ class Search:
         joints = dict.fromkeys(current.effects[i].joint for i in moved)
         return {j: current.numbers(i for i in moved if current.effects[i].joint == j) for j in joints}
 
-    def _told_held(self, fit: Fit) -> Fit:
+    def _with_settled_numbers(self, fit: Fit) -> Fit:
         """With covariance and slopes of those that are settled."""
         if self.settled is None:
             return fit
@@ -192,7 +187,7 @@ class Search:
         return replace(fit, covariance=covariance, slopes=(*others, *slopes))
 
     def refined(self, fit: Fit) -> Fit:
-        """The fit with its numbers as FINE steps want them, and what it leaves there: a step's error bends numbers by several per
+        """The fit with its numbers as fine steps want them, and what it leaves there: a step's error bends numbers by several per
         cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that
         floating-base takes identify, if it is one, the bottom of what is seen far around. A quarter of the way counts as a
         standard deviation more."""
@@ -233,13 +228,13 @@ class Search:
         return move
 
     def floors(self, fit: Fit) -> dict[int, Array]:
-        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what FINE steps twice as long change."""
+        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what those steps twice as long change."""
         model = with_effects(self.nominal, fit.sizes())
         longer = self.evaluator.residuals([RolloutRequest(model, self.takes, 2 * PROBLEM.fine)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.evaluator.evidence[i].moving])) for i in self.takes}
 
     def finely(self, fit: Fit, takes: tuple[int, ...], *points: Array) -> list[Fit]:
-        """The fit with other sizes, as FINE steps judge it."""
+        """The fit with other sizes, as fine steps judge it."""
         asked = [RolloutRequest(with_effects(self.nominal, fit.sizes(x)), takes, PROBLEM.fine) for x in points]
         return [replace(fit, x=x, cost=self._cost(r), residuals=r) for x, r in zip(points, self.evaluator.residuals(asked))]
 

@@ -13,7 +13,7 @@ from scipy.optimize import Bounds, minimize
 
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
-from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutRequest
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

@@ -28,12 +28,13 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True)
 class RolloutRequest:
     """A model on some takes (indices). step: in search steps; coarse ones are good for differences alone. until: how long after
-    the first command [s]; frames after that are NaN."""
+    the first command [s]; frames after that are NaN. horizon [s]: servo logs are put back to the recorded state so often."""
 
     model: RobotModel
     takes: tuple[int, ...]
     step: float = 1.0
     until: float = np.inf
+    horizon: float = np.inf
 
 
 class RolloutEvaluator:
@@ -96,7 +97,8 @@ class RolloutEvaluator:
         answers: dict[str, Array] = {}
         keys, missing, seen = [], [], set[str]()
         for q in questions:
-            keys.append({i: "log-" + self._key(self._felt(q.model, i), i, q) for i in q.takes})
+            windows = "" if np.isinf(q.horizon) else f"-every{q.horizon:.6g}"
+            keys.append({i: f"log-{self._key(self._felt(q.model, i), i, q)}{windows}" for i in q.takes})
             new = {i: k for i, k in keys[-1].items()
                    if k not in answers and k not in seen and not self._recalled(k, i, q, answers)}
             seen |= set(new.values())
@@ -116,7 +118,7 @@ class RolloutEvaluator:
         def rolled(of: tuple[RolloutRequest, Mapping[int, str]]) -> list[Array] | None:
             q, takes = of
             config = replace(self.config, time_step=q.step * self.config.time_step)
-            return log_angles([self.evidence[i] for i in takes], q.model, config)
+            return log_angles([self.evidence[i] for i in takes], q.model, config, q.horizon)
 
         if self.n_jobs == 1 or len(asked) < 2:
             yield from map(rolled, asked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.identify.rollouts.windows import recorded_states
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
@@ -35,9 +37,10 @@ def frames(e: TakeEvidence) -> NDArray[np.bool_]:
     return np.asarray((e.since >= 0) & (e.since <= e.until))
 
 
-def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig) -> list[Array] | None:
+def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig, horizon: float = math.inf
+               ) -> list[Array] | None:
     """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
-    config: base and rest apart, which are a log's."""
+    config: base and rest apart, which are a log's. horizon [s]: of windows, each of which starts from the recorded state."""
     held = replace(config, base="fixed", settle=SETTLE)
     models: dict[str, RobotModel] = {}
     jobs = []
@@ -47,7 +50,8 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
         models.setdefault(servos, model.with_servos(spec.servos))
         times = e.since[frames(e)]
         jobs.append(Job(models[servos], held, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
-                        start=e.take.start_state()))
+                        start=e.take.start_state(),
+                        restarts=None if math.isinf(horizon) else recorded_states(e.take, horizon)))
     try:
         angles = servo_angles(jobs)
     except NotCoveredError:

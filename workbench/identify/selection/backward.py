@@ -22,8 +22,7 @@ def without_part_answers(search: Search, current: Fit, rounds: Sequence[Selectio
 
 
 def without_idle(search: Search, current: Fit) -> Fit:
-    """Backward: an effect that the others have made idle goes. The others may have far to go: in a robot of one joint, where all
-    act alike and a load does by itself what another does with a spring and a zero askew; and where fixed-base takes go better
+    """Backward: an effect that the others have made idle goes. The others may have far to go where fixed-base takes go better
     without it, as a knee that was not fitted soft enough leaves floating-base takes something for play to close."""
     for i in range(len(current.effects) - 1, -1, -1):
         if len(current.effects) < 2:
@@ -32,14 +31,10 @@ def without_idle(search: Search, current: Fit) -> Fit:
         least = FIT.least_gain * max(1, c.size) * (ACCEPTANCE.all_closed if settled else 1.0)
         rest = search.evaluated(current.sizes_without(c.key))
         before = rest.cost["choose"]
-        if search.single_joint or before - current.cost["choose"] < BACKWARD.clearly * least:
+        if before - current.cost["choose"] < BACKWARD.clearly * least:
             rest = search.refitted(rest, search.fitted, 1, range(len(rest.effects)) if settled else None)
-        if (search.single_joint and rest.cost["choose"] < SUBSETS.half * before) or (
-            not settled and contradicted_by_fixed_base(search, current, rest)
-        ):
+        if not settled and contradicted_by_fixed_base(search, current, rest):
             rest = search.refitted(rest, search.fitted, SUBSETS.together_steps)
         if rest.cost["choose"] - current.cost["choose"] < least:
             current = rest
-            if search.single_joint:
-                return without_idle(search, current)
     return current

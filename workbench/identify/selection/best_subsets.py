@@ -127,7 +127,7 @@ def best_sets(seen: Sequence[Response], r0: Array) -> list[list[CandidateFit]]:
 
 
 class _NormalEquations:
-    """ResponseBank added up: what is missing, r0, less what they do in shares of what was seen."""
+    """Responses added up: what is missing, r0, less what they do in shares of what was seen."""
 
     def __init__(self, seen: Sequence[Response], r0: Array) -> None:
         A = np.concatenate([s.responses for s in seen], axis=1)

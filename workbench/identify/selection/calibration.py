@@ -23,12 +23,12 @@ Array = NDArray[np.float64]
 def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[NamePosterior]:
     """Standings less sure where fixed-base takes, which identified the effect, leave much at its place, or want its numbers to
-    change; of the whole robot at joints that no other effect is to answer for, or at its only one; where a floor is nearly the
+    change; of the whole robot at joints that no other effect is to answer for; where a floor is nearly the
     model's, a number as far as it may go, or nearly nothing; where it, or about as likely a rival, pulls straight down; where in
     fine steps it is `idle`. floors: of the fit, by take."""
     left = [(channel, r) for i in search.fixed_base if i in floors
             for channel, r in ratios(search.evaluator.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
-    out, theirs = [], set() if search.single_joint else {c.joint for c in fit.effects}
+    out, theirs = [], {c.joint for c in fit.effects}
     for (c, x), own_x, s in zip(fit.sizes(), fit.slices(), posteriors):
         worst = _left_at(c, left, theirs) if search.identified_on_fixed_base(c) else 0.0
         factor = next((factor for most, factor in CALIBRATION.left if worst <= most), COMPARISON.least)

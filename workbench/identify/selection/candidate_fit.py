@@ -35,11 +35,11 @@ class CandidateFit:
 class Race:
     """What rivals that are fitted side by side know of each other: the best gain that an earlier screening's responses predict,
     that those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of
-    one number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; unheld: whether no
-    take had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
+    one number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; no_fixed_base:
+    whether no take had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
-    screened_out: dict[str | None, float] = field(default_factory=dict)
+    predicted: dict[str | None, float] = field(default_factory=dict)
     reached: dict[str | None, float] = field(default_factory=dict)
     wide: dict[bool, list[float]] = field(default_factory=dict)
     least: float = 0.0

@@ -31,7 +31,7 @@ from workbench.identify.selection.record import SelectionResult, SelectionStep, 
 from workbench.identify.selection.reevaluation import reevaluated
 from workbench.identify.selection.scheduling import asked, standing_out
 from workbench.identify.selection.screening import tried
-from workbench.identify.selection.single_joint import set_right, single_joint_step, together
+from workbench.identify.selection.swap import best_sets
 
 
 def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
@@ -40,8 +40,7 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
     left out of what is played; read anew by what fixed-base takes identified."""
     current = nominal = search.evaluated([])
     rounds: list[SelectionStep] = []
-    work = FORWARD.most_work_single_joint if search.single_joint else FORWARD.most_work
-    most = np.inf if thorough else max(work, FORWARD.most_rollouts * search.evaluator.seconds)
+    most = np.inf if thorough else max(FORWARD.most_work, FORWARD.most_rollouts * search.evaluator.seconds)
     if search.fixed_base:
         search, current, rounds = _phase(search, pool, current, search.fixed_base, rounds, report, most)
     if current.effects and played is not None:
@@ -72,10 +71,8 @@ def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: 
 
 def _may_go_on(search: Search, fit: Fit) -> bool:
     """Whether a fit may not have come to its end: where floating-base takes still show a gap, as fits of several numbers begin in
-    coarse steps, and of a robot of one joint, where all acts alike and valleys are long."""
-    return search.single_joint or any(
-        channel_gaps(search.evaluator.evidence[i], fit.residuals[i]) for i in search.floating_base(search.fitted)
-    )
+    coarse steps."""
+    return any(channel_gaps(search.evaluator.evidence[i], fit.residuals[i]) for i in search.floating_base(search.fitted))
 
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep],
@@ -90,11 +87,6 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             break
         what = ", ".join(sorted({joint_of(c) if c not in BODY else "body" for c in beyond}))
         say = partial(report, f"explaining {what} ({len(rounds) + 1})")
-        if not search.evaluator.any_floating(takes) and search.single_joint and search.evaluator.work <= most_work:
-            current, taken_in = single_joint_step(search, pool, current, beyond, takes, say)
-            rounds += taken_in
-            if taken_in:
-                continue
         trials: list[CandidateFit] = []
         likely = pool
         for tier in range(SCHEDULING.tiers_of_all if closed > ACCEPTANCE.least_closed else SCHEDULING.tiers):
@@ -122,7 +114,7 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
         ]
         read_off = any(t.candidate.read_off for t in accepted)  # lines do not tell what goes with a stop: ask again beside it
         of_all = bool(accepted) and _is_of_all(search, current, accepted[0], takes, beyond)
-        sets = [] if stopped or read_off or of_all else together(search, current, trials, takes, beyond)
+        sets = [] if stopped or read_off or of_all else best_sets(search, current, trials, takes, beyond)
         if sets and penalised_cost(sets[0][0]) < SUBSETS.half * penalised_cost(after):
             after = sets[0][0]
             taken_in = [replace(taken_in[0], accepted=()), *selection_steps(search, current, sets)]
@@ -136,9 +128,6 @@ def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple
             current, rounds = reevaluated(search, current, rounds, takes)
     if search.evaluator.any_floating(takes):
         current, rounds = reevaluated(search, current, rounds, takes)
-    elif search.single_joint and search.evaluator.work <= most_work:
-        current, taken_in = set_right(search, pool, current, rounds, takes, partial(report, "explaining what is left"))
-        rounds = taken_in or rounds
     return search, current, rounds
 
 

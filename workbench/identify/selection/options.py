@@ -46,9 +46,6 @@ class SchedulingOptions:
     tiers: int = 8
     tiers_of_all: int = 6
     """On the ground the first are what moves the robot as a whole, and joints that stand out."""
-    single_joint_tier: int = 2
-    """The last tier of the one joint of a robot on a fixed base: its links move nothing else, and what they carry looks like what
-    it lacks."""
     stands_out: float = 4.0
     """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on
     it lacks something, not the robot as a whole."""
@@ -73,8 +70,13 @@ class SubsetOptions:
     sizes: tuple[int, int] = (2, 3)
     fitted: int = 6
     as_good: float = 2.0
-    """Effects in a set, and how many sets of a size are fitted: of those that leave less than AS_GOOD times what the best does,
+    """Effects in a set, and how many sets of a size are fitted: of those that leave less than `as_good` times what the best does,
     as lines predict roughly."""
+    ahead: int = 2
+    exchanges: int = 3
+    right: float = 1.2
+    """Sets that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in shares
+    of what a right model does, for which none is replaced."""
     again: tuple[tuple[float, float], ...] = tuple(product((0.75, 1.33), (-0.7, 0.7)))
     """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
     most_steps: int = 5
@@ -101,19 +103,6 @@ class ReevaluationOptions:
 
 
 @dataclass(frozen=True)
-class SingleJointOptions:
-    """A robot of one joint."""
-
-    ahead: int = 2
-    exchanges: int = 3
-    right: float = 1.2
-    """Sets of effects that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may
-    leave, in shares of what a right model does, for which none is replaced."""
-    all_the_rest: float = 0.95
-    """Share of what is beyond noise that a set closes, too, where it is right but for what engines do otherwise, as at a stop."""
-
-
-@dataclass(frozen=True)
 class RecordOptions:
     """What is said of a finished selection."""
 
@@ -126,17 +115,17 @@ class AcceptanceOptions:
     """The stopping criterion and the acceptance test."""
 
     least_walking: float = 300.0
-    """LEAST_GAIN of an effect that only floating-base takes show, whatever its numbers are: contact makes more of small
+    """`FIT.least_gain` of an effect that only floating-base takes show, whatever its numbers are: contact makes more of small
     differences."""
     all_closed: float = 0.5
-    """Share of LEAST_GAIN that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
+    """Share of `FIT.least_gain` that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
     least_share: float = 0.01
     walking_share: float = 0.02
     """Of what the effects before it brought at its place, that an effect must bring on a fixed base and on the ground, and of a
     fixed-base channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect
     does, and a second effect must not live on that."""
     alone: float = 0.25
-    """Of LEAST_SHARE, for a joint on a fixed base that nothing was given to and of which much more than of any other is left:
+    """Of `least_share`, for a joint on a fixed base that nothing was given to and of which much more than of any other is left:
     what engines play differently of an effect that all joints show, they do in all."""
     rough_share: float = 0.04
     left_share: float = 0.02
@@ -174,18 +163,17 @@ class ForwardOptions:
     most_rounds: int = 6
     """On a fixed base, and on the ground: an arm may lack several things in each joint, a round finds one in each."""
     most_work: float = 3200.0
-    most_work_single_joint: float = 6400.0
     most_rollouts: float = 60.0
-    """Seconds of rollouts, of a robot of one joint, of which sets are fitted, and rollouts of all takes if that is more, after
+    """Seconds of rollouts, and rollouts of all takes if that is more, after
     which nothing more is tried: minutes, of half a minute of recording."""
     enough: float = 0.6
-    """Share of a gap from which on less likely effects are not asked for. On a fixed base it is NEARLY_ALL, and on the ground
+    """Share of a gap from which on less likely effects are not asked for. On a fixed base it is `nearly_all`, and on the ground
     before joints are asked, as a joint's effect can look like one of the whole robot's."""
     own_gap: float = 0.9
     """The same of a joint that stands out: on a body that goes otherwise a tail swings otherwise; play closes three quarters."""
     nearly_all_walking: float = 0.97
-    """NEARLY_ALL where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it turn
-    back, which closes up to 0.93; true effects close more."""
+    """`nearly_all` where all channels of a walk judge: where one foot stands otherwise the robot turns, and much else makes it
+    turn back, which closes up to 0.93; true effects close more."""
     replayed_steps: int = 4
     """Of a fit to takes that are played otherwise."""
     last_steps: int = 3
@@ -196,7 +184,7 @@ class ForwardOptions:
     """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at
     a joint, where the best leaves more than a tenth: there some fit has not come to its end."""
     alike: float = 0.25
-    """Joints whose best gain is this share of the greatest, or NEARLY_ALL of what they lack, are taken in the same round."""
+    """Joints whose best gain is this share of the greatest, or `nearly_all` of what they lack, are taken in the same round."""
 
 
 @dataclass(frozen=True)
@@ -209,11 +197,11 @@ class OddsOptions:
     rough: float = 0.015
     """The same as a share of an effect's gain: where that is more, floating-base takes leave more open."""
     better: float = 30.0
-    """Of the same: a equivalent effect that fixed-base takes find worse by this much is none; by more where the fit leaves more
+    """Of the same: an equivalent effect that fixed-base takes find worse by this much is none; by more where the fit leaves more
     than a right model does."""
     number: float = 40.0
     number_share: float = 0.03
-    """What each number that a name has more than another must bring, of the same: TEMPER times the logarithm of how many frames
+    """What each number that a name has more than another must bring, of the same: `temper` times the logarithm of how many frames
     speak (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a
     model, differ by some hundredths of it, and a name with more numbers makes more of that."""
     most_from_floating: float = 2 * temper
@@ -228,7 +216,7 @@ class RivalOptions:
     near: float = 400.0
     near_fixed: float = 0.05
     """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one
-    that is this share of the effect's gain behind (CLOSE where a walk in coarse steps said it)."""
+    that is this share of the effect's gain behind (`close` where a walk in coarse steps said it)."""
     steps: int = 4
     """Of a fit: names that differ by little are told apart at their best alone."""
     shape_end: float = 0.5
@@ -245,7 +233,7 @@ class ComparisonOptions:
     """The least odds of a finding's equivalent effect that floating-base takes identify, where it came near enough to be put in
     its place, and of a name that fixed-base takes find better but for the price of its numbers."""
     closed: tuple[tuple[float, float], ...] = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
-    """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; LEAST below the
+    """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; `least` below the
     last. True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in
     part."""
     least: float = 0.2
@@ -256,7 +244,7 @@ class CalibrationOptions:
     """How sure an effect is, beyond its odds."""
 
     left: tuple[tuple[float, float], ...] = ((1.5, 1.0), (2.5, 0.7), (6.0, 0.4))
-    """RMS over sigma that fixed-base takes leave in some channel there at the end, and the factor for that; LEAST beyond the
+    """RMS over sigma that fixed-base takes leave in some channel there at the end, and the factor for that; `least` beyond the
     last. A large gap may be closed by 97 % and still leave ten times the noise: something else acts there."""
     rattles: float = 0.7
     """At least that factor for a link that cameras saw rock across its servo's axis: which way it lies is chance, each moment as
@@ -282,7 +270,6 @@ SCHEDULING = SchedulingOptions()
 SUBSETS = SubsetOptions()
 SWAP = SwapOptions()
 REEVALUATION = ReevaluationOptions()
-SINGLE_JOINT = SingleJointOptions()
 RECORD = RecordOptions()
 ACCEPTANCE = AcceptanceOptions()
 BACKWARD = BackwardOptions()

@@ -18,7 +18,7 @@ from workbench.identify.fitting.fits import Report, Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
-from workbench.identify.rollouts import RolloutRequest
+from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.identify.selection.acceptance import is_acceptable, too_little_left
 from workbench.identify.selection.best_subsets import fitted_beside, penalised_cost, selection_steps
 from workbench.identify.selection.candidate_fit import CandidateFit
@@ -91,7 +91,7 @@ class _Around:
         for c, points in self.probes:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
-    def screened_out(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
+    def predictions(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
         """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
         plain = next(answers)
         slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
@@ -118,7 +118,7 @@ def _predicted(search: Search, rest: Fit, ones: Sequence[CandidateFit], others: 
     answers = iter([search.evaluator.vector(answer, "fit") for answer in search.evaluator.residuals(questions)])
     best: dict[frozenset[Key], tuple[float, list[CandidateFit]]] = {}
     for a in around:
-        for cost, pair in a.screened_out(search.evaluator.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
+        for cost, pair in a.predictions(search.evaluator.vector({i: a.fit.residuals[i] for i in takes}, "fit"), answers):
             name = frozenset(t.candidate.key for t in pair)
             best[name] = min(best.get(name, (np.inf, pair)), (cost, pair), key=lambda b: b[0])
     return [pair for _, pair in sorted(best.values(), key=lambda b: b[0])[:PAIR_MOVE.pairs]]

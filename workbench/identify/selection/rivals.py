@@ -68,5 +68,5 @@ def put_in_place(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[
         return there
     fixed = search.identified_on_fixed_base(own)
     takes = search.fixed_base if fixed else search.fitted
-    beside = [j for j, (c, _) in enumerate(others) if fixed and (search.single_joint or c.joint == own.joint)]
+    beside = [j for j, (c, _) in enumerate(others) if fixed and c.joint == own.joint]
     return (yield from search.refitting(there, takes, RIVAL.steps, free=[*beside, len(others)]))

@@ -31,11 +31,9 @@ def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[
     stand = _Stand(search, well, ill, heavy_links(search.nominal))
     zeroed = all(search.evaluator.evidence[i].take.recorded.zeroed for i in takes)
     used = {c.key for c in current.effects}
-    single_joint = search.single_joint and not floating_base
     groups: dict[object, list[Candidate]] = {}
     for c in pool:
         likely = _tier(c, bool(floating_base), many, stand.heavy, outstanding, stand.carried_by(c) in well)
-        likely = min(likely, SCHEDULING.single_joint_tier) if single_joint else likely
         if c.key in used or _is_covered(c, current.effects) or likely != tier:
             continue
         if c.effect.layer == "measurement":

@@ -14,7 +14,7 @@ from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blo
 from workbench.identify.fitting.responses import Part, ResponseBank, linearised_estimate, scan, scan_sizes
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest, take_of
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest, take_of
 from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel
@@ -167,7 +167,7 @@ class CandidateEvaluation:
         return [g[0] for g in guesses], [g[1] / share for g in guesses]
 
     def _best(self, joint: str | None) -> float:
-        seen = (self.race.screened_out, self.race.remembered)
+        seen = (self.race.predicted, self.race.remembered)
         return max(max(of.values(), default=0.0) if joint is None else of.get(joint, 0.0) for of in seen)
 
     def _worth_fitting(self, gains: Sequence[float]) -> Part[list[int]]:
@@ -175,13 +175,13 @@ class CandidateEvaluation:
         race = self.race
         alike = race.wide.setdefault(self.coarse, [])
         alike.extend(g for j, g in zip(self.joints, gains) if j is None)
-        note_best(race.screened_out, self.joints, gains)
+        note_best(race.predicted, self.joints, gains)
         yield []  # until all have said what they predict
         last = sorted(alike, reverse=True)[:SCREENING.most_fitted][-1] if alike else 0.0
         worth = SCREENING.worth_walking if self.walking else SCREENING.worth
-        least = race.least * (1.0 if best_at(race.screened_out, None) > race.least else SCREENING.doubted)
+        least = race.least * (1.0 if best_at(race.predicted, None) > race.least else SCREENING.doubted)
         return [b for b, (j, g) in enumerate(zip(self.joints, gains))
-                if g > least and g >= worth * best_at(race.screened_out, j) and (j is not None or g >= last)]
+                if g > least and g >= worth * best_at(race.predicted, j) and (j is not None or g >= last)]
 
     def _fitted(self, starts: list[Array], alive: list[int], iterations: int) -> Part[list[Array]]:
         """Sizes after one step, and after all steps where the group is not behind by then."""

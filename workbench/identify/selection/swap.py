@@ -1,4 +1,4 @@
-"""Effects that were found together in one joint, one of them replaced: what lines around their fit say of all others.
+"""Sets of effects of one joint that are fitted together, and one of them replaced: what lines around their fit say of all others.
 
 Lines drawn from a robot that lacks nothing predict poorly what an effect does beside two more. Around a fit they are short, and
 the others give way: sequential replacement (A. J. Miller, Subset Selection in Regression, 2002).
@@ -20,14 +20,62 @@ from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.fitting.responses import scan
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, with_effects
-from workbench.identify.rollouts import RolloutRequest
-from workbench.identify.selection.best_subsets import Response, possible, variants
+from workbench.identify.rollouts.evaluator import RolloutRequest
+from workbench.identify.selection.best_subsets import (
+    Response,
+    begun_again,
+    fitted_beside,
+    penalised_cost,
+    possible,
+    several,
+    variants,
+    worst_joint,
+)
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS, SWAP
 
 Array = NDArray[np.float64]
 NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only predict."""
+
+
+def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], takes: tuple[int, ...], beyond: dict[str, float]
+              ) -> list[tuple[Fit, list[CandidateFit]]]:
+    """Sets of effects for the joint that errs most, fitted beside `current`, the best first, and sets with one effect of the best
+    replaced, until none of these is better."""
+    joint = worst_joint(beyond)
+    sets = _fitted(search, current, several(search, current, trials, takes, beyond), takes)
+    if joint is None or not sets:
+        return []
+    for _ in range(SUBSETS.exchanges):
+        fit, chosen = sets[0]
+        if _is_right(search, fit, takes, joint):
+            break
+        if (again := begun_again(search, fit, takes, SUBSETS.together_steps)) is not fit:
+            sets[0] = again, chosen
+            continue
+        known = {frozenset(t.candidate.key for t in others) for _, others in sets}
+        new = [s for s in exchanges(search, fit, trials, takes, joint, [t.candidate for t in chosen])
+               if frozenset(t.candidate.key for t in s) not in known]
+        sets = sorted([*sets, *_fitted(search, current, new, takes)], key=lambda f: penalised_cost(f[0]))
+        if sets[0][0] is fit:
+            break
+    return sets
+
+
+def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
+    """Whether a fit leaves in a joint about what a right model does."""
+    left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
+    return bool(left.sum() < SUBSETS.right * expected.sum())
+
+
+def _fitted(search: Search, current: Fit, sets: Sequence[list[CandidateFit]], takes: tuple[int, ...],
+            ahead: int = SUBSETS.ahead) -> list[tuple[Fit, list[CandidateFit]]]:
+    """Sets of effects fitted beside `current`, the best first: all some way, those ahead by then to the end, from new slopes."""
+    begun = search.side_by_side([fitted_beside(search, current, chosen, takes, SUBSETS.most_steps) for chosen in sets])
+    ranked = sorted(zip(begun, sets), key=lambda f: penalised_cost(f[0]))
+    ended = search.side_by_side([search.refitting(fit, takes, SUBSETS.together_steps) for fit, _ in ranked[:ahead]])
+    return sorted([*zip(ended, (chosen for _, chosen in ranked)), *ranked[ahead:]], key=lambda f: penalised_cost(f[0]))
 
 
 def exchanges(
@@ -37,10 +85,9 @@ def exchanges(
     takes: tuple[int, ...],
     joint: str,
     alone: Sequence[Candidate],
-    beside: bool = False,
 ) -> list[list[CandidateFit]]:
     """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
-    whoever was asked about the joint, on these takes, whose base is fixed. beside: those, too, in which it stands for none."""
+    whoever was asked about the joint, on these takes, whose base is fixed."""
     there = fit.sizes_by_key()
     mine = [c for c in alone if c.key in there]
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
@@ -59,7 +106,7 @@ def exchanges(
     rests = [next(seen) for _ in mine]
     responses = [[next(seen) - left for _ in points] for points in probes]
     out: list[list[CandidateFit]] = []
-    for k, rest in enumerate([*rests, left] if beside else rests):
+    for k, rest in enumerate(rests):
         staying = [n for n in range(len(mine)) if n != k]
         x = [there[mine[n].key] for n in staying]
         sets = [s for t, points, did in zip(others, probes, responses)

@@ -64,4 +64,4 @@ def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled
     change = np.concatenate([[True], np.any(state[1:] != state[:-1], axis=1)])
     rows = np.flatnonzero(change)
     return Commands(times=time[rows] - time[0], joints=joints, goals=held[rows], speeds=speeds[rows],
-                    enabled=enabled[rows], end=float(time[-1] - time[0]), poses=np.full(len(rows), -1))
+                    enabled=enabled[rows], end=float(time[-1] - time[0]), poses=np.full(len(rows), -1), begun=True)

@@ -8,7 +8,6 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import compute as arrow_compute
@@ -145,6 +144,8 @@ def number_columns(path: str | Path, text: str, first_line: int, skip_blank: boo
     for i, line in enumerate(text.splitlines()):
         if line.count(",") != width and not (skip_blank and not line):
             raise InputError(path, f"line {i + first_line}: expected {width + 1} cells, got {line.count(',') + 1}")
+    import pandas as pd
+
     try:
         table = pd.read_csv(io.StringIO(text), dtype=float, keep_default_na=False, na_values=[""], index_col=False)
     except ValueError as e:  # pandas' parser errors among them

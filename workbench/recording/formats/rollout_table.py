@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from workbench.files import InputError
@@ -54,6 +53,8 @@ def save_rollout(take: Take, path: str | Path) -> Path:
         "commands": None if take.commands is None else _commands_out(take.commands)}
     out = io.StringIO()
     out.write(f"{HEADER}, format 1\n# {json.dumps(about)}\n{_UNITS}\n")
+    import pandas as pd
+
     pd.DataFrame({k: np.round(v, _DECIMALS) + 0.0 for k, v in columns.items()}).to_csv(out, index=False)
     return write_whole(path, out.getvalue())
 

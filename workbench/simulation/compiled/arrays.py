@@ -59,7 +59,8 @@ class Servos(NamedTuple):
     sag (a,): volts lost for each servo at full duty, by term; supply (m,) [V]. fade [1/s]. sticking (b, m), speed (b,):
     friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it
     at rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates.
-    lopsided (d, m): shares by which friction is more forwards, by term."""
+    lopsided (d, m): shares by which friction is more forwards, by term. derivative [duty per rad/s], ramp [rad/s], lag [s] (m,):
+    of the law."""
 
     joint: Ints
     zero: Array
@@ -70,6 +71,9 @@ class Servos(NamedTuple):
     back_emf: Array
     viscous: Array
     coulomb: Array
+    derivative: Array
+    ramp: Array
+    lag: Array
     terms: bool
     varies: bool
     most: Array
@@ -119,7 +123,8 @@ class Shapes(NamedTuple):
 class Schedule(NamedTuple):
     """What happens when. steps of length dt; log_every: steps between two rows of the log. begin [s]: the first command,
     on which terms count. command_step (K,): the step before which a command comes, late (K,) [s] how long before; goal (K, m),
-    speed (K, m), on (K, m). put_step (P,): the step before which the base is put; quat (P, 4), v, w (P, 3) as in BaseStates."""
+    speed (K, m), on (K, m). put_step (P,): the step before which the robot is put somewhere: a free base to quat (P, 4), v, w
+    (P, 3) as in BaseStates; the servos of a held one to q, qdot (P, m) as in JointStates."""
 
     dt: float
     steps: int
@@ -134,18 +139,22 @@ class Schedule(NamedTuple):
     put_quat: Array
     put_v: Array
     put_w: Array
+    put_q: Array
+    put_qdot: Array
 
 
 class State(NamedTuple):
     """Changed by a run. base (7,): quaternion wxyz and position of the base in W; q (n,), v (nv,); reference (m,): the ramp;
-    goal, reach (m,): of the command, and how far the ramp goes in a step; on (m,). memory (4, m): velocity, what is known of the
-    load, load and friction of the step before; stepped (1,): 1 where there was one."""
+    goal, reach (m,): of the command, and how far the ramp goes in a step; lagging (m,): the goal behind its filter; on (m,).
+    memory (4, m): velocity, what is known of the load, load and friction of the step before; stepped (1,): 1 where there was
+    one."""
 
     base: Array
     q: Array
     v: Array
     reference: Array
     goal: Array
+    lagging: Array
     reach: Array
     on: NDArray[np.bool_]
     memory: Array

@@ -43,7 +43,7 @@ def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
     stages = [tables.joints.index(s) for names in physics.stages.values() for s in names]
     damping[stages] *= max(1.0, dt / (2 * SPRING_TIME))  # as the station steadies springs
     armature[joint], damping[joint] = physics.law.inertia, physics.law.damping
-    most = most_friction(physics.terms, physics.law)
+    most = most_friction(physics.servo_terms, physics.law)
     brake, gain = np.zeros(len(tables.joints)), np.zeros(len(tables.joints))
     brake[joint] = most
     gain[joint] = np.where(most == physics.law.coulomb, HOLDING_DAMPING, np.maximum(HOLDING_DAMPING, most / MOST_CREEP))
@@ -54,7 +54,7 @@ def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
 def _servos(physics: Physics, joint: Ints) -> Servos:
     law, n = physics.law, len(joint)
     numbers: list[TermNumbers] = []
-    for term in physics.terms:
+    for term in physics.servo_terms:
         said = term.numbers()
         if said is None:
             raise NotCoveredError(f"what servos do by {type(term).__module__.rsplit('.', 1)[-1]}")
@@ -68,11 +68,12 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
     still = [t for t in numbers if t.rubbing_still is not None]
     lopsided = [t.lopsided for t in numbers if t.lopsided is not None]
     sticking = [t for t in numbers if t.sticking is not None]
-    most = most_friction(physics.terms, law)
+    most = most_friction(physics.servo_terms, law)
     return Servos(
         joint=joint, zero=_array(physics.zero), gain=_array(law.gain), margin=_array(law.margin), punch=_array(law.punch),
         full_torque=_array(law.full_torque), back_emf=_array(law.back_emf), viscous=_array(law.viscous),
-        coulomb=_array(law.coulomb), terms=bool(numbers), varies=bool((most > law.coulomb).any()), most=_array(most),
+        coulomb=_array(law.coulomb), derivative=_array(law.derivative), ramp=_array(law.ramp), lag=_array(law.lag),
+        terms=bool(numbers), varies=bool((most > law.coulomb).any()), most=_array(most),
         ceiling=ceiling, sag=np.array([t.sag for t in numbers if t.sag]), supply=_array(law.full_torque / law.torque_per_volt),
         fade=float(sum(t.fade for t in numbers)), sticking=_array([t.sticking for t in sticking]).reshape(len(sticking), n),
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,

@@ -1,10 +1,10 @@
-"""A free base stood on the floor, and put back to where it was recorded; see `workbench.simulation.steady`."""
+"""A free base stood on the floor, and a robot put back to where it was recorded; see `workbench.simulation.steady`."""
 
 from __future__ import annotations
 
 import math
 
-from workbench.simulation.compiled.arrays import Schedule, Shapes, State, Tree, Work
+from workbench.simulation.compiled.arrays import Schedule, Servos, Shapes, State, Tree, Work
 from workbench.simulation.compiled.contact import lowest
 from workbench.simulation.compiled.kernel import part
 from workbench.simulation.compiled.tree import place_bodies
@@ -74,3 +74,16 @@ def _turn_back(w: Work, heading: float, x: float, y: float) -> None:
     w.turned[1] += c * shift_x - s * shift_y
     w.turned[2] += s * shift_x + c * shift_y
     w.turned[0] -= heading
+
+
+@part
+def put_servos(servos: Servos, schedule: Schedule, k: int, state: State) -> None:
+    """The servos of a held robot to recorded state number k; ramps and what hangs between servos and links go on as they are."""
+    for i in range(servos.joint.shape[0]):
+        j = servos.joint[i]
+        if not math.isnan(schedule.put_q[k, i]):
+            state.q[j] = schedule.put_q[k, i] + servos.zero[i]
+            state.v[j] = schedule.put_qdot[k, i]
+            for m in range(4):
+                state.memory[m, i] = 0.0
+    state.stepped[0] = 0.0

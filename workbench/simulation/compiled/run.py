@@ -8,7 +8,7 @@ from workbench.simulation.compiled.arrays import Log, Schedule, Servos, Shapes, 
 from workbench.simulation.compiled.contact import floor_contacts
 from workbench.simulation.compiled.kernel import kernel, part
 from workbench.simulation.compiled.links import UNKNOWN, link_contacts
-from workbench.simulation.compiled.put import drop, put
+from workbench.simulation.compiled.put import drop, put, put_servos
 from workbench.simulation.compiled.servo import advance_servos, braking, command, push_joints
 from workbench.simulation.compiled.solve import prepare, solve
 from workbench.simulation.compiled.tree import gather, move_bodies, place_bodies, weigh_bodies
@@ -127,7 +127,10 @@ def run(tree: Tree, servos: Servos, shapes: Shapes, schedule: Schedule, state: S
                 return -count
             _write_forces(tree, servos, shapes, schedule.dt, count, state, row, log, w)
         while puts < schedule.put_step.shape[0] and schedule.put_step[puts] == k:
-            put(tree, shapes, schedule, puts, rest, state, w)
+            if tree.free:
+                put(tree, shapes, schedule, puts, rest, state, w)
+            else:
+                put_servos(servos, schedule, puts, state)
             puts += 1
         while commands < schedule.command_step.shape[0] and schedule.command_step[commands] == k:
             command(schedule, commands, servos, state)

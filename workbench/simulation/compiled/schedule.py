@@ -9,7 +9,7 @@ import numpy as np
 from workbench.motion.commands import Commands
 from workbench.simulation.compiled.arrays import Schedule
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.steady import BaseStates
+from workbench.simulation.steady import BaseStates, JointStates
 
 ROUNDING = 1e-9
 """Seconds by which an instant may miss one of the log's and be that."""
@@ -25,14 +25,15 @@ def _whole(every: float, seconds: float) -> float:
 
 
 def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float, duration: float, elapsed: float,
-                steadied: BaseStates | None) -> Schedule:
+                steadied: BaseStates | None, restarts: JointStates | None = None) -> Schedule:
     """lead: in whole steps of the log. commands: as the servos get them, columns in the model's order.
 
     What comes at or after the end does not come; of two things at one instant the later stays, as in `Simulation`."""
     dt, every = config.time_step, config.logged_every
     end = _on_grid(every, lead + duration)
     at, which = _sent(every, np.zeros(0) if commands is None else lead + commands.times, end)
-    puts = {} if steadied is None else {_whole(every, lead + t): k for k, t in enumerate(steadied.times.tolist())}
+    states = steadied if restarts is None else restarts
+    puts = {} if states is None else {_whole(every, lead + t): k for k, t in enumerate(states.times.tolist())}
     puts = {t: k for t, k in sorted(puts.items()) if t < end}
     steps = np.ceil(at / dt - 1e-6).astype(np.int64)
     late = dt * steps - at
@@ -46,7 +47,8 @@ def schedule_of(config: SimulationConfig, commands: Commands | None, lead: float
         speed=empty if commands is None else np.ascontiguousarray(commands.speeds[which], dtype=float),
         on=empty.astype(bool) if commands is None else np.ascontiguousarray(commands.enabled[which], dtype=bool),
         put_step=np.array([round(t / dt) for t in puts], dtype=np.int64),
-        put_quat=_rows(steadied, "quat", put, 4), put_v=_rows(steadied, "v", put, 3), put_w=_rows(steadied, "w", put, 3))
+        put_quat=_rows(steadied, "quat", put, 4), put_v=_rows(steadied, "v", put, 3), put_w=_rows(steadied, "w", put, 3),
+        put_q=_rows(restarts, "q", put, n), put_qdot=_rows(restarts, "v", put, n))
 
 
 def _sent(every: float, times: np.ndarray, end: float) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +78,7 @@ def _on_grid(every: float, t: float) -> float:
     return nearest if abs(nearest - t) < ROUNDING else t
 
 
-def _rows(states: BaseStates | None, name: str, which: list[int], width: int) -> np.ndarray:
+def _rows(states: BaseStates | JointStates | None, name: str, which: list[int], width: int) -> np.ndarray:
     if states is None:
         return np.zeros((0, width))
     return np.ascontiguousarray(getattr(states, name)[which], dtype=float).reshape(-1, width)

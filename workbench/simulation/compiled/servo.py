@@ -21,21 +21,37 @@ def command(schedule: Schedule, k: int, servos: Servos, state: State) -> None:
     """Command number k comes; one that comes between two steps ramps from then on."""
     share = schedule.late[k] / schedule.dt
     if share > 0.0:
-        _shift_ramp(state, share, -1.0)
+        _shift_ramp(servos, state, schedule.late[k], share, -1.0)
     for i in range(state.goal.shape[0]):
         state.goal[i] = schedule.goal[k, i] + servos.zero[i]
-        state.reach[i] = schedule.speed[k, i] * schedule.dt if schedule.speed[k, i] > 0.0 else INFINITY
+        reach = schedule.speed[k, i] * schedule.dt if schedule.speed[k, i] > 0.0 else INFINITY
+        state.reach[i] = min(reach, servos.ramp[i] * schedule.dt)
         state.on[i] = schedule.on[k, i]
     if share > 0.0:
-        _shift_ramp(state, share, 1.0)
+        _shift_ramp(servos, state, schedule.late[k], share, 1.0)
 
 
 @part
-def _shift_ramp(state: State, share: float, sign: float) -> None:
+def _shift_ramp(servos: Servos, state: State, late: float, share: float, sign: float) -> None:
     for i in range(state.goal.shape[0]):
+        goal = _lagging(servos, i, state, late) if sign > 0.0 else state.lagging[i]
+        goal = goal if servos.lag[i] > 0.0 else state.goal[i]
         if state.on[i]:
             reach = state.reach[i] * share
-            state.reference[i] += sign * clamp(state.goal[i] - state.reference[i], -reach, reach)
+            state.reference[i] += sign * clamp(goal - state.reference[i], -reach, reach)
+        if sign > 0.0:
+            state.lagging[i] = goal
+        elif servos.lag[i] > 0.0:
+            passed = -math.expm1(-late / servos.lag[i])
+            state.lagging[i] = (state.lagging[i] - passed * state.goal[i]) / (1.0 - passed)
+
+
+@part
+def _lagging(servos: Servos, i: int, state: State, seconds: float) -> float:
+    """The goal behind its filter after so long."""
+    if servos.lag[i] > 0.0:
+        return state.lagging[i] - math.expm1(-seconds / servos.lag[i]) * (state.goal[i] - state.lagging[i])
+    return state.goal[i]
 
 
 @part
@@ -62,6 +78,8 @@ def _push(servos: Servos, free: int, state: State, w: Work) -> None:
         if size > servos.margin[i]:
             offset = servos.punch[i] * servos.full_torque[i] - slope * servos.margin[i]
             torque = math.copysign(min(offset + slope * size, servos.full_torque[i]), error)
+        if servos.derivative[i] != 0.0:
+            torque = _duty(servos, i, error, v) * servos.full_torque[i]
         if state.on[i]:
             w.push[i], w.motor[i] = torque, torque - servos.back_emf[i] * v
         else:  # no back-EMF either: undo the joint's share of damping
@@ -70,18 +88,18 @@ def _push(servos: Servos, free: int, state: State, w: Work) -> None:
 
 
 @part
-def _duty(servos: Servos, i: int, error: float) -> float:
+def _duty(servos: Servos, i: int, error: float, v: float) -> float:
     beyond = abs(error) - servos.margin[i]
-    if beyond > 0.0:
-        return math.copysign(min(servos.punch[i] + servos.gain[i] * beyond, 1.0), error)
-    return 0.0
+    duty = math.copysign(servos.punch[i] + servos.gain[i] * beyond, error) if beyond > 0.0 else 0.0
+    return clamp(duty - servos.derivative[i] * v, -1.0, 1.0)
 
 
 @part
 def _push_with_terms(servos: Servos, elapsed: float, free: int, state: State, w: Work) -> None:
     drawn = 0.0
     for i in range(servos.joint.shape[0]):
-        duty = _duty(servos, i, state.reference[i] - state.q[servos.joint[i]]) if state.on[i] else 0.0
+        j = servos.joint[i]
+        duty = _duty(servos, i, state.reference[i] - state.q[j], state.v[free + j]) if state.on[i] else 0.0
         w.motor[i] = duty
         drawn += abs(duty)
     fade = math.exp(-servos.fade * elapsed) if servos.fade > 0.0 else 1.0
@@ -141,8 +159,10 @@ def advance_servos(tree: Tree, servos: Servos, dt: float, state: State, w: Work)
     for i in range(servos.joint.shape[0]):
         j = servos.joint[i]
         v = state.v[free + j]
+        goal = _lagging(servos, i, state, dt)
+        state.lagging[i] = goal
         if state.on[i]:
-            state.reference[i] += clamp(state.goal[i] - state.reference[i], -state.reach[i], state.reach[i])
+            state.reference[i] += clamp(goal - state.reference[i], -state.reach[i], state.reach[i])
         else:  # the ramp starts at the measured position once torque is back
             state.reference[i] = state.q[j]
         if servos.varies:

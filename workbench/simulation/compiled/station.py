@@ -166,7 +166,7 @@ class CompiledJob:
     def _rest(self) -> State:
         n, m, nv = len(self.tables.joints), len(self.model.joints), len(self.tables.tree.path)
         return State(base=np.array([1.0, 0, 0, 0, 0, 0, 0]), q=np.zeros(n), v=np.zeros(nv), reference=np.zeros(m),
-                     goal=self.physics.zero.copy(), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
+                     goal=self.physics.zero.copy(), lagging=np.zeros(m), reach=np.full(m, np.inf), on=np.ones(m, dtype=bool),
                      memory=np.zeros((4, m)), stepped=np.zeros(1))
 
     def _put(self, start: Start, state: State) -> None:
@@ -185,6 +185,7 @@ class CompiledJob:
         state.reference[:] = servos if commands is None else first_reference(commands, servos, self.physics.zero)
         if start.reference is not None:
             state.reference[:] = state.goal[:] = start.reference
+        state.lagging[:] = state.reference
         state.memory[:], state.stepped[:] = 0.0, 0.0
 
     def _structure(self) -> Structure | None:

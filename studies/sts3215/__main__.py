@@ -1,0 +1,119 @@
+"""Known changes of the weighed STS3215 rig, diagnosed from one session alone and with the law of another session.
+
+    python -m studies.sts3215 --data ../shared/data/sts3215 --out OUT [--quick] [--only NAME ...]
+
+For each session: effects with confidence, size beside the truth, and time. With the law of another session, the first repetition
+of the rig as weighed is diagnosed first, and its model.yaml is what the others are held against (`diagnose --model`). Frequencies
+and sizes are those of one servo; nothing in the diagnosis was set on them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from studies.common import ROOT, run_study
+from studies.sts3215.sessions import CASES, Case, write_session
+from workbench.compare.session import load_session
+from workbench.compare.session_takes import Progress
+from workbench.files import InputError
+from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.results.findings import Diagnosis, Finding
+from workbench.robot import RobotModel, load_model
+
+SAID = 0.5
+"""Confidence from which on a name counts."""
+QUICK: dict[str, Any] = {"gains": (16,), "programmes": ("sin_sin",)}
+QUICK_CASES = ("quiet", "mass")
+"""What of a session, and which sessions, the quick form looks at: whether it runs, not how good it is."""
+DATA = ROOT / "../shared/data/sts3215"
+ALONE, SINCE = "alone", "since another session"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of one session. rightly: the change was named, or, where there is none, nothing; false: names that are no truth; sized: the
+    size is within what the case allows, None where none was told; seconds: of wall time."""
+
+    case: str
+    since: str
+    findings: tuple[Finding, ...]
+    rightly: bool
+    false: tuple[str, ...]
+    sized: bool | None
+    seconds: float
+
+    def to_json(self) -> dict[str, object]:
+        """As it is kept."""
+        return {"case": self.case, "since": self.since, "rightly": self.rightly, "false": list(self.false), "sized": self.sized,
+                "seconds": round(self.seconds, 1), "findings": [f.to_json() for f in self.findings]}
+
+
+def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outcome:
+    """What a diagnosis said beside what is true."""
+    said = [f for f in diagnosis.findings if f.confidence >= SAID]
+    named = [f for f in said if f.effect in case.effects]
+    false = tuple(f.effect for f in said if f.effect not in case.effects)
+    size = None
+    if named and named[0].effect == case.effects[0]:
+        value = next(iter(named[0].parameters.values())).value
+        size = None if isinstance(value, tuple) else abs(value - case.size) <= case.within * abs(case.size)
+    return Outcome(case.name, since, diagnosis.findings, bool(named) if case.effects else not said, false, size, seconds)
+
+
+def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None, since: str, jobs: int,
+              progress: Progress) -> Outcome:
+    """A session written, diagnosed and saved."""
+    session = load_session(write_session(folder, data, case))
+    began = time.monotonic()
+    result = diagnose_session(session, progress, jobs, previous=previous)
+    result.diagnosis.save(folder / "diagnosis")
+    outcome = judged(case, result.diagnosis, since, time.monotonic() - began)
+    print(f"{case.name} ({since}): {'right' if outcome.rightly else 'WRONG'}, {outcome.seconds:.0f} s", flush=True)
+    for f in result.diagnosis.findings:
+        sizes = ", ".join(f"{k} {_told(e.value)} ({_told(e.low)} to {_told(e.high)})" for k, e in f.parameters.items())
+        print(f"    {f.confidence:.2f} {f.effect}: {sizes}", flush=True)
+    return outcome
+
+
+def _told(value: float | tuple[float, ...]) -> str:
+    return "[" + " ".join(f"{v:.3g}" for v in value) + "]" if isinstance(value, tuple) else f"{value:.3g}"
+
+
+def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) -> str:
+    """All sessions alone, then all with the law of the first."""
+    if unknown := set(args.only) - {c.name for c in CASES}:
+        raise InputError(None, f"--only: no session is named {min(unknown)!r}; expected of {', '.join(c.name for c in CASES)}")
+    cases = [replace(c, **QUICK) for c in CASES if c.name in QUICK_CASES] if quick else list(CASES)
+    law, outcomes = args.law, []
+    if law is None:
+        outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress))
+        law = out / "law" / "diagnosis" / "model.yaml"
+    known = load_model(law)
+    for case in (c for c in cases[1:] if not args.only or c.name in args.only):
+        for previous, since in ((known, SINCE), (None, ALONE)):
+            folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
+            outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress))
+    (out / "outcomes.json").write_text(json.dumps([o.to_json() for o in outcomes], indent=1))
+    right, false = sum(o.rightly for o in outcomes), sum(len(o.false) for o in outcomes)
+    return f"{right} of {len(outcomes)} sessions rightly; {false} false names of {SAID} or more"
+
+
+def main() -> int:
+    """Takes this study's own options, and leaves the others to `run_study`."""
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the logs")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="of these sessions alone, beside the law's")
+    parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
+    args, others = parser.parse_known_args()
+    return run_study("sts3215", __doc__, partial(study, args), others)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,135 @@
+"""Sessions of real logs with a change that is known: what the session is told differs from what was recorded.
+
+A pendulum that one Feetech STS3215 swings (kscalelabs/sysid, commit ca1ecb1), on three rigs that its authors weighed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from workbench.files import InputError
+from workbench.files.reading import write_whole
+
+Array = NDArray[np.float64]
+Entry = dict[str, Any]
+JOINT, ARM = "servo", "arm"
+DUTY_PER_UNIT = 0.16489
+"""Duty per radian of position error for each unit of the firmware's position gain, as the logs' authors state it."""
+GAINS, PROGRAMMES = (8, 16, 32), ("lift_and_drop", "sin_sin")
+SERVO = {"model": "STS3215", "stall_torque": 2.94, "no_load_speed": 4.71, "rated_voltage": 12.0, "supply_voltage": 12.0,
+         "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278,
+         "minimum_duty": {"value": 0.015, "sd": 0.0075}, "dead_zone": {"value": 0.0879, "sd": 0.044},
+         "goal_delay": {"value": 0.02, "sd": 0.01}, "goal_ramp": {"value": 299.0, "sd": 15.0},
+         "load_friction": {"value": 0.3, "sd": 0.18}, "torque_tolerance": 0.5, "back_emf_tolerance": 0.5}
+"""Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1);
+the law, and how well it is known, as in data/servos/sts3215.yaml, with the default goal speed, 3400 counts/s."""
+SDF = """<?xml version="1.0"?>
+<sdf version="1.9"><model name="sts3215_rig">
+<link name="stand"/>
+<link name="{arm}"><inertial><pose>0 0 {z} 0 0 0</pose><mass>{mass}</mass>
+<inertia><ixx>{about_centre}</ixx><iyy>{about_centre}</iyy><izz>1e-5</izz></inertia></inertial></link>
+<joint name="fixed" type="fixed"><parent>world</parent><child>stand</child></joint>
+<joint name="{joint}" type="revolute"><parent>stand</parent><child>{arm}</child><axis><xyz>0 1 0</xyz>
+<limit><lower>-6.3</lower><upper>6.3</upper></limit></axis></joint>
+</model></sdf>
+"""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """As weighed. mass [kg] at arm [m]; inertia about the axis [kg m^2]; moment: of gravity, arm level [N m]."""
+
+    name: str
+    mass: float
+    arm: float
+    inertia: float
+    moment: float
+
+    @property
+    def sdf(self) -> str:
+        """Its description: a point mass on an arm whose own mass makes up the moment."""
+        along = self.moment / 9.81 - self.mass * self.arm
+        mass = self.mass + along / (self.arm / 2)
+        z = self.moment / 9.81 / mass
+        return SDF.format(arm=ARM, joint=JOINT, mass=mass, z=-z, about_centre=self.inertia - mass * z * z)
+
+
+RIGS = {r.name: r for r in (Rig("arm150_0.741kg", 0.741, 0.150, 0.018793, 1.12685),
+                            Rig("arm150_0.969kg", 0.969, 0.150, 0.024550, 1.46192),
+                            Rig("arm100_0.741kg", 0.741, 0.100, 0.009273, 0.74437))}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One session. recorded: rig and repetition of the logs; told: the rig that the session describes. gain: by which the told
+    gain is larger than the servo's; edit: what is done to a log's rows. effects: names that say rightly what changed; size: of
+    the first parameter of the first of them, in the unit of docs/formats.md; within: share of it within which an answer is
+    right."""
+
+    name: str
+    recorded: str
+    repetition: int = 1
+    told: str = "arm150_0.741kg"
+    gain: float = 1.0
+    edit: Callable[[list[Entry]], list[Entry]] | None = None
+    effects: tuple[str, ...] = ()
+    size: float = 0.0
+    within: float = 0.05
+    gains: Sequence[int] = GAINS
+    programmes: Sequence[str] = PROGRAMMES
+
+
+def goals_at(shift: float, rate: float = 1.0) -> Callable[[list[Entry]], list[Entry]]:
+    """Goals as if they had been sent `shift` [s] earlier, by a clock that runs `rate` times as fast."""
+    def edited(rows: list[Entry]) -> list[Entry]:
+        time = np.array([r["timestamp"] for r in rows])
+        goal = np.array([r["goal_position"] for r in rows])
+        moved = np.interp(time[0] + (time - time[0]) * rate + shift, time, goal)
+        return [r | {"goal_position": float(g)} for r, g in zip(rows, moved)]
+    return edited
+
+
+def encoder(degrees: float) -> Callable[[list[Entry]], list[Entry]]:
+    """Angles that read so much more than they are."""
+    return lambda rows: [r | {"position": r["position"] + float(np.deg2rad(degrees))} for r in rows]
+
+
+CASES = (
+    Case("quiet", "arm150_0.741kg"),
+    Case("quiet, repeated", "arm150_0.741kg", 2),
+    Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), size=0.228, within=0.2),
+    Case("arm", "arm100_0.741kg", effects=("link_length", "com_shift", "payload"), size=-50.0, within=0.2),
+    Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
+    Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
+    Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_skew",), size=1.01, within=0.002),
+    Case("zero", "arm150_0.741kg", 2, edit=encoder(3.0), effects=("zero_offset",), size=3.0),
+)
+
+
+def write_session(folder: Path, data: Path, case: Case) -> Path:
+    """Writes robot.sdf, servo.yaml, session.yaml and the logs that had to be edited; returns session.yaml."""
+    folder, takes = folder.resolve(), []
+    for gain in case.gains:
+        for programme in case.programmes:
+            name = f"{case.recorded}_kp{gain}_{programme}_{case.repetition}"
+            path = data.resolve() / f"{name}.json"
+            if not path.exists():
+                raise InputError(path, "expected a log of the STS3215 rigs")
+            if case.edit is not None:
+                content = json.loads(path.read_text())
+                path = write_whole(folder / path.name, json.dumps(content | {"entries": case.edit(content["entries"])}))
+            takes.append({"name": f"{programme}_{gain}", "recording": str(path), "base": "fixed",
+                          "servos": {"proportional_gain": case.gain * gain * DUTY_PER_UNIT}})
+    write_whole(folder / "robot.sdf", RIGS[case.told].sdf)
+    servo = SERVO | {"proportional_gain": case.gain * case.gains[-1] * DUTY_PER_UNIT}
+    write_whole(folder / "servo.yaml", yaml.safe_dump(servo, sort_keys=False))
+    return write_whole(folder / "session.yaml", yaml.safe_dump({
+        "format": 1, "robot": {"model": "robot.sdf", "base": "stand", "servos": "servo.yaml"}, "takes": takes}, sort_keys=False))

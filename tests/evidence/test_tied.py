@@ -1,0 +1,66 @@
+"""Gravity against torque: a joint gets one name of a tie, believed by no more than the prior odds of both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.evidence.linear import JOINT, candidate, region
+from workbench.identify.evidence.fit import judged
+from workbench.identify.evidence.hypothesis import Prior, Uncertain, log_odds, start
+from workbench.identify.evidence.linearise import extensions
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.evidence.tied import as_torque
+
+OPTIONS = EvidenceOptions()
+N = 1600
+
+
+def fitted(sd, size, alike=1.0):
+    """A tilt that does what torque does, but for what is at right angles to it; a unit of it as much as 0.1 of the logarithm."""
+    tilt = candidate("ground_tilt")
+    here = replace(region([tilt]), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
+    rng = np.random.default_rng(1)
+    torque, other = rng.normal(size=(2, N)) * 0.02
+    other -= torque * (other @ torque) / (torque @ torque)
+    other *= np.linalg.norm(torque) / np.linalg.norm(other)
+    does = 0.1 * (np.sqrt(alike) * torque + np.sqrt(1 - alike) * other)
+    h = start(here.numbers).with_effect(tilt, np.r_[size, np.zeros(tilt.size - 1)])
+    J = np.column_stack([sd * torque, does, *np.zeros((tilt.size - 1, N))])
+    return here, judged(here, OPTIONS, h, 1e-3 * rng.normal(size=N), J), tilt
+
+
+def test_what_the_motors_tolerance_covers_is_no_load():
+    here, f, c = fitted(sd=0.5, size=3.0)
+    tie = as_torque(here, OPTIONS, f, c)
+    assert tie.by == pytest.approx(0.3)
+    assert tie.alike == pytest.approx(1.0)
+    assert tie.share < 0.1
+    assert "35 % more" in tie.sentence
+    assert "known weight" in tie.sentence
+
+
+def test_what_it_does_not_cover_is_one():
+    here, f, c = fitted(sd=0.03, size=3.0)
+    assert as_torque(here, OPTIONS, f, c).share > 0.99
+
+
+def test_the_share_is_that_of_the_prior_odds():
+    here, f, c = fitted(sd=0.1, size=2.0)
+    prior, own = Prior.of(f.hypothesis, OPTIONS), f.hypothesis.slices()[0]
+    density = prior.at_center[own].sum() + prior.log(f.hypothesis.theta) - prior.log(prior.center)
+    H = (f.J[:, own].T * here.likelihood.precision(f.r, f.discrepancy)) @ f.J[:, own] + np.diag(
+        prior.precision(f.hypothesis.theta)[own])
+    effect = density + log_odds(1, OPTIONS.expected) + 0.5 * len(H) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(H)[1]
+    assert as_torque(here, OPTIONS, f, c).share == pytest.approx(1 / (1 + np.exp(-0.5 * 2.0**2 - effect)))
+
+
+def test_what_does_something_else_is_tied_to_nothing():
+    here, f, c = fitted(sd=0.5, size=3.0, alike=0.3)
+    assert as_torque(here, OPTIONS, f, c) is None
+
+
+def test_a_joint_gets_one_of_a_tie():
+    here = region([candidate(name) for name in ("ground_tilt", "supply_voltage", "torque_ceiling", "supply_sag", "backlash")])
+    h = start(here.numbers).with_effect(candidate("ground_tilt"), np.ones(2))
+    assert {c.name for c in extensions(here, h)} == {"torque_ceiling", "supply_sag", "backlash"}

@@ -1,0 +1,30 @@
+"""A servo that smooths the goal it is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.effects.base import Parameter, scalar
+from workbench.effects.servo_constant import ServoConstant, any_proportional
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+
+class CommandFilter(ServoConstant):
+    """A servo follows its goal through a first-order low-pass filter, as one that measures the width of pulses does; the time
+    constant is added to the nominal one."""
+
+    name = "command_filter"
+    field = "lag"
+    family = "timing"
+    # hobby servos are sent a pulse every 20 ms, and average a few
+    parameters = (Parameter("time", "s", 0.0, 1.0, 0.01, seldom_beyond=0.06),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"{', '.join(spec.where)} smooths its goals with a time constant {1000 * scalar(spec, 'time'):.1f} ms longer."
+
+    def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
+        return any_proportional(model)
+
+
+EFFECT = CommandFilter()

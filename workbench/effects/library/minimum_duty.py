@@ -1,0 +1,29 @@
+"""A servo that starts at more duty than nominal outside its dead zone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from workbench.effects.base import Parameter, scalar
+from workbench.effects.servo_constant import ServoConstant, any_proportional
+from workbench.motion.commands import Commands
+from workbench.robot import EffectSpec, RobotModel
+
+
+class MinimumDuty(ServoConstant):
+    """The duty at the edge of a servo's dead zone is more than nominal by `duty`, and so is all duty beyond it: what a register
+    of start-up force or punch does."""
+
+    name = "minimum_duty"
+    field = "punch"
+    # the AX-12A's default punch is 3 % of full duty, the STS3215's 1.5 %
+    parameters = (Parameter("duty", "1", 0.0, 0.5, 0.02, seldom_beyond=0.1),)
+
+    def sentence(self, spec: EffectSpec) -> str:
+        return f"{', '.join(spec.where)} gives {100 * scalar(spec, 'duty'):.1f} % more duty than nominal as soon as it gives any."
+
+    def could_act(self, model: RobotModel, sent: Sequence[Commands]) -> bool:
+        return any_proportional(model)
+
+
+EFFECT = MinimumDuty()

@@ -1,0 +1,55 @@
+"""Effects that change one constant of a servo's law by their first parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.effects.base import Effect
+from workbench.files import InputError
+from workbench.motion.commands import Commands
+from workbench.robot import RobotModel
+from workbench.robot.servo_profile_file import servo_profile
+from workbench.servo import ServoLaw
+
+
+class ServoConstant(Effect):
+    """The first parameter is added to a field of `ServoLaw`, multiplies it, or is the most that it may be."""
+
+    layer = "actuator"
+    places = ("joint",)
+    field: ClassVar[str]
+    how: ClassVar[Literal["add", "multiply", "at most"]] = "add"
+
+    def law(self, law: ServoLaw, columns: NDArray[np.int_], values: Mapping[str, float]) -> ServoLaw:
+        """The constant changed at its joints alone."""
+        constant, by = getattr(law, self.field).copy(), values[self.parameters[0].name]
+        before = constant[columns]
+        constant[columns] = {"add": before + by, "multiply": before * by, "at most": np.minimum(before, by)}[self.how]
+        return replace(law, **{self.field: constant})
+
+
+def any_proportional(model: RobotModel) -> bool:
+    """Whether a servo of the robot follows goals by a position gain, as servos with firmware for that do."""
+    return any(model.servo(j).proportional_gain is not None for j in model.joints)
+
+
+def any_at_once(sent: Sequence[Commands]) -> bool:
+    """Whether a goal comes without a moving speed."""
+    return any(bool((c.speeds <= 0).any()) for c in sent)
+
+
+def any_register(model: RobotModel, name: str) -> bool:
+    """Whether a servo of the robot is of a known family that has a register of this name."""
+    return any(name in _registers(model.servo(j).model) for j in model.joints)
+
+
+def _registers(family: str) -> Sequence[str]:
+    try:
+        return tuple(servo_profile(family).registers)
+    except InputError:  # nobody's family
+        return ()

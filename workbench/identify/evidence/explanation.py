@@ -1,0 +1,202 @@
+"""What a search of servo logs by evidence found, with its probabilities, and what it says of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.metrics import rms
+from workbench.compare.session_takes import Progress
+from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
+from workbench.identify.evidence.leftover import left_over
+from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, with_known
+from workbench.identify.evidence.recalibration import what_changed
+from workbench.identify.evidence.step_errors import extrapolated
+from workbench.identify.evidence.tied import as_torque
+from workbench.identify.options import CONCLUSIONS, PROBLEM
+from workbench.identify.problem import TakeEvidence
+from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
+from workbench.identify.results.reasons import LessLikely
+from workbench.identify.results.ties import Tie
+from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
+from workbench.robot import Posterior, RobotModel
+from workbench.robot.model_file import parameter_names
+
+if TYPE_CHECKING:
+    from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.options import EvidenceOptions
+    from workbench.identify.evidence.posterior import RegionPosterior
+    from workbench.identify.evidence.robot_search import RobotFound
+    from workbench.identify.evidence.rollouts import Rollouts
+    from workbench.identify.evidence.search import Found
+    from workbench.identify.fitting.constancy import Drift
+
+Array = NDArray[np.float64]
+WORTH_SAYING = 0.01
+"""Least probability of an alternative that is named."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The likeliest model, and all that was believed beside it (`workbench.identify.explained.Explained`). found, posteriors: one
+    a region; robot: what acts in all of them; refuted: by registers or by takes kept back; missed: commands that never arrived;
+    drifts: parameters that drift within a take; stopped: by the limit of work."""
+
+    nominal: RobotModel
+    rollouts: Rollouts
+    found: tuple[Found, ...]
+    posteriors: tuple[RegionPosterior, ...]
+    robot: RobotFound
+    refuted: tuple[Rejected, ...]
+    options: EvidenceOptions
+    missed: tuple[DroppedCommands, ...] = ()
+    drifts: tuple[Drift, ...] = ()
+    stopped: bool = False
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot with its numbers recalibrated and its effects."""
+        return self.rollouts.model([p.best.hypothesis for p in self.posteriors])
+
+    @property
+    def calibrated(self) -> RobotModel:
+        """The same, with how well its servos' numbers are known now."""
+        sds: dict[Uncertain, float] = {}
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            variances = np.diag(p.best.covariance(region, self.options))
+            sds |= {n: n.sd * math.sqrt(v) for n, v in zip(p.best.hypothesis.numbers, variances)}
+        return with_known(self.model, sds)
+
+    @property
+    def recalibrated(self) -> tuple[Recalibrated, ...]:
+        """Numbers of the nominal law that are used otherwise."""
+        return tuple(r for p in self.posteriors
+                     for r in what_changed(self.nominal, as_mapping(p.best.hypothesis.numbers, p.best.hypothesis.z)))
+
+    def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
+        """The likeliest model's effects, the surest first."""
+        out = self._of_robot(evidence, before, after)
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+            for (c, x), s in zip(h.sizes(), h.slices()):
+                family, elsewhere = c.effect.family, p.elsewhere((c.name, c.where))
+                rival = p.rival((c.name, c.where), elsewhere)
+                others = [] if rival is None else [Alternative(*rival[0], CONCLUSIONS.surest * rival[1])]
+                share = CONCLUSIONS.surest
+                if (of_all := self.robot.rivals.get(c.key)) is not None:
+                    share /= 1.0 + math.exp(min(of_all[1], 700.0))
+                    others.append(Alternative(of_all[0].name, of_all[0].where, CONCLUSIONS.surest - share))
+                tie = as_torque(region, self.options, p.best, c)
+                share *= 1.0 if tie is None else tie.share
+                others = sorted((o for o in others if o.confidence >= WORTH_SAYING), key=lambda o: -o.confidence)
+                where = (*c.where, *(place for _, places in elsewhere for place in places))
+                fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
+                out.append(Finding(
+                    c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
+                    estimates(c, x, covariance[s, s]), fit, validation, tuple(others[:1]),
+                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence),
+                    family=None if family is None else FamilyBelief(family, share * p.families[family])))
+        return tuple(sorted(out, key=lambda f: -f.confidence))
+
+    def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:
+        """What acts in all joints at once."""
+        out, at, sure = [], self.robot.together, CONCLUSIONS.surest * self.robot.sure
+        nats = at.log_posterior
+        for (c, x), s in zip(at.shared.sizes(), at.shared.slices()):
+            others = tuple(Alternative(o.name, o.where, sure * math.exp(min(0.0, other - nats)))
+                           for o, other in self.robot.instead if o is not None)
+            fit, validation = (change(evidence, c.where, before, after, use) for use in ("fit", "validate"))
+            out.append(Finding(
+                c.name, c.where, sure, estimates(c, x, at.covariance[s, s]), fit, validation,
+                tuple(o for o in others if o.confidence >= WORTH_SAYING)[:1], c.effect.sentence(c.spec(x)),
+                family=None if c.effect.family is None else FamilyBelief(c.effect.family, sure)))
+        return out
+
+    def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
+        """Of all numbers of the model's effects, in the units of docs/formats.md; a recalibrated zero is one of them. read_off:
+        effects that no search identified."""
+        model = self.model
+        names = parameter_names(model.effects)
+        blocks: dict[tuple[str, tuple[str, ...]], Array] = {}
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+            for k, number in enumerate(h.numbers):
+                degrees = np.degrees(number.sd)
+                zero = turned_horn(number.joint, number.sd)
+                blocks.setdefault((zero.effect, zero.where), np.array([[degrees**2 * covariance[k, k]]]))
+            for (c, x), s in zip(h.sizes(), h.slices()):
+                slopes = value_slopes(c, x)
+                blocks[c.name, c.where] = slopes @ covariance[s, s] @ slopes.T
+        robot = self.robot.together
+        for (c, x), s in zip(robot.shared.sizes(), robot.shared.slices()):
+            slopes = value_slopes(c, x)
+            blocks[c.name, c.where] = slopes @ robot.covariance[s, s] @ slopes.T
+        mean = np.concatenate([np.empty(0), *(np.ravel(v) for e in model.effects for v in e.parameters.values())])
+        whole, at = np.zeros((len(mean), len(mean))), 0
+        for e in model.effects:
+            n = sum(np.size(v) for v in e.parameters.values())
+            block = blocks.get((e.effect, e.where), np.zeros((n, n)))
+            whole[at:at + n, at:at + n] = block if block.shape == (n, n) else np.zeros((n, n))
+            at += n
+        return with_read_off(Posterior(names, mean, CONCLUSIONS.wider**2 * whole), read_off)
+
+    @property
+    def looked_at(self) -> tuple[TakeEvidence, ...]:
+        """The takes, as far as the search looked at them."""
+        return self.rollouts.evaluator.evidence
+
+    def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
+        """Whole takes: the search plays what it was given."""
+        return evaluator
+
+    def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
+        """Residuals on whole takes in the limit of a step of zero, and what the last steps differ by, over sigma."""
+        progress("rolling out the fitted model", None)
+        evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
+        steps = (2 * PROBLEM.fine, PROBLEM.fine)
+        longer, shorter = evaluator.residuals([RolloutRequest(self.model, everywhere, step) for step in steps])
+        floors = {i: np.nan_to_num(rms((longer[i] - shorter[i])[evidence[i].moving])) for i in everywhere}
+        return {i: extrapolated(longer[i], shorter[i]) for i in everywhere}, floors
+
+    def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+        """What is beyond noise and numerics, with its worst event, and parameters that drift within a take."""
+        return (*left_over(evidence, after, floors), *(d.left(evidence) for d in self.drifts))
+
+    def is_slight(self) -> bool:
+        """All frames were searched: what got no name is no gap, unless it shows."""
+        return True
+
+    def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
+        """Effects that were fitted and are not in the likeliest model, with the nats by which the best model with them is
+        behind."""
+        out = list(self.refuted)
+        said = {(r.effect, r.where) for r in out}
+        for p, found in zip(self.posteriors, self.found):
+            kept = {(c.name, c.where) for c in p.best.hypothesis.effects}
+            for f in sorted(found.fits.values(), key=lambda f: -f.log_posterior):
+                for c in f.hypothesis.effects:
+                    if (c.name, c.where) in kept | said:
+                        continue
+                    said.add((c.name, c.where))
+                    behind = p.best.log_posterior - f.log_posterior
+                    out.append(Rejected(c.name, c.where, LessLikely(behind)))
+        return tuple(out)
+
+    def ties(self) -> tuple[Tie, ...]:
+        """The likeliest model beside the likeliest one in which another effect stands in a finding's place."""
+        out = []
+        for k, p in enumerate(self.posteriors):
+            for c in p.best.hypothesis.effects:
+                rival = p.rival((c.name, c.where))
+                other = next((f for f, _ in p.weights if rival and rival[0] in {(o.name, o.where) for o in f.hypothesis.effects}
+                              and (c.name, c.where) not in {(o.name, o.where) for o in f.hypothesis.effects}), None)
+                if rival is not None and other is not None and rival[1] > CONCLUSIONS.worth_an_experiment:
+                    hypotheses = [q.best.hypothesis for q in self.posteriors]
+                    hypotheses[k] = other.hypothesis
+                    out.append(Tie(self.model, self.rollouts.model(hypotheses), rival[1]))
+        return tuple(out)

@@ -1,0 +1,88 @@
+"""What a search of either kind hands over: its model, and what it has to say of it. The rest of a diagnosis asks no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from workbench.compare.session_takes import Progress
+    from workbench.identify.conclusions import ReadOff, Residuals
+    from workbench.identify.estimators.dropped_again import TakesAsPlayed
+    from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.options import EvidenceOptions
+    from workbench.identify.parameters import Candidate
+    from workbench.identify.problem import TakeEvidence
+    from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+    from workbench.identify.results.ties import Tie
+    from workbench.identify.rollouts.evaluator import RolloutEvaluator
+    from workbench.robot import Posterior, RobotModel
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be explained. nominal: the robot with what was read off; residuals: what it leaves, by take; pool: effects that
+    may act; played: commands that never arrived, which a search may read again; thorough: without a limit of work; options: of a
+    search of servo logs."""
+
+    evaluator: RolloutEvaluator
+    nominal: RobotModel
+    residuals: Residuals
+    pool: Sequence[Candidate]
+    played: TakesAsPlayed
+    thorough: bool
+    progress: Progress
+    options: EvidenceOptions
+
+
+class Explained(Protocol):
+    """What a search found."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot with the effects that were found, beside the commands that never arrived."""
+
+    @property
+    def calibrated(self) -> RobotModel:
+        """The same, with how well its servos' numbers are known now."""
+
+    @property
+    def missed(self) -> Sequence[DroppedCommands]:
+        """Commands that never arrived."""
+
+    @property
+    def looked_at(self) -> Sequence[TakeEvidence]:
+        """The takes, as far as the search looked at them."""
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the limit of work ended the search."""
+
+    @property
+    def recalibrated(self) -> tuple[Recalibrated, ...]:
+        """Numbers of the nominal law that are used otherwise."""
+
+    def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
+        """Whole takes with their commands as the search read them."""
+
+    def left_by(self, evaluator: RolloutEvaluator, progress: Progress) -> tuple[Residuals, Residuals]:
+        """Residuals (N, c) and numerical floors (c,) of the model on whole takes, over sigma."""
+
+    def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
+        """The model's effects. before, after: residuals of the nominal model and of this one."""
+
+    def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
+        """What is beyond noise and numerics, and what casts doubt on what was fitted."""
+
+    def is_slight(self) -> bool:
+        """Whether all that shows on frames that were searched is too little for a name."""
+
+    def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
+        """Effects that were tried and are not in the model, and why."""
+
+    def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
+        """Of all numbers of the model's effects; read_off: those that no search identified."""
+
+    def ties(self) -> tuple[Tie, ...]:
+        """Findings and their rivals that are worth an experiment."""

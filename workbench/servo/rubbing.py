@@ -1,0 +1,50 @@
+"""Dry friction that grows with the load of the gear, of the nominal law and of effects."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.servo.law import ServoLaw
+from workbench.servo.terms import Instant, ServoTerm, TermNumbers
+
+Array = NDArray[np.float64]
+
+MOST_LOAD = 2.0
+"""Of the torque at full duty: beyond it friction grows no further, as the solver needs a bound."""
+
+
+@dataclass(frozen=True)
+class Rubbing(ServoTerm):
+    """Shares of the load (n,): coefficient always, static more at rest, which fades as exp(-(w / speed)^2), speed [rad/s],
+    backdrive more where the load drives the motor."""
+
+    coefficient: Array
+    static: Array
+    speed: float
+    backdrive: Array
+
+    def friction(self, now: Instant) -> Array:
+        """By the load [N m]."""
+        share = self.coefficient + self.static * np.exp(-np.square(now.velocity / self.speed))
+        share = share + self.backdrive * np.maximum(-np.sign(now.motor) * now.direction, 0.0)
+        return np.asarray(share * np.abs(now.load))
+
+    def most_friction(self, law: ServoLaw) -> Array:
+        """At MOST_LOAD [N m]."""
+        return np.asarray((self.coefficient + self.static + self.backdrive) * MOST_LOAD * law.full_torque)
+
+    def numbers(self) -> TermNumbers:
+        """All of it."""
+        return TermNumbers(rubbing=self.coefficient, rubbing_still=self.static, rubbing_speed=self.speed,
+                           rubbing_backwards=self.backdrive)
+
+
+def nominal_terms(law: ServoLaw) -> tuple[ServoTerm, ...]:
+    """What servos do by the nominal law beyond motor, Coulomb and viscous friction: none, or load friction."""
+    if not law.load_friction.any():
+        return ()
+    none = np.zeros_like(law.load_friction)
+    return (Rubbing(law.load_friction, none, 1.0, none),)
