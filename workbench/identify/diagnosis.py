@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
+from workbench.compare.logged import how_logged
 from workbench.compare.metrics import rms
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import LeftOut, Progress, ReadTake, no_progress, read_takes
@@ -208,7 +209,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
         findings=findings, rejected=explained.losers(), unexplained=left,
         posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - settings.began) | settings.provenance()
-        | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **final}},
+        | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **final}} | how_logged([e.take for e in evidence]),
         left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
     return DiagnosisResult(diagnosis, reports, explained.ties(), observation_models(evidence))

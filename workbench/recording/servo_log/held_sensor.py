@@ -1,9 +1,8 @@
 """A sensor that is refreshed more slowly than it is read: its positions are older than their stamps, by more and less in turn.
 
-A servo measures its position every few milliseconds and answers with the last one it has. Where that period is near the log's own,
-the age of what is read goes round: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake. Period
-and phase are told by the log alone: they are those by which positions lie best on a line between their neighbours.
-"""
+A servo measures its position every few milliseconds and answers with the last one it has. Where that period is near the log's
+own, the age of what is read goes round: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake.
+Period and phase are told by the log alone: they are those by which positions lie best on a line between their neighbours. """
 
 from __future__ import annotations
 
@@ -23,8 +22,8 @@ class HeldChecks:
 
     shortest, longest: period looked for, in rows; of a shorter one little can be told, of a longer one rows repeat. span: rows
     of fastest motion that are looked at first. phases: of a period that are tried. drift: of the ages over what is looked at, at
-    most, between two periods that are tried, in periods. left: share of the error of interpolation that is left at most; in 23
-    of 24 logs of a servo whose sensor is held it was 0.22 to 0.75, in logs of other servos 0.85 and more. hopeless: share over
+    most, between two periods that are tried, in periods. left: share of the error of interpolation that is left at most; in 20
+    of 24 logs of a servo whose sensor is held it was 0.22 to 0.67, in logs of other servos 0.78 and more. hopeless: share over
     the first rows beyond which no more is looked at. alike: errors that differ by less are of one pattern of ages, which several
     periods give: the longest is taken. cut: of a single error [rad], as stick and slip are no line. fewest: rows that tell.
     counts: by which the joint moves in a row at least, in the 90th percentile.
@@ -35,7 +34,7 @@ class HeldChecks:
     span: int = 80
     phases: int = 8
     drift: float = 0.15
-    left: float = 0.76
+    left: float = 0.71
     hopeless: float = 0.8
     alike: float = 1.1
     cut: float = 0.03
@@ -61,8 +60,8 @@ class Refresh:
 
 
 def refresh_of(time: Array, position: Array, c: HeldChecks = HELD) -> Refresh | None:
-    """How a sensor whose positions (N,) [rad] were read at times (N,) [s] is refreshed; None where it is not held, or the log does
-    not tell."""
+    """How a sensor whose positions (N,) [rad] were read at times (N,) [s] is refreshed; None where it is not held, or the log
+    does not tell."""
     known = np.isfinite(position)
     t, q = time[known], position[known]
     if len(t) < c.fewest or np.percentile(np.abs(np.diff(q)), 90) < c.counts * max(resolution(q), 1e-9):

@@ -15,6 +15,7 @@ from workbench.files import InputError
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
+from workbench.recording.servo_log.logged import as_logged
 from workbench.recording.servo_log.units import UNITS, unit_problems
 
 Array = NDArray[np.float64]
@@ -69,7 +70,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     problems += unit_problems(mended)
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
         problems += lead_problems(mended)
-    return replace(mended, problems=tuple(problems))
+    return as_logged(replace(mended, problems=tuple(problems)))
 
 
 def _bounded(r: Recording, c: LogChecks) -> None:
