@@ -231,7 +231,7 @@ def draw(effect: str, rng: Rng, robot: Robot) -> Draw:
 def possible(robot: Robot, outside: bool) -> list[str]:
     """Effects that this robot can show, in or outside the vocabulary."""
     logs = not robot.rigid_bodies
-    names = OUTSIDE if outside else VOCABULARY
+    names = OUTSIDE if outside else HIDEABLE
     return [e for e in names if CATALOGUE[e].logged or not logs]
 
 
