@@ -48,7 +48,7 @@ def bound(build: Path) -> int:
     own, calls = read(build)
     named = {f.rsplit(":", 1)[-1]: f for f in own}
     interrupt = max(deepest(named[i], own, calls) for i in INTERRUPTS)
-    return deepest(named["run"], own, calls) + own[named["reset"]] + FRAME + interrupt
+    return deepest(named["run"], own, calls) + own[named["begin"]] + FRAME + interrupt
 
 
 if __name__ == "__main__":

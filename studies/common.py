@@ -30,13 +30,6 @@ ROOT = Path(__file__).resolve().parents[1]
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 """Of the body in the thesis's axes: x forward, y up, z right [cm], and the rotations about them [deg]; ry is the heading, left
 positive, rx the right side down, rz the nose up."""
-LABELS = ("x, forward [cm]", "y, up [cm]", "z, right [cm]", "about x, right side down [deg]", "about y, to the left [deg]",
-          "about z, nose up [deg]")
-REAL = (37.01, -0.18, -0.10)
-"""Where the real robot was after six seconds of the ROBOTIS walk [cm] (thesis, 7.2)."""
-SIMULATED_M, SIMULATED_OWN = (32.70, -0.38, -1.28), (32.35, -0.38, -1.81)
-"""The same of the thesis's simulation with ROBOTIS angles: MATLAB filter, own filter [cm]."""
-
 _TO_THESIS = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 Study = Callable[[Path, bool, Callable[[str, float | None], None]], str]
 
@@ -67,11 +60,6 @@ def sign(value: float, digits: int = 1) -> str:
     """A number as text with a true minus."""
     text = f"{value:.{digits}f}"
     return ("0" + text[2:] if float(text) == 0 and text.startswith("-") else text).replace("-", "−")
-
-
-def with_floor(value: float, floor: float, digits: int = 1) -> str:
-    """A number and how far finer steps move it."""
-    return f"{sign(value, digits)} ± {floor:.{digits}f}"
 
 
 @styled

@@ -54,7 +54,7 @@ def evidence(out: Path, quick: bool, progress: Callable[[str, float | None], Non
     joint = session.model.joints[0]
     numbers = [n for n in uncertain_numbers(session.model, joint, zeroed=False) if n.name in NUMBERS]
     region = region_of([joint], evaluator.evidence, numbers, (), OPTIONS)
-    rollouts = Rollouts(evaluator, session.model, (region,), (start(numbers),))
+    rollouts = Rollouts.of(evaluator, session.model, [region])
     rows = ["| model | Laplace [nats] | nested sampling [nats] | rollouts |", "|---|---|---|---|"]
     for names in MODELS[1:2] if quick else MODELS:
         progress(f"{' and '.join(names) or 'nominal'}", None)

@@ -23,7 +23,7 @@ from workbench.gait.feet import feet_measure
 from workbench.gait.legs import legs_of
 from workbench.gait.measure import fallen, measure
 from workbench.gait.rollouts import Rollouts
-from workbench.motion import Commands, Motion, load_motion
+from workbench.motion import Commands, load_motion
 from workbench.robot import GRAVITY, EffectSpec, RobotModel, data_file, puppy_model
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.view.figures import by_joint, footfalls, joint_grid, phase_portrait, stance_of
@@ -53,8 +53,10 @@ def gaits(model: RobotModel) -> list[Played]:
     walk = load_motion(data_file("robotis_walk.csv"), model)
     out = [Played("ROBOTIS walk", walk.commands(math.ceil(SECONDS / walk.duration)), walk.duration, walk.duration)]
     for folder in sorted(GAITS.glob("*/gait.csv")):
-        start, cycle = (load_motion(folder.with_name(f"{n}.csv"), model) for n in ("start", "gait"))
-        out.append(Played(folder.parent.name, _after(start, cycle), start.duration, cycle.duration))
+        gait = load_motion(folder, model)
+        begin = gait.seconds(1) - gait.duration - float(gait.times[-1] - gait.times[len(gait.times) - 1 - gait.stop])
+        commands = gait.commands(math.ceil(SECONDS / gait.duration))
+        out.append(Played(folder.parent.name, commands, begin, gait.duration))
     return out
 
 
@@ -165,15 +167,6 @@ def _map(speeds: Mapping[str, Mapping[str, float]]) -> Figure:
     figure.axes[0].set_ylabel("speed [cm/s]")
     figure.axes[0].legend()
     return figure
-
-
-def _after(start: Motion, cycle: Motion) -> Commands:
-    """The start, then cycles for SECONDS."""
-    first = start.commands()
-    rest = cycle.commands(math.ceil(SECONDS / cycle.duration))
-    joined = {f: np.concatenate([getattr(first, f), getattr(rest, f)]) for f in ("goals", "speeds", "enabled", "poses")}
-    return Commands(times=np.concatenate([first.times, rest.times + first.end]), joints=first.joints, end=first.end + rest.end,
-                    **joined)
 
 
 if __name__ == "__main__":

@@ -2,15 +2,20 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from workbench.device import read_tables, write_tables
+from tests.command import refused, succeeds
+from workbench.device import export, read_tables, write_tables
+from workbench.device.controller.program import table_of
 from workbench.files import InputError
 from workbench.motion import PoseTable, load_motion
-from workbench.robot import BUS_IDS, data_file
+from workbench.robot import BUS_IDS, data_file, puppy_model
+from workbench.robot.model_file import save_model
+from workbench.robot.servo_constants import load_servo_constants
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import ServoUnits
 
@@ -120,3 +125,24 @@ def test_joints_need_bus_ids(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="joints blb and blm share bus ID 13"):
         write_tables(TABLE, tmp_path / "new", {**BUS_IDS, "blb": 13})
     assert not (tmp_path / "new").exists()
+
+
+def test_a_servo_that_nobody_knows_gets_no_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An LX-16A turns 240 deg over 1000 counts: in the AX-12A's, every angle would be 18 % too small."""
+    path = tmp_path / "servo.yaml"
+    path.write_text("model: LX-16A\nstall_torque: 1.7\nno_load_speed: 6.5\nrated_voltage: 7.4\nsupply_voltage: 7.4\n"
+                    "coulomb_friction: 0.05\nviscous_friction: 0.01\nreflected_inertia: 0.005\nproportional_gain: 4.0\n")
+    model = replace(puppy_model(), servos=dict.fromkeys(puppy_model().joints, load_servo_constants(path)))
+    said = "joint .*: no servo profile for 'LX-16A'; expected one of AX-12A.*lx16a.yaml"
+    with pytest.raises(InputError, match=said):
+        export(load_motion(data_file("robotis_walk.csv"), model), model, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(InputError, match=said):
+        table_of(data_file("robotis_walk.csv"), model, 3, force=True)
+    save_model(model, tmp_path / "model.yaml")
+    for verb in ("export", "play", "run", "flash"):
+        more = {"play": ["--port", "/dev/ttyNONE"], "flash": ["--dry-run"]}.get(verb, [])
+        line = refused(capsys, verb, str(data_file("robotis_walk.csv")), "--model", str(tmp_path / "model.yaml"),
+                       "--out", str(tmp_path / verb), *more)
+        assert "no servo profile for 'LX-16A'" in line, verb
+    assert succeeds(capsys, "inspect", str(path)).count("no servo profile for 'LX-16A'") == 1

@@ -120,15 +120,3 @@ def test_impossible_windows(window: int) -> None:
         filter_derivatives(sine(), window)
     with pytest.raises(ValueError, match="time constant"):
         low_pass(sine(), 0.0)
-
-
-def test_the_filters_study_tells_its_effects_apart() -> None:
-    """Without simulation: the comparable time constant of a known low-pass, a known lag, and a velocity error of a known size."""
-    from studies.filters import measure
-
-    _, smooth = measure.robotis()
-    assert measure.lag(low_pass(smooth, 0.01), smooth) == pytest.approx(20, abs=2)
-    assert measure.lag(savitzky_golay(smooth, 501), smooth) == pytest.approx(0, abs=0.2)
-    off = Trajectory(smooth.time, smooth.joints, smooth.q, smooth.v + np.radians(3), smooth.a)
-    assert measure.velocity_error(off, smooth) == pytest.approx(3)
-    assert 0.5 < measure.comparable_time_constant(smooth, 2001) / (2 * measure.comparable_time_constant(smooth, 1001)) < 2

@@ -44,6 +44,6 @@ def test_what_was_tried_is_sorted_by_how_much_less_likely() -> None:
     rows = [row for part in tried(rejected, "more") for t in (part.parts if isinstance(part, Details) else [part])
             if isinstance(t, Table) for row in t.rows]
     assert ["2 times less" in str(row[-1]) for row in rows] == [True, False, False]
-    assert "81 times less likely" in str(rows[1][-1])
+    assert "81 times less probable" in str(rows[1][-1])
     assert "more than 1,000,000 times less" in str(rows[2][-1])
-    assert str(SpokenAgainst(7.0)) == "takes that were kept back are 1,000 times less likely with it"
+    assert str(SpokenAgainst(7.0)) == "takes that were kept back are 1,000 times less probable with it"

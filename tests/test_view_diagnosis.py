@@ -249,7 +249,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
              "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
              "Tried in its place", "dead band at flm takes 900 off", "Before and after, on unseen stretches",
-             "What is left", "a &lt;take&gt;", "What else was tried", "its signature is not that of what is missing",
+             "Residuals", "a &lt;take&gt;", "What else was tried", "its signature is not that of what is missing",
              "What to record next", "next_experiment.csv", "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]
     assert -1 not in places, order[places.index(-1)]

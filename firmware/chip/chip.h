@@ -17,7 +17,7 @@ uint8_t reset_cause(void);
 
 void pins_begin(void);                     /* pins.c */
 bool start_button(void);
-void show(uint8_t state);
+void show(uint8_t state, uint8_t reason, uint32_t now);
 void battery_begin(void);
 uint16_t battery_decivolt(void);
 

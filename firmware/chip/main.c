@@ -24,7 +24,7 @@ static void every_tick(uint32_t now) {
 
 static void seldom(void) {
     robot.battery = battery_decivolt();
-    show(robot.state);
+    show(robot.state, robot.reason, milliseconds);
 }
 
 /* Asleep until an interrupt; one that came since the last look is seen, as it stays pending while interrupts are masked. */

@@ -27,7 +27,11 @@ void pins_begin(void) {
     mode(&GPIOB_CRH, 11, IN_PULLED);
     pin_set(&GPIOB_BSRR, 13, true);
     pin_set(&GPIOB_BSRR, 15, true);
-    mode(&GPIOB_CRH, 13, OUT);           /* lights, on when low: MANAGE */
+    pin_set(&GPIOB_BSRR, 12, true);
+    pin_set(&GPIOB_BSRR, 14, true);
+    mode(&GPIOB_CRH, 12, OUT);           /* lights, on when low: AUX */
+    mode(&GPIOB_CRH, 14, OUT);           /* PROGRAM */
+    mode(&GPIOB_CRH, 13, OUT);           /* MANAGE */
     mode(&GPIOB_CRH, 15, OUT);           /* PLAY */
     pin_set(&GPIOC_BSRR, 13, false);
     mode(&GPIOC_CRH, 13, OUT);           /* POWER */
@@ -40,10 +44,13 @@ void pins_begin(void) {
 
 bool start_button(void) { return !(GPIOB_IDR & 1u << 3); }
 
-/* PLAY while a table plays, MANAGE while torque is off or nothing is done. */
-void show(uint8_t state) {
+/* PLAY while a table plays; MANAGE while torque is off or nothing is done, and then why: PROGRAM blinks the tens, AUX the ones. */
+void show(uint8_t state, uint8_t reason, uint32_t now) {
+    bool idle = state == STATE_LIMP || state == STATE_STILL;
     pin_set(&GPIOB_BSRR, 15, state != STATE_PLAY);
-    pin_set(&GPIOB_BSRR, 13, state != STATE_LIMP && state != STATE_STILL);
+    pin_set(&GPIOB_BSRR, 13, !idle);
+    pin_set(&GPIOB_BSRR, 14, !(idle && reason_light(reason, now, true)));
+    pin_set(&GPIOB_BSRR, 12, !(idle && reason_light(reason, now, false)));
 }
 
 void battery_begin(void) {

@@ -32,12 +32,21 @@ void bus_start(void) {
     USART1_CR1 = ON | USART_CR1_TCIE;
 }
 
-static void over(uint16_t received) {
-    robot.bus.rx_length = received;
+static uint32_t more; /* bytes beyond those expected, as stray ones came first */
+
+static void over(uint32_t received) {
+    robot.bus.rx_length = (uint16_t)received;
     robot.bus.busy = false;
     robot.bus.done = true;
     USART1_CR3 = USART_CR3_DMAT;
     USART1_CR1 = ON | USART_CR1_RXNEIE; /* what comes now, nobody asked for */
+}
+
+static void receive(uint8_t *to, uint32_t count) {
+    DMA1_IFCR = DMA_IFCR_CGIF5;
+    DMA1_CMAR5 = (uint32_t)(uintptr_t)to;
+    DMA1_CNDTR5 = count;
+    DMA1_CCR5 = DMA_CCR_MINC | DMA_CCR_TCIE | DMA_CCR_EN;
 }
 
 static void sent(void) {
@@ -51,10 +60,8 @@ static void sent(void) {
         over(0);
         return;
     }
-    DMA1_IFCR = DMA_IFCR_CGIF5;
-    DMA1_CMAR5 = (uint32_t)(uintptr_t)b->rx;
-    DMA1_CNDTR5 = b->expected;
-    DMA1_CCR5 = DMA_CCR_MINC | DMA_CCR_TCIE | DMA_CCR_EN;
+    more = 0;
+    receive(b->rx, b->expected);
     USART1_CR3 = USART_CR3_DMAT | USART_CR3_DMAR;
 }
 
@@ -71,7 +78,14 @@ void bus_interrupt(void) {
 void bus_received_interrupt(void) {
     DMA1_CCR5 = 0;
     DMA1_IFCR = DMA_IFCR_CGIF5;
-    if (robot.bus.busy) over(robot.bus.expected);
+    if (!robot.bus.busy) return;
+    uint32_t lead = more ? 0 : bus_more(&robot.bus);
+    if (lead) {
+        more = lead; /* the answer's end is still to come; the next byte takes 10 us */
+        receive(robot.bus.rx + robot.bus.expected, lead);
+    } else {
+        over(robot.bus.expected + more);
+    }
 }
 
 /* The core waits no longer: what has come so far is the answer. Called from the main loop; the interrupt may have been first. */
@@ -79,5 +93,5 @@ void bus_stop_waiting(void) {
     DMA1_CCR5 = 0;
     if (!robot.bus.busy) return;
     DMA1_IFCR = DMA_IFCR_CGIF5;
-    over((uint16_t)(robot.bus.expected - DMA1_CNDTR5));
+    over(robot.bus.expected + more - DMA1_CNDTR5);
 }

@@ -19,7 +19,7 @@ void *memset(void *to, int value, size_t n) {
     return to;
 }
 
-static void reset(void) {
+__attribute__((used)) static void begin(void) {
     SYST_CSR = 0; /* whatever the loader has left running */
     NVIC_ICER0 = NVIC_ICER1 = NVIC_ICPR0 = NVIC_ICPR1 = ~(uint32_t)0;
     SCB_VTOR = 0x08003000;
@@ -27,6 +27,9 @@ static void reset(void) {
     memset(bss_start, 0, (size_t)bss_size);
     run();
 }
+
+/* Whatever stack the loader has left. */
+__attribute__((naked)) static void reset(void) { __asm volatile("ldr r0, =stack_top\n msr msp, r0\n b begin\n .ltorg"); }
 
 /* A fault stops everything; the watchdog then resets, and the robot stands still and says so. */
 static void stop(void) {

@@ -5,12 +5,20 @@ static void start(struct robot *r, uint8_t reason) {
     if (r->joints == 0) return;
     if (r->state == STATE_STILL || r->state == STATE_LIMP) enter(r, STATE_CHECK, reason, 0xFF);
     if (r->state != STATE_NEUTRAL) return;
-    enter(r, STATE_PLAY, reason, 0xFF);
-    begin_play(r);
+    play_from_neutral(r, reason);
 }
 
+/* A stop starts nothing: where nothing moves it does nothing, and a check that would lead to a ramp is given up. */
 static void stop(struct robot *r, uint8_t reason) {
-    if (r->state == STATE_STILL || r->state == STATE_LIMP) start(r, reason);
+    if (r->state == STATE_CHECK && r->check_for == STATE_RAMP)
+        enter(r, r->came_from == STATE_STILL ? STATE_STILL : STATE_LIMP, reason, 0xFF);
+    bool sent = r->state == STATE_PLAY && (r->pose || r->cycle);
+    if (sent && table_stop(playing(r)) && !r->stop_asked) { /* it has an end of its own; asked a second time it ends at once */
+        r->stop_asked = true;
+        r->reason = reason;
+        r->state_told = false;
+        return;
+    }
     if (r->state != STATE_PLAY && !(r->state == STATE_RAMP && r->after == STATE_PLAY)) return;
     r->reason = reason;
     ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
@@ -33,12 +41,23 @@ static void button(struct robot *r) {
     if (!r->pressed && lasted >= BUTTON_MS) r->armed = true;
     if (r->pressed && r->armed && lasted >= HELD_MS && !r->held_told) {
         r->held_told = true;
-        if (r->state == STATE_BRIDGE) bridge_end(r, REASON_HELD);
         react(r, REASON_HELD, 0xFF);
     }
 }
 
-void commands_tick(struct robot *r) { button(r); }
+/* Torque off once more, where a servo is not known to have heard it; without a table none is. */
+static void off_again(struct robot *r) {
+    bool known = r->joints > 0;
+    for (uint32_t j = 0; j < r->joints; j++) known = known && r->servo[j].off;
+    if (!known) r->send_release = true;
+}
+
+void commands_tick(struct robot *r) {
+    button(r);
+    if (r->state == STATE_LIMP && r->now % OFF_AGAIN_MS == 0) off_again(r);
+    bool waits = r->state == STATE_NEUTRAL || (r->state == STATE_STILL && r->joints);
+    if (waits && r->now - r->entered >= IDLE_MS) react(r, REASON_IDLE, 0xFF);
+}
 
 static void result(struct robot *r, uint8_t link, uint8_t code) {
     const struct frame_reader *f = &r->link[link].reader;
@@ -73,7 +92,7 @@ static void order(struct robot *r, uint8_t link, uint8_t type) {
         stop(r, REASON_LINK);
         break;
     case FRAME_RELEASE:
-        if (r->state != STATE_BRIDGE && r->joints) enter(r, STATE_LIMP, REASON_LINK, 0xFF);
+        enter(r, STATE_LIMP, REASON_LINK, 0xFF);
         break;
     case FRAME_BRIDGE_END:
         if (r->state == STATE_BRIDGE) bridge_end(r, REASON_LINK);
@@ -96,15 +115,22 @@ static void frame(struct robot *r, uint8_t link) {
 
 static void remote(struct robot *r, uint8_t byte) {
     uint16_t pressed = remote_feed(&r->remote, byte, r->now);
+    if (pressed == REMOTE_6) enter(r, STATE_LIMP, REASON_REMOTE, 0xFF);
     if (r->state == STATE_BRIDGE) return;
     if (pressed == REMOTE_U) start(r, REASON_REMOTE);
-    if (pressed == REMOTE_1) stop(r, REASON_REMOTE);
+    if (pressed == REMOTE_1 && (r->state == STATE_STILL || r->state == STATE_LIMP)) start(r, REASON_REMOTE); /* neutral, by a person */
+    else if (pressed == REMOTE_1) stop(r, REASON_REMOTE);
 }
 
 /* Some bytes of each link at each wake, so that no pose has to wait for a long message. */
 void commands_bytes(struct robot *r) {
     for (uint8_t link = 0; link < LINKS; link++) {
         struct links *l = &r->link[link];
+        bool gap = r->now - l->heard > FRAME_MS;
+        if (ring_used(&l->rx)) {
+            if (gap) frame_reset(&l->reader);
+            l->heard = r->now;
+        }
         for (uint32_t k = 0; k < 16u && ring_used(&l->rx); k++) {
             bool bridged = link == LINK_PC && r->state == STATE_BRIDGE;
             if (bridged && r->bridge.whole) break;

@@ -29,6 +29,17 @@ uint32_t dxl_write(uint8_t *out, uint8_t id, uint8_t address, const uint8_t *val
     return finish(out, id, DXL_WRITE, count + 1u);
 }
 
+uint32_t dxl_sync_limits(uint8_t *out, const uint8_t *table, const uint16_t *limits) {
+    uint8_t *at = out + 7;
+    out[5] = DXL_TORQUE_LIMIT;
+    out[6] = 2;
+    for (uint32_t j = 0; j < table_joints(table); j++, at += 3) {
+        at[0] = table_id(table, j);
+        put16(at + 1, limits[j]);
+    }
+    return finish(out, DXL_BROADCAST, DXL_SYNC_WRITE, 2u + 3u * table_joints(table));
+}
+
 uint32_t dxl_sync_goals(uint8_t *out, const uint8_t *table, const uint16_t *goals, const uint16_t *speeds) {
     uint8_t *at = out + 7;
     out[5] = DXL_GOAL;

@@ -7,9 +7,15 @@ static void new_goals(struct robot *r) {
 }
 
 void release(struct robot *r) {
-    r->send_goals = false;
+    r->send_goals = r->send_limits = false;
     r->send_release = true;
     for (uint32_t j = 0; j < r->joints; j++) r->servo[j].off = false;
+}
+
+/* What this joint's torque limit should be now: its own, or on the first way to neutral less. */
+uint16_t torque_limit(const struct robot *r, uint32_t joint) {
+    uint16_t own = r->servo[joint].torque_limit;
+    return r->gentle && own > RAMP_TORQUE ? RAMP_TORQUE : own;
 }
 
 /* All joints arrive together, the one with the longest way at the ramp's speed. */
@@ -42,46 +48,101 @@ void ramp_to_neutral(struct robot *r, uint8_t state, uint8_t after) {
 void begin_play(struct robot *r) {
     if (upload_ready(&r->upload)) upload_take(&r->upload);
     r->pose = r->cycle = 0;
+    r->stop_asked = r->ending = false;
     r->next_pose = r->now + POSE_GUARD_MS; /* on the tick, as all that follow: what is under way on the bus is over by then */
 }
 
-static void ramp_to_table(struct robot *r) {
-    uint16_t last[MAX_JOINTS];
-    uint32_t end = table_poses(playing(r)) - 1u;
-    for (uint32_t j = 0; j < r->joints; j++) last[j] = table_goal(playing(r), end, j);
-    ramp_to(r, last, STATE_RAMP, STATE_PLAY);
+/* The moving speed that brings a joint from one goal to another in the dwell of that pose [counts of the register]. */
+static uint32_t speed_of_way(uint32_t way, uint32_t dwell_ms) {
+    uint32_t a_second = dwell_ms < 4000u ? (way * 1000u + dwell_ms - 1u) / dwell_ms : (way + 3u) / 4u;
+    return (a_second * 1000u + SPEED_MILLI - 1u) / SPEED_MILLI;
 }
 
-/* Where a cycle has ended: another table, another cycle, or neutral. True where the next pose is to be sent now. */
-static bool turn_over(struct robot *r) {
-    r->pose = 0;
-    r->cycle++;
-    if (upload_ready(&r->upload)) {
-        bool reachable = table_reachable(r->upload.spare, r->goals);
-        if (reachable || (r->upload.flags & UPLOAD_RAMPS)) {
-            upload_take(&r->upload);
-            r->cycle = 0;
-            r->table_fault = TABLE_OK;
-            if (!reachable) ramp_to_table(r);
-            return reachable;
-        }
-        upload_drop(&r->upload);
-        r->table_fault = TABLE_UNREACHABLE;
-        r->state_told = false;
-    }
-    if ((table_flags(playing(r)) & TABLE_STOPS) && r->cycle >= table_cycles(playing(r))) {
-        r->reason = REASON_ENDED;
-        ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
-        return false;
+/* What is sent where the table says 0, "at once": a servo that is told so and is not there goes as fast as it can. Instead its way
+   from the last goal takes the pose's dwell; without one it goes on at the speed that it had, as it may still be under way. */
+static uint16_t speed_to_send(const struct robot *r, uint32_t pose, uint32_t j, uint16_t from) {
+    const uint8_t *t = playing(r);
+    uint32_t speed = table_speed(t, pose, j), way = distance(table_goal(t, pose, j), from);
+    if (speed) return (uint16_t)speed;
+    speed = way ? speed_of_way(way, table_dwell(t, pose)) : r->speeds[j];
+    if (way && speed < RAMP_SLOWEST) speed = RAMP_SLOWEST;
+    return (uint16_t)(speed < table_fastest(t, j) ? speed : table_fastest(t, j));
+}
+
+/* Whether the first pose can be sent from neutral: none of the joints that the table sends there at once would have to go faster
+   than a ramp. The computer's player and the simulation go by the same rule. */
+static bool startable(const struct robot *r) {
+    const uint8_t *t = playing(r);
+    for (uint32_t j = 0; j < r->joints; j++) {
+        uint32_t way = distance(table_goal(t, 0, j), r->goals[j]);
+        if (table_speed(t, 0, j) == 0 && speed_of_way(way, table_dwell(t, 0)) > RAMP_SPEED) return false;
     }
     return true;
 }
 
+static void ramp_to_pose(struct robot *r, uint32_t pose) {
+    uint16_t goals[MAX_JOINTS];
+    for (uint32_t j = 0; j < r->joints; j++) goals[j] = table_goal(playing(r), pose, j);
+    ramp_to(r, goals, STATE_RAMP, STATE_PLAY);
+}
+
+void play_from_neutral(struct robot *r, uint8_t reason) {
+    enter(r, STATE_PLAY, reason, 0xFF);
+    begin_play(r);
+    if (!startable(r)) ramp_to_pose(r, 0);
+}
+
+/* Another table takes over in the walk: at its loop if that is near enough, else (where the PC allows it) from its beginning, after a
+   ramp to where that begins. True where its next pose is to be sent now. */
+static bool take_over(struct robot *r, bool reachable) {
+    upload_take(&r->upload);
+    r->cycle = 0;
+    r->table_fault = TABLE_OK;
+    r->pose = table_start(playing(r));
+    if (reachable) return true;
+    if (table_start(playing(r)))
+        ramp_to_neutral(r, STATE_RAMP, STATE_PLAY);
+    else
+        ramp_to_pose(r, table_loop_end(playing(r)) - 1u);
+    return false;
+}
+
+static void wind_up(struct robot *r) {
+    if (!r->stop_asked) r->reason = REASON_ENDED;
+    r->ending = true;
+    r->pose = table_loop_end(playing(r));
+}
+
+/* Where a cycle has ended: another table, another cycle, the stop, or neutral. True where the next pose is to be sent now. */
+static bool turn_over(struct robot *r) {
+    r->cycle++;
+    if (upload_ready(&r->upload) && !r->stop_asked) {
+        bool reachable = table_reachable(r->upload.spare, r->goals);
+        if (reachable || (r->upload.flags & UPLOAD_RAMPS)) return take_over(r, reachable);
+        upload_drop(&r->upload);
+        r->table_fault = TABLE_UNREACHABLE;
+        r->state_told = false;
+    }
+    r->pose = table_start(playing(r));
+    if ((table_flags(playing(r)) & TABLE_STOPS) && r->cycle >= table_cycles(playing(r))) wind_up(r);
+    return true;
+}
+
+/* Whether r->pose is the next pose to send; where all have been, the way to neutral begins. */
+static bool pose_follows(struct robot *r) {
+    const uint8_t *t = playing(r);
+    if (!r->ending && r->pose == table_loop_end(t) && !turn_over(r)) return false;
+    if (!r->ending && r->stop_asked && r->pose == table_start(playing(r))) wind_up(r);
+    if (r->pose < table_poses(playing(r))) return true;
+    ramp_to_neutral(r, STATE_STOP, STATE_NEUTRAL);
+    return false;
+}
+
 static void pose_due(struct robot *r) {
-    if (r->pose >= table_poses(playing(r)) && !turn_over(r)) return;
+    if (!pose_follows(r)) return;
     for (uint32_t j = 0; j < r->joints; j++) {
+        r->speeds[j] = speed_to_send(r, r->pose, j, r->goals[j]);
         r->goals[j] = table_goal(playing(r), r->pose, j);
-        r->speeds[j] = table_speed(playing(r), r->pose, j);
     }
     r->next_pose += table_dwell(playing(r), r->pose);
     r->pose++;
@@ -97,6 +158,13 @@ bool motion_send(struct robot *r) {
         static const uint8_t off = 0;
         r->send_release = false; /* asked for again by whoever reads that a servo is still on */
         bus_ask(&r->bus, dxl_write(r->bus.tx, DXL_BROADCAST, DXL_TORQUE, &off, 1), 0, BUS_TIMEOUT_MS, r->now);
+        return true;
+    }
+    if (r->send_limits) {
+        uint16_t limits[MAX_JOINTS];
+        r->send_limits = false;
+        for (uint32_t j = 0; j < r->joints; j++) limits[j] = torque_limit(r, j);
+        bus_ask(&r->bus, dxl_sync_limits(r->bus.tx, playing(r), limits), 0, BUS_TIMEOUT_MS, r->now);
         return true;
     }
     bool due = r->state == STATE_PLAY && (int32_t)(r->now - r->next_pose) >= 0;

@@ -15,6 +15,7 @@ enum reaction reaction_of(uint8_t reason) {
     case REASON_DEAD_SUPPLY:
     case REASON_BABBLE:
     case REASON_HELD:
+    case REASON_IDLE:
     case REASON_NOT_ARRIVED:
         return RELEASE;
     default:
@@ -22,10 +23,19 @@ enum reaction reaction_of(uint8_t reason) {
     }
 }
 
+/* What a servo that is still starting looks like. */
+static bool nobody_hears(uint8_t reason) {
+    return reason == REASON_SILENT || reason == REASON_GARBLED || reason == REASON_DEAD_SUPPLY || reason == REASON_BABBLE;
+}
+
+/* Where nothing is sent, servos may hold all the same: a ramp would be motion, so all that ends a walk lets go there. A person who holds
+   START is obeyed in every state. */
 void react(struct robot *r, uint8_t reason, uint8_t servo) {
     enum reaction what = reaction_of(reason);
-    if (what == GO_ON || !torque_on(r)) return;
-    if (what == RELEASE) {
+    bool still = r->state == STATE_STILL;
+    if (what == GO_ON || !(torque_on(r) || still || reason == REASON_HELD)) return;
+    if (still && booting(r) && nobody_hears(reason)) return;
+    if (what == RELEASE || still) {
         enter(r, STATE_LIMP, reason, servo);
     } else if (r->state != STATE_YIELD) {
         r->reason = reason;
@@ -52,12 +62,13 @@ static void judge_supply(struct robot *r) {
 
 /* After every round of readings. */
 void judge_round(struct robot *r) {
-    if (!torque_on(r)) return;
+    if (!torque_on(r) && r->state != STATE_STILL) return;
     judge_supply(r);
-    for (uint32_t j = 0; j < r->joints && torque_on(r); j++) {
+    for (uint32_t j = 0; j < r->joints && r->state != STATE_LIMP; j++) {
         const struct servo *s = &r->servo[j];
         uint8_t id = table_id(playing(r), j);
-        if (s->missed >= DEAD_ROUNDS) react(r, 2u * s->garbled >= s->missed ? REASON_GARBLED : REASON_SILENT, id);
+        bool silent = s->missed >= DEAD_ROUNDS || (s->missed >= SUPPLY_ROUNDS && r->now - s->heard >= DEAD_MS);
+        if (silent) react(r, 2u * s->garbled >= s->missed ? REASON_GARBLED : REASON_SILENT, id);
         if (s->overloaded >= ALARM_READINGS) react(r, REASON_OVERLOAD, id);
         if (s->hot >= ALARM_READINGS) react(r, REASON_HOT, id);
     }

@@ -13,6 +13,7 @@ void read_begin(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
         struct servo *s = &r->servo[j];
         s->missed = s->garbled = s->hot = s->overloaded = 0;
+        s->heard = r->now;
     }
 }
 
@@ -29,7 +30,7 @@ bool read_next(struct robot *r) {
     return true;
 }
 
-static void keep(struct servo *s, const uint8_t *ram, uint8_t error) {
+static void keep(struct servo *s, const uint8_t *ram, uint8_t error, uint32_t now) {
     s->position = get16(ram + DXL_POSITION - FIRST_READ);
     s->present_speed = get16(ram + DXL_PRESENT_SPEED - FIRST_READ);
     s->load = get16(ram + DXL_LOAD - FIRST_READ);
@@ -37,6 +38,7 @@ static void keep(struct servo *s, const uint8_t *ram, uint8_t error) {
     s->heat = ram[DXL_HEAT - FIRST_READ];
     s->error = error;
     s->missed = s->garbled = 0;
+    s->heard = now;
     s->fresh = true;
 }
 
@@ -61,11 +63,20 @@ static void verify_goal(struct robot *r, uint32_t j, const uint8_t *ram) {
     r->send_goals = true;
 }
 
-/* Margins, slopes and punch are as they were when torque went on; what a broken packet changed is put back. */
+/* Margins, slopes and punch are as they were when torque went on, and the torque limit is what it should be now; what a broken packet
+   or the first ramp has changed is put back. */
 static void restore_settings(struct robot *r, uint32_t j, const uint8_t *ram) {
     const uint8_t *kept = r->servo[j].settings;
     uint8_t id = table_id(playing(r), j);
     const struct { uint8_t address, count, at; } part[2] = {{DXL_CW_MARGIN, 4, 0}, {DXL_PUNCH, 2, 4}};
+    uint16_t limit = torque_limit(r, j), found = get16(ram + DXL_TORQUE_LIMIT - FIRST_READ);
+    if (!r->servo[j].known) return;
+    if (found != limit && found != 0) { /* 0 is the servo's own alarm */
+        uint8_t value[2];
+        put16(value, limit);
+        bus_ask(&r->bus, dxl_write(r->bus.tx, id, DXL_TORQUE_LIMIT, value, 2), DXL_OVERHEAD, BUS_TIMEOUT_MS, r->now);
+        return;
+    }
     for (uint32_t k = 0; k < 2; k++)
         for (uint32_t i = 0; i < part[k].count; i++)
             if (ram[part[k].address - FIRST_READ + i] != kept[part[k].at + i]) {
@@ -75,20 +86,24 @@ static void restore_settings(struct robot *r, uint32_t j, const uint8_t *ram) {
             }
 }
 
-static void keep_settings(struct servo *s, const uint8_t *ram) {
+static void keep_settings(struct servo *s, const uint8_t *all) {
+    const uint8_t *ram = all + FIRST_READ;
+    s->known = true;
+    s->torque_limit = get16(all + DXL_MAX_TORQUE);
     for (uint32_t k = 0; k < 4; k++) s->settings[k] = ram[DXL_CW_MARGIN - FIRST_READ + k];
     for (uint32_t k = 0; k < 2; k++) s->settings[4 + k] = ram[DXL_PUNCH - FIRST_READ + k];
 }
 
 static void good(struct robot *r, uint32_t j, const uint8_t *ram, uint8_t error) {
     struct servo *s = &r->servo[j];
-    keep(s, ram, error);
+    keep(s, ram, error, r->now);
     count_alarms(s, ram);
     if (torque_on(r)) {
         verify_goal(r, j, ram);
         if (torque_on(r) && !reserved(r, POSE_GUARD_MS)) restore_settings(r, j, ram);
     } else if (r->state == STATE_LIMP) {
         s->off = ram[0] == 0;
+        if (s->off) restore_settings(r, j, ram);
     }
 }
 
@@ -101,7 +116,8 @@ static uint8_t objection(const struct robot *r, uint32_t j, const uint8_t *all, 
     if (cw > table_low(t, j) + LIMIT_SPREAD || ccw + LIMIT_SPREAD < table_high(t, j)) return REASON_NARROW_LIMITS;
     if (error & DXL_ERROR_OVERLOAD || get16(all + DXL_TORQUE_LIMIT) == 0) return REASON_OVERLOAD;
     if (error & DXL_ERROR_HEAT || all[DXL_HEAT] >= HOT_CELSIUS) return REASON_HOT;
-    if (r->check_pass == 1 && distance(get16(all + DXL_POSITION), s->position) > CHECK_SPREAD) return REASON_MOVED_BY_HAND;
+    if (r->check_pass == 2 && get16(all + DXL_TORQUE_LIMIT) != torque_limit(r, j)) return REASON_GOAL_REFUSED;
+    if (r->check_pass >= 1 && distance(get16(all + DXL_POSITION), s->position) > CHECK_SPREAD) return REASON_MOVED_BY_HAND;
     return REASON_NONE;
 }
 
@@ -127,15 +143,20 @@ static void check_answer(struct robot *r, bool right, uint8_t trouble) {
     const uint8_t *all = r->bus.rx + 5;
     uint32_t j = r->turn;
     uint8_t against = right ? objection(r, j, all, r->bus.rx[4]) : trouble;
+    if (!right && booting(r)) return; /* asked again until it has started */
     if (against) {
         r->tries++;
+        r->send_limits = against == REASON_GOAL_REFUSED;
         if (r->tries >= CHECK_TRIES) enter(r, STATE_LIMP, against, table_id(playing(r), j));
         return;
     }
-    keep(&r->servo[j], all + FIRST_READ, r->bus.rx[4]);
-    keep_settings(&r->servo[j], all + FIRST_READ);
+    keep(&r->servo[j], all + FIRST_READ, r->bus.rx[4], r->now);
+    keep_settings(&r->servo[j], all);
     advance(r);
-    if (r->turn == 0 && ++r->check_pass == 2) check_over(r);
+    if (r->turn) return;
+    r->check_pass++;
+    if (r->check_pass == 2) r->send_limits = true; /* the third time it is seen whether they have them */
+    if (r->check_pass == 3) check_over(r);
 }
 
 static void bad(struct robot *r, uint32_t j, bool noise) {
@@ -145,7 +166,7 @@ static void bad(struct robot *r, uint32_t j, bool noise) {
         r->garbled_row++;
         r->noise = true;
     }
-    if (r->failed_row > 2u * r->joints) {
+    if (r->failed_row > FAILED_ROW && r->failed_row > r->joints) {
         react(r, 2u * r->garbled_row > r->failed_row ? REASON_BABBLE : REASON_DEAD_SUPPLY, 0xFF);
         r->failed_row = r->garbled_row = 0;
     }
@@ -156,14 +177,13 @@ static void bad(struct robot *r, uint32_t j, bool noise) {
     advance(r);
 }
 
-/* After a round: no pause before every goal is known to be there; torque off is told again to whoever is not known to be. */
+/* After a round: no pause before every goal is known to be there. */
 static void look_again(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
         if (r->round_over && torque_on(r) && !r->servo[j].verified && r->servo[j].missed == 0) {
             r->round_over = false;
             r->sweep_started = r->now;
         }
-        if (r->state == STATE_LIMP && !r->servo[j].off) r->send_release = true;
     }
 }
 

@@ -4,7 +4,7 @@
 
 #include "bytes.h"
 
-enum { REMOTE_U = 1, REMOTE_1 = 16 };
+enum { REMOTE_U = 1, REMOTE_1 = 16, REMOTE_6 = 512 };
 
 struct remote {
     uint8_t got[6], count;

@@ -5,6 +5,7 @@ void robot_init(struct robot *r, const uint8_t *built_in, uint32_t size, uint8_t
     memset(r, 0, sizeof *r);
     upload_init(&r->upload, built_in);
     r->cause = cause;
+    r->state = cause == REASON_POWER_ON ? STATE_LIMP : STATE_STILL;
     r->table_fault = (uint8_t)table_check(built_in, size);
     if (r->table_fault) {
         enter(r, STATE_STILL, REASON_BAD_TABLE, 0xFF);
@@ -18,17 +19,25 @@ void robot_init(struct robot *r, const uint8_t *built_in, uint32_t size, uint8_t
 }
 
 void enter(struct robot *r, uint8_t state, uint8_t reason, uint8_t servo) {
+    if (state == STATE_CHECK) r->came_from = r->state;
+    r->entered = r->now;
     r->state = state;
     r->reason = reason;
     r->servo_named = servo;
     r->state_told = false;
     if (state == STATE_CHECK || state == STATE_LIMP || state == STATE_STILL) read_begin(r);
-    if (state == STATE_CHECK) r->check_for = STATE_RAMP;
+    if (state == STATE_CHECK) {
+        r->check_for = STATE_RAMP;
+        r->gentle = true;
+    }
+    if (state == STATE_NEUTRAL || state == STATE_LIMP) r->gentle = false;
     if (state == STATE_LIMP) release(r);
 }
 
 static void answer(struct robot *r) {
     r->bus.done = false;
+    __asm volatile("" ::: "memory"); /* what an interrupt has put there is not looked at before */
+    bus_align(&r->bus);
     if (r->state == STATE_BRIDGE)
         bridge_answer(r);
     else if (r->sending_read)
@@ -37,7 +46,10 @@ static void answer(struct robot *r) {
 }
 
 static void next(struct robot *r) {
-    if (r->joints == 0) return;
+    if (r->joints == 0) {
+        if (r->send_release) motion_send(r);
+        return;
+    }
     if (r->state == STATE_BRIDGE) {
         bridge_send(r);
         return;
@@ -58,6 +70,8 @@ static void finish_upload(struct robot *r) {
 
 void robot_step(struct robot *r, uint32_t now) {
     r->now = now;
+    if (!r->running) r->began = r->entered = now;
+    r->running = true;
     if (r->bus.done) answer(r);
     if (r->ticked != now) {
         r->ticked = now;

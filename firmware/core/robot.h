@@ -26,7 +26,7 @@ enum reason {
     REASON_NONE, REASON_POWER_ON, REASON_RESET_PIN, REASON_WATCHDOG, REASON_SOFTWARE, REASON_BROWN_OUT, REASON_BUTTON,
     REASON_REMOTE, REASON_LINK, REASON_ENDED, REASON_SILENT, REASON_GARBLED, REASON_WRONG_MODEL, REASON_OVERLOAD, REASON_HOT,
     REASON_LOW_BATTERY, REASON_DEAD_SUPPLY, REASON_BABBLE, REASON_NOT_ARRIVED, REASON_GOAL_REFUSED, REASON_NARROW_LIMITS,
-    REASON_HELD, REASON_BRIDGE_SILENT, REASON_BAD_TABLE, REASON_MOVED_BY_HAND, REASONS
+    REASON_HELD, REASON_BRIDGE_SILENT, REASON_BAD_TABLE, REASON_MOVED_BY_HAND, REASON_IDLE, REASONS
 };
 
 enum seating { SEAT_NOT, SEAT_ABOVE, SEAT_DONE }; /* how far the last of the way to neutral has come */
@@ -37,17 +37,21 @@ struct servo {
     uint16_t position, present_speed, load;
     uint8_t volts, heat, error;
     uint8_t settings[6];   /* margins, slopes, punch as they were when torque went on */
+    uint16_t torque_limit; /* what the servo itself begins with: its register of the largest torque */
+    bool known;            /* settings and torque limit were read */
     uint8_t missed;        /* rounds without an answer, one after another */
     uint8_t garbled;       /* of those, with something that was none */
     uint8_t hot, overloaded;
     bool verified;         /* was read to have the goal and speed that were sent last */
     bool off;              /* was read to have torque off since it was told */
     bool fresh;            /* answered in this round */
+    uint32_t heard;        /* when it answered last [ms] */
 };
 
 struct links {
     struct ring rx, tx;
     struct frame_reader reader;
+    uint32_t heard;        /* when its last byte came [ms] */
 };
 
 enum { LINK_PC, LINK_ZIGBEE, LINKS };
@@ -57,6 +61,7 @@ struct bridge {
     bool whole;            /* a packet waits for the bus */
     bool asked;            /* what is under way on the bus is the PC's */
     bool moved;            /* torque or goals went through: silence ends in a ramp */
+    bool off;              /* torque was to be off when it began; those that do not hear yet are told again */
     uint32_t heard;
 };
 
@@ -74,12 +79,17 @@ struct robot {
     uint16_t goals[MAX_JOINTS], speeds[MAX_JOINTS]; /* what was sent last */
     uint32_t joints;
     uint32_t now, ticked;
+    uint32_t began, entered; /* when the program and the present state did [ms] */
+    bool running;
 
     uint8_t state, after, reason, servo_named, cause, table_fault;
     bool state_told;
 
     uint32_t pose, cycle, next_pose; /* of the table that plays */
-    bool send_goals, send_release, sending_read;
+    bool stop_asked, ending; /* it is to end with its stop; that plays */
+    bool send_goals, send_release, send_limits, sending_read;
+    bool gentle;       /* the first way to neutral: torque is limited */
+    uint8_t came_from; /* the state before CHECK */
     uint8_t resends;
     uint32_t ramp_ends;
     uint8_t seating;
@@ -106,15 +116,19 @@ void robot_step(struct robot *r, uint32_t now);
 /* --- what the core's files share --- */
 
 static inline bool torque_on(const struct robot *r) { return r->state >= STATE_RAMP && r->state <= STATE_YIELD; }
+/* Servos that do not answer may still be starting. */
+static inline bool booting(const struct robot *r) { return r->now - r->began < BOOT_MS; }
 static inline const uint8_t *playing(const struct robot *r) { return r->upload.active; }
 
 void enter(struct robot *r, uint8_t state, uint8_t reason, uint8_t servo);    /* robot.c */
-void begin_play(struct robot *r);                                             /* motion.c */
+void begin_play(struct robot *r);
+void play_from_neutral(struct robot *r, uint8_t reason);                                             /* motion.c */
 void ramp_to(struct robot *r, const uint16_t *goals, uint8_t state, uint8_t after);
 void ramp_to_neutral(struct robot *r, uint8_t state, uint8_t after);
 bool motion_send(struct robot *r);
 void motion_round(struct robot *r);
 void release(struct robot *r);
+uint16_t torque_limit(const struct robot *r, uint32_t joint);
 bool reserved(const struct robot *r, uint32_t ms);
 void read_begin(struct robot *r);                                             /* reading.c */
 bool read_next(struct robot *r);
@@ -127,6 +141,7 @@ void commands_tick(struct robot *r);                                          /*
 void commands_bytes(struct robot *r);
 void tell_state(struct robot *r);                                             /* telemetry.c */
 void tell_log(struct robot *r);
+bool reason_light(uint8_t reason, uint32_t now, bool tens);
 void bridge_begin(struct robot *r);                                           /* bridge.c */
 void bridge_feed(struct robot *r, uint8_t byte);
 void bridge_send(struct robot *r);

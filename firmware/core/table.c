@@ -13,7 +13,7 @@ static enum table_fault check_joint(const uint8_t *t, uint32_t j) {
 
 static enum table_fault check_counts(const uint8_t *t) {
     if (table_joints(t) == 0 || table_joints(t) > MAX_JOINTS) return TABLE_JOINTS;
-    if (table_poses(t) == 0) return TABLE_POSES;
+    if (table_start(t) + table_stop(t) >= table_poses(t)) return TABLE_POSES;
     if (table_flags(t) & ~TABLE_STOPS) return TABLE_FLAGS;
     if ((table_flags(t) & TABLE_STOPS) && table_cycles(t) == 0) return TABLE_FLAGS;
     return TABLE_OK;
@@ -22,11 +22,12 @@ static enum table_fault check_counts(const uint8_t *t) {
 enum table_fault table_check_head(const uint8_t *t, uint32_t size) {
     if (size < TABLE_HEAD) return TABLE_SHORT;
     if (get32(t) != TABLE_MAGIC_WORD) return TABLE_MAGIC;
-    if (t[4] != 1) return TABLE_VERSION;
+    if (t[4] != 1u && t[4] != 2u) return TABLE_VERSION;
+    if (size < table_head(t)) return TABLE_SHORT;
     enum table_fault counts = check_counts(t);
     if (counts) return counts;
     uint32_t n = table_joints(t), poses = table_poses(t);
-    if (table_size(t) != size || size != TABLE_HEAD + TABLE_JOINT * n + (4u + 4u * n) * poses + 4u) return TABLE_SIZE;
+    if (table_size(t) != size || size != table_head(t) + TABLE_JOINT * n + (4u + 4u * n) * poses + 4u) return TABLE_SIZE;
     for (uint32_t j = 0; j < n; j++) {
         enum table_fault fault = check_joint(t, j);
         if (fault) return fault;
@@ -62,12 +63,13 @@ enum table_fault table_fits(const uint8_t *t, const uint8_t *of) {
 }
 
 bool table_reachable(const uint8_t *next, const uint16_t *from) {
+    uint32_t first = table_start(next), dwell = table_dwell(next, first);
+    if (dwell > 4000u) dwell = 4000u; /* time enough for any way */
     for (uint32_t j = 0; j < table_joints(next); j++) {
-        uint32_t speed = table_speed(next, 0, j);
+        uint32_t speed = table_speed(next, first, j);
         if (speed == 0 || speed > FASTEST_SPEED) speed = FASTEST_SPEED;
-        uint32_t dwell = table_dwell(next, 0) < 4000u ? table_dwell(next, 0) : 4000u; /* time enough for any way */
         uint32_t reach = speed * SPEED_MILLI / 1000u * dwell / 1000u;
-        if (distance(from[j], table_goal(next, 0, j)) > reach + reach / 10u + 8u) return false; /* a tenth and 2 degrees late: let it */
+        if (distance(from[j], table_goal(next, first, j)) > reach + reach / 10u + 8u) return false; /* a tenth and 2 degrees late: let it */
     }
     return true;
 }

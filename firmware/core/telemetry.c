@@ -46,3 +46,11 @@ void tell_log(struct robot *r) {
     if (frame_send(&r->link[LINK_PC].tx, FRAME_LOG, (uint8_t)r->joints, p, (uint32_t)(at - p)))
         r->slow_turn = (uint16_t)((r->slow_turn + SLOW_JOINTS) % r->joints);
 }
+
+#define BLINK_MS 256u /* a light is on, or off, for so long */
+
+/* Whether a light that blinks a reason's number is on: first one blinks its tens, then the other its ones; again after 8 seconds. */
+bool reason_light(uint8_t reason, uint32_t now, bool tens) {
+    uint32_t slot = now / BLINK_MS % 32u, from = tens ? 0u : 8u, times = tens ? reason / 10u : reason % 10u;
+    return slot >= from && (slot - from) % 2u == 0 && (slot - from) / 2u < times;
+}

@@ -119,7 +119,7 @@ static void check(const struct sim *sim) {
     const struct robot *r = &sim->r;
     const uint8_t *t = r->upload.active;
     if (r->joints == 0) { /* a broken table is built in */
-        MUST(r->state == STATE_STILL && !r->bus.start && !r->bus.busy);
+        MUST(r->state == STATE_STILL || r->state == STATE_LIMP); /* RELEASE is obeyed all the same */
         return;
     }
     MUST(sim->goal_errors == 0 || sim->flip_to); /* of any bounds that a servo may have been given */
@@ -131,7 +131,7 @@ static void check(const struct sim *sim) {
     MUST(r->state != STATE_PLAY || r->pose <= table_poses(t));
     for (uint32_t j = 0; torque_on(r) && j < r->joints; j++) {
         MUST(r->goals[j] >= table_low(t, j) && r->goals[j] <= table_high(t, j));
-        MUST(r->state == STATE_PLAY || r->state == STATE_NEUTRAL || (r->speeds[j] > 0 && r->speeds[j] <= RAMP_SPEED));
+        MUST(r->speeds[j] > 0 && (r->state == STATE_PLAY || r->speeds[j] <= RAMP_SPEED));
     }
     for (uint32_t link = 0; link < LINKS; link++) MUST(ring_used(&r->link[link].tx) <= RING_BYTES && ring_used(&r->link[link].rx) <= RING_BYTES);
 }

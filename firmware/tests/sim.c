@@ -31,6 +31,7 @@ void sim_boot(struct sim *s, const uint8_t *table, uint32_t size, uint32_t cause
         v->milli = 1000 * (int64_t)(table_neutral(table, j) - 40u + sim_random(s, 80));
         v->heat = 30;
         v->table[HEAT_LIMIT] = 70;
+        put16(v->table + DXL_MAX_TORQUE, 1023);
         v->table[DXL_ID] = table_id(table, j);
         put16(v->table + DXL_MODEL, table_model(table, j));
         put16(v->table + DXL_CW_LIMIT, table_low(table, j));
@@ -99,6 +100,11 @@ static void reply(struct sim *s, struct sim_servo *v, const uint8_t *parameters,
     s->answer_length = n + DXL_OVERHEAD;
     if (v->twin) a[5 + sim_random(s, n + 1u)] ^= (uint8_t)(1u + sim_random(s, 255));
     spoil(s);
+    s->answer_length -= v->lacks;
+    for (uint32_t k = 0; v->lacks && k < s->answer_length; k++) a[k] = a[k + v->lacks];
+    for (uint32_t k = s->answer_length; v->lead && k > 0; k--) a[k - 1u + v->lead] = a[k - 1u];
+    for (uint32_t k = 0; k < v->lead; k++) a[k] = (uint8_t)(k % 2u ? 0xFF : sim_random(s, 256));
+    s->answer_length += v->lead;
     for (uint32_t k = 0; k < s->answer_length; k++)
         if (s->flip_from && sim_random(s, 1000000) < s->flip_from) a[k] ^= (uint8_t)(1u << sim_random(s, 8));
 }
@@ -107,7 +113,7 @@ static void sync_write(struct sim *s, const uint8_t *p, uint32_t parameters) {
     uint32_t n = p[6];
     for (uint32_t k = 2; n && k + n < parameters; k += n + 1u)
         for (uint32_t j = 0; j < s->joints; j++)
-            if (s->servo[j].powered && s->servo[j].table[DXL_ID] == p[5 + k]) store(s, &s->servo[j], p[5], p + 6 + k, n);
+            if (s->servo[j].powered && s->us / 1000u >= s->servo[j].boots_until && s->servo[j].table[DXL_ID] == p[5 + k]) store(s, &s->servo[j], p[5], p + 6 + k, n);
 }
 
 /* What the servos make of the packet that was sent. */
@@ -122,12 +128,12 @@ static void hear(struct sim *s) {
     if (p[4] == DXL_SYNC_WRITE) sync_write(s, p, n - DXL_OVERHEAD);
     for (uint32_t j = 0; j < s->joints; j++) {
         struct sim_servo *v = &s->servo[j];
-        if (!v->powered || (p[2] != v->table[DXL_ID] && p[2] != DXL_BROADCAST)) continue;
+        if (!v->powered || s->us / 1000u < v->boots_until || (p[2] != v->table[DXL_ID] && p[2] != DXL_BROADCAST)) continue;
         if (p[4] == DXL_WRITE) store(s, v, p[5], p + 6, n - DXL_OVERHEAD - 1u);
         if (p[2] == DXL_BROADCAST) continue;
         sense(s, v);
         if (p[4] == DXL_READ && p[5] + p[6] <= (int)DXL_END) reply(s, v, v->table + p[5], p[6]);
-        else if (p[4] <= DXL_RESET) reply(s, v, NULL, 0);
+        else if (p[4] <= DXL_RESET && !v->level1) reply(s, v, NULL, 0);
     }
 }
 
@@ -162,7 +168,10 @@ static void begin_transaction(struct sim *s) {
     if (b->tx[4] == DXL_SYNC_WRITE) note(s, LOG_GOALS);
     if (b->tx[4] == DXL_SYNC_WRITE && s->r.state == STATE_PLAY && s->r.resends == 0) s->poses++;
     if (b->tx[4] == DXL_WRITE && b->tx[5] == DXL_TORQUE && b->tx[6] == 0) note(s, LOG_OFF);
+    s->transactions++;
+    if (s->before) s->before(s);
     hear(s);
+    if (s->after) s->after(s);
     uint64_t sent = s->us + 10u * b->tx_length;
     if (s->babble && b->expected) {
         for (uint32_t k = 0; k < b->expected; k++) s->answer[k] = (uint8_t)sim_random(s, 256);
@@ -171,7 +180,7 @@ static void begin_transaction(struct sim *s) {
     } else if (b->expected == 0) {
         s->busy_until = sent;
     } else if (s->answer_length >= b->expected) {
-        s->busy_until = sent + 520u + sim_random(s, 131) + 10u * s->answer_length;
+        s->busy_until = sent + 520u + sim_random(s, 131u + s->jitter) + 10u * s->answer_length;
     } else {
         s->busy_until = UINT64_MAX; /* the core's time-out ends it */
     }
@@ -181,6 +190,12 @@ static void end_transaction(struct sim *s) {
     struct bus *b = &s->r.bus;
     uint32_t n = s->answer_length < b->expected ? s->answer_length : b->expected;
     memcpy(b->rx, s->answer, n);
+    if (n && n == b->expected) { /* as the chip's layer does */
+        uint32_t more = bus_more(b);
+        if (more > s->answer_length - n) more = s->answer_length - n;
+        memcpy(b->rx + n, s->answer + n, more);
+        n += more;
+    }
     b->rx_length = (uint16_t)n;
     b->stray += s->answer_length - n;
     b->busy = false;
@@ -220,6 +235,10 @@ void sim_send(struct sim *s, uint32_t link, const uint8_t *bytes, uint32_t n) {
         ring_put(&s->r.link[link].rx, bytes[k]);
         if (k % 6u == 5u) sim_run(s, 1); /* 57,600 bit/s: 5.8 bytes a millisecond */
     }
+}
+
+void sim_put(struct sim *s, uint32_t link, const uint8_t *bytes, uint32_t n) {
+    for (uint32_t k = 0; k < n; k++) ring_put(&s->r.link[link].rx, bytes[k]);
 }
 
 uint32_t sim_receive(struct sim *s, uint32_t link, uint8_t *to, uint32_t most) {

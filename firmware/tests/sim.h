@@ -8,6 +8,9 @@ struct sim_servo {
     uint8_t table[DXL_END];
     int64_t milli; /* position, thousandths of a count */
     bool powered, mute, twin, overload;
+    uint32_t boots_until; /* ms: starting, and answers nothing */
+    bool level1;          /* answers reads alone */
+    uint8_t lead, lacks;  /* stray bytes before each answer; first bytes that each answer lacks */
     bool held;     /* something is in its way: it does not move */
     uint8_t heat, drop; /* deg C; 0.1 V less than the others have */
     uint8_t hangs;      /* counts by which its load holds it below its goal */
@@ -26,7 +29,7 @@ struct sim {
     struct sim_servo servo[MAX_JOINTS];
     uint32_t joints;
     uint64_t us, busy_until, rng;
-    uint8_t answer[BUS_BYTES];
+    uint8_t answer[BUS_BYTES + 16];
     uint32_t answer_length;
     uint32_t flip_to, flip_from; /* of a million bytes */
     uint8_t volts;
@@ -38,6 +41,9 @@ struct sim {
     uint32_t wrong_since, wrong_longest; /* ms for which some servo's goal was not the one meant */
     uint8_t state_seen;
     void (*sent)(const struct sim *s); /* called at each transaction, where set */
+    void (*before)(struct sim *s);     /* before the servos hear a packet; after the answer is there */
+    void (*after)(struct sim *s);
+    uint32_t transactions, jitter;     /* jitter: us by which answers come later, at most */
 };
 
 struct sim *sim_new(void);
@@ -46,6 +52,7 @@ void sim_boot(struct sim *s, const uint8_t *table, uint32_t size, uint32_t cause
 void sim_reset(struct sim *s, const uint8_t *table, uint32_t size, uint32_t cause);
 void sim_run(struct sim *s, uint32_t ms);
 void sim_send(struct sim *s, uint32_t link, const uint8_t *bytes, uint32_t n);
+void sim_put(struct sim *s, uint32_t link, const uint8_t *bytes, uint32_t n);
 uint32_t sim_receive(struct sim *s, uint32_t link, uint8_t *to, uint32_t most);
 void sim_frame(struct sim *s, uint32_t link, uint32_t type, const uint8_t *payload, uint32_t n);
 void sim_remote(struct sim *s, uint32_t buttons);

@@ -114,7 +114,7 @@ def test_base_left_out_follows_the_model(tmp_path):
     (changed(takes__0__base="hung"), ["takes[0].base", "free or fixed", "'hung'"]),
     (changed(takes__0__base="free"), ["takes[0].base", "cannot float"]),
     (changed(takes__0__use="test"), ["takes[0].use", "fit or validate"]),
-    (changed(takes=[*session_content()["takes"], *session_content()["takes"]]), ["takes[1].name", "'wave' stands twice"]),
+    (changed(takes=[*session_content()["takes"], *session_content()["takes"]]), ["takes[1].name", "duplicate name 'wave'"]),
     (changed(takes={"name": "wave"}), ["takes", "expected a list"]),
     (changed(takes=[]), ["takes", "at least one"]),
     (changed(robot__model="none.sdf"), ["robot.model", "file not found"]),
@@ -128,9 +128,9 @@ def test_base_left_out_follows_the_model(tmp_path):
     (changed(ground__friction=-1), ["ground.friction", "at least 0"]),
     (changed(predict=[{"name": "p", "base": "fixed"}]), ["predict[0].motion", "either motion"]),
     (changed(predict=[{"name": "p", "motion": "motions/wave.csv", "base": "fixed"}]), ["predict[0].start", "is missing"]),
-    ("format: 1\nformat: 1\n", ["'format' stands twice"]),
+    ("format: 1\nformat: 1\n", ["duplicate key 'format'"]),
     ("format: 1\n  robot: [", ["not valid YAML"]),
-    ("- 1\n", ["expected keys with values"]),
+    ("- 1\n", ["expected a mapping"]),
 ])
 def test_refuses_in_one_line_with_file_and_place(tmp_path, content, words):
     path = write_session(tmp_path, content)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from workbench.identify.rollout_key import rollout_code
+from workbench.identify.rollouts.key import rollout_code
 
 
 @pytest.fixture(scope="session")

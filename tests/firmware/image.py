@@ -53,7 +53,7 @@ class Ear:
             self.bytes += len(values)
             if talker is board:
                 self.packets.append((starts, bytes(values)))
-                if values[4] == 0x83:
+                if values[4:6] == b"\x83\x1e":
                     self.poses.append(self.packets[-1])
             return end
 

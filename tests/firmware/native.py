@@ -34,7 +34,8 @@ class CellRun(ctypes.Structure):
 def compile_core(flags: tuple[str, ...] = ("-O2",)) -> Path:
     """A shared library of core and tests, made anew where a source has changed."""
     source = FIRMWARE
-    sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in ("sim", "cells", "access"))])
+    tests = ("sim", "cells", "access", "rude", "monitor")
+    sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in tests)])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):
         digest.update(path.read_bytes())
@@ -84,6 +85,10 @@ class Sim:
     def send(self, data: bytes, link: int = LINK_PC) -> None:
         """Bytes at 57,600 bit/s."""
         self.lib.sim_send(self.p, link, data, len(data))
+
+    def put(self, data: bytes, link: int = LINK_PC) -> None:
+        """Bytes that are there at once; no time goes by."""
+        self.lib.sim_put(self.p, link, data, len(data))
 
     def remote(self, buttons: int) -> None:
         self.lib.sim_remote(self.p, buttons)

@@ -101,7 +101,7 @@ def test_no_torque_where_a_servo_is_missing_wrong_hot_overloaded_or_double() -> 
         for k in range(15):
             sim = Sim(table, seed=k)
             sim.set(what, value, k)
-            sim.run(800)
+            sim.run(2300)
             assert (sim.get("state"), sim.get("reason")) == (LIMP, reason), what
             assert sim.get("servo_named") == sim.get("id", k)
             assert not any(sim.get("torque", j) for j in range(15))

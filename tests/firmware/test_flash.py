@@ -11,6 +11,7 @@ import pytest
 
 from tests.firmware.image import Robot, image, needs_compiler
 from workbench.device.controller.loader import (
+    ASKED,
     HALF,
     LOADED,
     UNKNOWN,
@@ -18,11 +19,10 @@ from workbench.device.controller.loader import (
     LoadError,
     Loading,
     Transcript,
-    check_image,
-    load_loader_profile,
 )
+from workbench.device.controller.loader_profile import check_image, load_loader_profile
 from workbench.device.link import ControllerState
-from workbench.device.virtual.loader import Controller, EmulatedLoader
+from workbench.device.virtual.loader import POWERED_ON, Controller, EmulatedLoader
 from workbench.files import InputError
 
 PROFILE = load_loader_profile()
@@ -38,9 +38,10 @@ def load(line: EmulatedLoader, data: bytes = IMAGE) -> Transcript:
 def test_a_program_is_loaded_and_started_and_the_transcript_tells_all() -> None:
     line = EmulatedLoader(PROFILE, Controller())
     transcript = load(line)
-    assert (line.controller.runs, line.controller.program) == ("new", IMAGE)
+    assert (line.controller.runs, line.controller.program, line.stays) == ("new", IMAGE, True)
     text = transcript.text
-    for said in ("we send: '#'", "CM-530 loader", "we send: 'LOAD\\r'", "Ready", "the image, 3009 bytes", "Success", "'GO\\r'"):
+    for said in ("we send: '#'", "CM530 Boot loader", "we send: 'LOAD\\r'", "'APP\\r'", "Ready", "the image, 3009 bytes",
+                 "Success", "'GO\\r'"):
         assert said in text
 
 
@@ -49,7 +50,8 @@ def test_the_line_cut_at_each_of_200_places_says_the_truth_and_a_second_run_succ
     load(whole)
     places = sorted({round(k * (whole.crossed - 1) / 199) for k in range(200)})
     assert len(places) == 200
-    truth = {UNTOUCHED: {"factory"}, HALF: {"factory", "nothing"}, UNKNOWN: {"new", "nothing"}, LOADED: {"new"}}
+    truth = {UNTOUCHED: {"factory"}, ASKED: {"factory", "nothing"}, HALF: {"nothing"}, UNKNOWN: {"new", "nothing"},
+             LOADED: {"new"}}
     seen = set()
     for place in places:
         controller = Controller()
@@ -61,13 +63,13 @@ def test_the_line_cut_at_each_of_200_places_says_the_truth_and_a_second_run_succ
         seen.add(caught.value.state)
         load(EmulatedLoader(PROFILE, controller))
         assert (controller.runs, controller.program) == ("new", IMAGE)
-    assert seen >= {UNTOUCHED, HALF, LOADED}
+    assert seen >= {UNTOUCHED, ASKED, HALF, LOADED}
 
 
 def test_silence_another_device_and_unknown_texts_stop_before_anything_is_replaced() -> None:
     for options, said in (
         ({"mute": True}, "silent while it was switched on"),
-        ({"says": {"banner": b"CM-510 loader\r\n-"}}, "which is no CM-530"),
+        ({"says": {"banner": b"CM-510 Boot loader\r\n-"}}, "which is no CM-530"),
         ({"says": {"banner": b"\r\nCM-530 v2\r\n$ "}}, "does not hold"),
     ):
         line = EmulatedLoader(PROFILE, Controller(), **options)
@@ -95,6 +97,38 @@ def test_a_program_that_does_not_speak_is_said_to_be_loaded_but_not_seen() -> No
     assert line.controller.runs == "new"
 
 
+@pytest.mark.parametrize("late", [0.0, 0.016, 0.03, 0.15])
+@pytest.mark.parametrize("deaf", [False, True])
+def test_a_console_that_keeps_what_is_typed_behind_a_slow_adapter_is_no_obstacle(late: float, deaf: bool) -> None:
+    line = EmulatedLoader(PROFILE, Controller(), late=late, deaf=deaf)
+    transcript = load(line)
+    assert (line.controller.runs, line.controller.program, line.stays) == ("new", IMAGE, True)
+    assert line.reopened == deaf
+    assert ("Bad Command" in transcript.text) == (late > 0.02)
+
+
+def test_a_refused_load_is_sent_again_and_then_nothing_is_said_to_be_erased() -> None:
+    line = EmulatedLoader(PROFILE, Controller(), drops=1)
+    load(line)
+    assert line.controller.runs == "new"
+    line = EmulatedLoader(PROFILE, Controller(), drops=2)
+    with pytest.raises(LoadError, match="Bad Command") as caught:
+        load(line)
+    assert (caught.value.state, line.controller.runs) == (UNTOUCHED, "factory")
+
+
+def test_a_program_that_is_first_heard_after_the_port_was_opened_again_has_started() -> None:
+    line = EmulatedLoader(PROFILE, Controller(), starts=lambda program: b"")
+    heard = line.reopen
+
+    def reopen() -> None:
+        heard()
+        line.say(POWERED_ON)
+
+    line.reopen = reopen  # type: ignore[method-assign]
+    assert Loading(line, PROFILE, Transcript(now=lambda: line.time)).run(IMAGE).state == ControllerState.CHECK
+
+
 @pytest.mark.parametrize(("data", "said"), [
     (b"", "0 bytes"), (b"\0" * 600_000, "600000 bytes"), (b"#!/bin/sh\n" + b"x" * 400, "no stack and start"),
     (struct.pack("<II", 0x20010000, 0x08000101) + b"\0" * 400, "no stack and start"),
@@ -106,7 +140,7 @@ def test_a_wrong_image_is_refused(data: bytes, said: str) -> None:
 
 def test_a_loader_file_with_a_fault_is_named(tmp_path: Path) -> None:
     good = Path(PROFILE.source).read_text()
-    for change, said in (("rate: 57600", "'rate' is missing"), ('ready: ["Ready"]', "'ready' is missing")):
+    for change, said in (("rate: 57600", "'rate' is missing"), ('ready: ["Ready", "ready"]', "'ready' is missing")):
         path = tmp_path / "loader.yaml"
         path.write_text(good.replace(change, ""))
         with pytest.raises(InputError, match=said):
@@ -148,7 +182,8 @@ class Babbler(EmulatedLoader):
 
 
 def test_whatever_a_loader_says_it_ends_and_a_claim_of_success_needs_the_program_itself() -> None:
-    truth = {UNTOUCHED: {"factory"}, HALF: {"factory", "nothing"}, UNKNOWN: {"new", "nothing", "factory"},
+    truth = {UNTOUCHED: {"factory"}, ASKED: {"factory", "nothing"}, HALF: {"factory", "nothing"},
+             UNKNOWN: {"new", "nothing", "factory"},
              LOADED: {"new", "nothing", "factory"}, "started": {"new"}}
     ends = set()
     for seed in range(300):
@@ -173,6 +208,8 @@ def test_flash_builds_and_says_what_it_would_do_and_needs_a_yes(tmp_path: Path, 
     assert main(["flash", walk, "--dry-run", "--cycles", "5", "--out", str(tmp_path)]) == 0
     out = capsys.readouterr().out
     assert "RoboPlus Manager" in out
+    assert "The robot will move" in out
+    assert "ends after 5 cycles" in out
     assert "no port was opened" in out
     assert main(["flash", walk, "--out", str(tmp_path)]) == 2
     assert "say yes" in capsys.readouterr().err

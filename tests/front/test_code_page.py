@@ -15,7 +15,7 @@ QUESTIONS = {
     "how do two names tie": ("identify/results/findings.py", "def tie"),
     "what is the numerical floor": ("identify/preparation.py", "floor = _apart"),
     "where does a new recording format go": ("recording/formats/", "FORMAT"),
-    "where are rollouts remembered": ("identify/rollouts.py", "def _keep"),
+    "where are rollouts remembered": ("identify/rollouts/memory.py", "def keep"),
     "where are the report's sentences made": ("view/report/words.py", "def in_words"),
     "who chooses the next experiment": ("experiment/design.py", "def design_experiment"),
     "what must a plug-in effect say": ("effects/base.py", "class Effect"),

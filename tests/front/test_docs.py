@@ -19,7 +19,7 @@ from workbench.effects.registry import known_effects
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-OUTSIDE = ("README.md", "CONTRIBUTING.md", "studies/README.md", "studies/history.md")
+OUTSIDE = ("README.md", "CONTRIBUTING.md", "studies/README.md")
 PAGES = [*(ROOT / p for p in OUTSIDE), *sorted(DOCS.glob("*.md"))]
 BLOCK = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SNIPPET = re.compile(r'^--8<-- "(.+)"$', re.MULTILINE)

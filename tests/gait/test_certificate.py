@@ -16,12 +16,12 @@ from workbench.gait.optimize import shape_from, write_gait
 from workbench.gait.request import Request
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
-from workbench.motion import load_motion
+from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,
-                         variants=("2 ms", "1 ms"))
+                         variants=("2 ms", "1 ms"), n_jobs=1, watched=8)
 
 
 @pytest.fixture(scope="module")
@@ -52,20 +52,29 @@ def test_says_what_there_is_to_say(made):
     assert c.draws["count"] == 2
     assert {m.where for m in c.margins if m.name == "RMS torque"} == set(machine.model.joints)
     assert {m.name for m in c.margins} >= {"range", "moving speed", "reach", "self-contact", "RMS torque", "torque-speed line",
-                                           "supply current", "tilt", "falls", "bus time", "poses"}
+                                           "supply current", "tilt", "falls", "bus time", "poses",
+                                           "way back to its cycle"}
     assert set(c.floor["speed"]) == {"2 ms", "1 ms"}
     assert c.other_engine["speed kept"] == pytest.approx(1.0, abs=1e-9)  # the other engine is this one
+    back = c.cycle["cycles until it is back"]
+    assert {"from neutral", "at once", "a pose got lost", "a push to the left", "from another table"} <= set(back)
+    assert all(n is not None and n <= 5 for n in back.values())
+    assert c.cycle["heading deg, standard deviation"] < 1.0
     assert c.ways["at rest"]["largest angle off neutral deg"] < 6
     assert shape_from(json.loads((folder / NAME).read_text())["shape"]) == table.shape
     assert "a claim about the model" in json.loads((folder / NAME).read_text())["claim"]
     assert c.as_text() == certified.certificate.as_text()
 
 
-def test_is_bound_to_its_tables_and_its_robot(made):
+def test_is_bound_to_its_table_and_its_robot(made, tmp_path):
     folder, machine, _, _ = made
-    for name in ("gait.csv", "start.csv", "stop.csv"):
-        assert has_mark(folder / name)
-        check_certificate(folder / name, load_motion(folder / name), machine.model)
+    assert has_mark(folder / "gait.csv")
+    check_certificate(folder / "gait.csv", load_motion(folder / "gait.csv"), machine.model)
+    cycle_alone = tmp_path / "gait.csv"
+    save_motion(Motion.from_table(load_motion(folder / "gait.csv").as_table().part("loop")), cycle_alone)
+    (tmp_path / NAME).write_text((folder / NAME).read_text())
+    with pytest.raises(InputError, match="another table's"):  # certified from power-on, not the cycle thrown in at full speed
+        check_certificate(cycle_alone, load_motion(cycle_alone), machine.model)
     other = replace(machine.model, ground=replace(machine.model.ground, friction=0.4))
     with pytest.raises(InputError, match="another robot"):
         check_certificate(folder / "gait.csv", load_motion(folder / "gait.csv"), other)
@@ -73,9 +82,9 @@ def test_is_bound_to_its_tables_and_its_robot(made):
 
 def other_goal(path):
     lines = path.read_text().splitlines()
-    cells = lines[3].split(",")
-    cells[1] = str(float(cells[1]) + 2.0)
-    path.write_text("\n".join([*lines[:3], ",".join(cells), *lines[4:]]) + "\n")
+    cells = lines[5].split(",")
+    cells[2] = str(float(cells[2]) + 2.0)
+    path.write_text("\n".join([*lines[:5], ",".join(cells), *lines[6:]]) + "\n")
 
 
 def tampered(folder, to, change):
@@ -100,6 +109,14 @@ def test_export_refuses_what_has_no_valid_certificate_unless_forced(made, tmp_pa
     assert (tmp_path / "out/pos.txt").is_file()
 
 
+@pytest.mark.parametrize("verb", [("run",), ("run", "--upload"), ("play", "--port", "virtual"), ("flash", "--dry-run")])
+def test_no_verb_moves_a_robot_by_what_lacks_its_certificate(made, tmp_path, capsys, verb):
+    path = tampered(made[0], tmp_path, lambda f: (f / NAME).unlink())
+    said = refused(capsys, verb[0], str(path), *verb[1:], "--out", str(tmp_path / "out"))
+    assert "the certificate is missing; --force goes on all the same" in said
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_broken_limit_is_named(made, tmp_path):
     folder, machine, _, certified = made
     broken = replace(certified.certificate, kept=False, margins=tuple(
@@ -118,5 +135,5 @@ def test_the_robotis_walk_needs_none(capsys, tmp_path):
 
 
 def test_nan_is_null():
-    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {})
+    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {}, {})
     assert json.loads(empty.as_text())["nominal"] == {"slip m/s": None, "rms": 0.5}

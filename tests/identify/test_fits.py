@@ -120,7 +120,8 @@ def test_what_a_jury_remembers_it_does_not_simulate_again(worn, tmp_path):
     first.residuals([RolloutRequest(session.model, (0,))])
     again = RolloutEvaluator(search.evaluator.evidence, CONFIG, n_jobs=1, memory=tmp_path)
     residual = again.residuals([RolloutRequest(session.model, (0,))])[0][0]
-    assert (first.rollouts, again.rollouts) == (1, 0)
+    assert (first.memory.played, again.memory.played) == (1, 0)
+    assert first.rollouts == again.rollouts == 1
     np.testing.assert_array_equal(residual, nominal.residuals[0])
 
 

@@ -9,8 +9,8 @@ import pytest
 import workbench.simulation.compiled
 from tests.gap_sessions import record_arm
 from workbench.compare.session import load_session
-from workbench.identify import rollout_key
 from workbench.identify.diagnosis import diagnose_session
+from workbench.identify.rollouts import key as rollout_key
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.compiled import run_compiled
 from workbench.view.report.diagnosis import diagnosis_report
@@ -34,7 +34,7 @@ def test_a_diagnosis_says_which_engine_it_stands_on(session, tmp_path, monkeypat
             raise AssertionError("a rollout that was remembered")
         return []
 
-    monkeypatch.setattr("workbench.identify.rollouts.simulate_stream", no_more)
+    monkeypatch.setattr("workbench.identify.rollouts.evaluator.simulate_stream", no_more)
     again = diagnose_session(session, n_jobs=1, memory=tmp_path).diagnosis
     assert again.verdict == told.verdict
     monkeypatch.setattr(rollout_key, "rollout_code", lambda: "another version")

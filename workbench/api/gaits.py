@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
@@ -41,12 +41,14 @@ class GaitResult:
 
     @property
     def motion(self) -> Motion:
-        """The gait as poses: times (K,) [s], angles (K, n) [rad]. InputError where there is none."""
-        return Motion.from_table(self._found()[0].cycle)
+        """The gait as poses from neutral to neutral, in sections: times (K,) [s], angles (K, n) [rad]; its cycles are
+        those of the certificate. InputError where there is none."""
+        table, certified = self._found()
+        return replace(Motion.from_table(table.whole), cycles=certified.cycles)
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:
-        """Writes gait.csv, start.csv, stop.csv, certificate.json and report.html; returns their paths. InputError where no gait
-        was found, or they cannot be written."""
+        """Writes gait.csv, certificate.json and report.html; returns their paths. InputError where no gait was found, or they
+        cannot be written."""
         Path(folder).mkdir(parents=True, exist_ok=True)
         written = write_gait(Path(folder), *self._found())
         return [write_gait_page(Path(folder), self.model, self.optimized), *written]

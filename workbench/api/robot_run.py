@@ -15,7 +15,7 @@ from workbench.device.capture import Capture, Recorder, VirtualLink, VirtualMoti
 from workbench.device.capture.background import BackgroundRecording
 from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
-from workbench.device.tables.table_file import TableFile, bounds_of
+from workbench.device.tables.table_file import table_file
 from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_registers import save_registers
@@ -80,7 +80,7 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
     tell = progress or (lambda what, done: None)
     commands, name = motion.commands(cycles), motion.name
     table = motion.as_table()
-    file = TableFile(table, bounds_of(table, model), cycles, True)
+    file = table_file(table, model, cycles, True)
     background = None if recorder is None else BackgroundRecording(recorder, folder / f"{name}.csv")
     if background is not None:
         background.start()

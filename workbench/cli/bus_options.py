@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from workbench.cli.options import load_model
@@ -22,11 +23,13 @@ def add_bus(parser: argparse.ArgumentParser, default: str | None = None) -> None
     said = default or "the only USB adapter"
     parser.add_argument("--port", metavar="PORT", default=default,
                         help=f"serial port of the U2D2, USB2Dynamixel or CM-530 bridge, or `{VIRTUAL}` (default: {said})")
-    parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S", help="of the servos' bus (default: 1000000)")
-    parser.add_argument("--echo", action="store_true", help="the adapter is known to hear what it sends itself")
+    parser.add_argument("--rate", type=int, default=1_000_000, metavar="BIT/S",
+                        help="baud rate of the servo bus (default: 1000000)")
+    parser.add_argument("--echo", action="store_true", help="the adapter echoes its own transmissions")
     parser.add_argument("--bridge", action="store_true", help="the port is the PC link of a CM-530 with the workbench's program")
     parser.add_argument("--robot", metavar="FILE",
-                        help=f"with --port {VIRTUAL}: the robot as it really is, a model.yaml with effects (default: the model)")
+                        help=f"with --port {VIRTUAL}: ground-truth model of the emulated robot: a model.yaml "
+                             "with effects (default: the model)")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="the robot stands on its feet, or is held")
 
 
@@ -97,6 +100,8 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
         return
     if args.image is None:
         raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+    if find_spec("unicorn") is None:
+        raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     try:
         image = Path(args.image).read_bytes()
     except OSError as e:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def add_yes(parser: argparse.ArgumentParser) -> None:
     """--yes: long work is meant."""
     parser.add_argument("--yes", action="store_true",
-                        help="simulate that long (required beyond ten minutes of the robot's time)")
+                        help="allow simulations longer than ten minutes of robot time")
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
@@ -60,6 +60,22 @@ def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool
     if (text := slow_poses(motion)) and not yes:
         raise InputError(motion.source, f"{text} Say --yes if it is meant")
     _ask(motion.source, motion.seconds(cycles), yes)
+
+
+def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
+    """Of a motion that `optimize` made, whether its certificate speaks for it on this robot; InputError where it does not, unless
+    `force`, which warns. Every verb that moves a robot, or writes what moves one, asks this first."""
+    from workbench.files import InputError
+    from workbench.gait.certificate import check_certificate, has_mark
+
+    if not has_mark(path):
+        return
+    try:
+        check_certificate(path, motion, model)
+    except InputError as e:
+        if not force:
+            raise InputError(e.source, f"{e.problem}; --force goes on all the same") from None
+        warn(verb, [str(e)])
 
 
 def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:

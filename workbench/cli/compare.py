@@ -22,11 +22,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("a", metavar="SESSION|A", help="session.yaml or its folder; or a recording, motion or rollout")
     parser.add_argument("b", metavar="B", nargs="?", help="what to compare A with: a recording, motion or rollout")
     add_model(parser, "the session's own; of two files, the bundled puppy")
-    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of the simulation")
-    parser.add_argument("--base", choices=("free", "fixed"), default="free", help="of A and B; a session says it itself")
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
+                        help="foot-ground contact model (default: point)")
+    parser.add_argument("--base", choices=("free", "fixed"), default="free",
+                        help="base of A and B; a session specifies its own (default: free)")
     add_cycles(parser, 1)
     add_yes(parser)
-    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_out(parser)
     parser.set_defaults(run=run)
 

@@ -30,14 +30,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     add_yes(parser)
     add_out(parser)
-    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
-    parser.add_argument("--memory", metavar="DIR", help="keep every rollout there, for other diagnoses of the same recordings "
-                        "(default: beside --out, until this one ends)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
+    parser.add_argument("--memory", metavar="DIR", help="directory for cached rollouts, shared by diagnoses of the same takes "
+                        "(default: next to --out, deleted on success)")
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
-                        help="do not look for this effect (a name of docs/effects.md), because you know that it is not there; "
-                        "may be given several times")
+                        help="exclude this effect (a name from docs/effects.md) from the search, because you know it is absent; "
+                        "repeatable")
     parser.set_defaults(run=run)
 
 

@@ -10,7 +10,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "doctor",
-        help="say what this machine has, lacks, and how to get it",
+        help="check this installation and suggest fixes",
         description="Looks at versions, cores, memory, disk, the cache of compiled rollouts, Meshcat, the second engine and "
         "shell completion, and says how to get what is missing. Exits with 2 where something keeps the workbench from working.")
     parser.add_argument("--json", action="store_true", help="print JSON")

@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
-from workbench.cli.check import add_yes, check_model, check_motion
+from workbench.cli.check import add_yes, check_certificate_of, check_model, check_motion
 from workbench.cli.options import add_cycles, add_model, add_out, load_model
-
-if TYPE_CHECKING:
-    from workbench.files import InputError
-    from workbench.motion import Motion
-    from workbench.robot import RobotModel
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -39,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.device import export
+    from workbench.device.tables.firmware_tables import check_servos
     from workbench.motion import load_motion
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
@@ -48,33 +43,16 @@ def run(args: argparse.Namespace) -> int:
     cycles = motion.often(args.cycles, 3)
     check_model("export", model)
     check_motion("export", motion, cycles, args.yes)
-    motion.as_table()  # refused before the simulation
-    uncertified = uncertified_by(args.motion, motion, model)
-    if uncertified is not None and not args.force:
-        raise uncertified
+    check_servos(motion, model)  # refused before the simulation
+    motion.as_table()
+    check_certificate_of("export", args.motion, motion, model, args.force)
     base = "fixed" if model.kinematics.fixed_to_world else "free"
     with output_directory(args.out) as folder, Progress("export", stages=("simulating", "writing")) as progress:
         take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)
-    if uncertified is not None:
-        print(f"workbench export: warning: {uncertified}", file=sys.stderr)
     for violation in exported.violations:
         print(f"workbench export: warning: {violation}", file=sys.stderr)
     print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}"
           + (f"; no motion.table: {exported.no_binary}" if exported.no_binary else ""))
     return 0
-
-
-def uncertified_by(path: str, motion: Motion, model: RobotModel) -> InputError | None:
-    """What is wrong with the certificate of a motion that `optimize` made."""
-    from workbench.files import InputError
-    from workbench.gait.certificate import check_certificate, has_mark
-
-    if not has_mark(path):
-        return None
-    try:
-        check_certificate(path, motion, model)
-    except InputError as e:
-        return e
-    return None

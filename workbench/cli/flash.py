@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_model, load_model, positive
 
 
@@ -17,13 +18,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="build a motion into the controller's program, load and start it",
         description="Turns a motion (CSV, .mtn, or a binary .table) into a table, builds the CM-530's program with it, "
         "loads that through the controller's own loader and starts it. It replaces the program that is there, "
-        "says so, and goes on only at a yes.",
+        "says so, and goes on only at a yes. Then the robot moves: it goes to neutral.",
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
     parser.add_argument("--port", metavar="PORT", help="serial port of the PC link (default: the only one there is)")
-    parser.add_argument("--cycles", type=positive, metavar="N",
-                        help="stop in neutral after N cycles (default: go on until stopped)")
+    how_long = parser.add_mutually_exclusive_group()
+    how_long.add_argument("--cycles", type=positive, metavar="N",
+                          help="stop in neutral after N cycles (default: the motion's own, or 10)")
+    how_long.add_argument("--endless", action="store_true", help="go on until a person stops it")
     parser.add_argument("--force", action="store_true", help="although a limit is broken, with a warning")
     parser.add_argument("--yes", action="store_true", help="do not ask before the program in the controller is replaced")
     parser.add_argument("--dry-run", action="store_true", help="do all but open the port, and say what would be sent")
@@ -35,9 +38,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Builds, asks, loads, keeps the transcript."""
-    from workbench.cli.export import uncertified_by
     from workbench.cli.progress import Progress
-    from workbench.device.controller.loader import FACTORY, LoadError, Loading, Transcript, load_loader_profile
+    from workbench.device.controller.loader import FACTORY, MOVES, LoadError, Loading, Transcript
+    from workbench.device.controller.loader_profile import load_loader_profile
     from workbench.device.controller.program import build_program
     from workbench.files import InputError
     from workbench.files.reading import write_whole
@@ -47,23 +50,23 @@ def run(args: argparse.Namespace) -> int:
     with Progress("flash") as progress:
         progress("building")
         model = load_model(args.model, args.packages)
-        if Path(args.motion).suffix != ".table" and not args.force:
-            uncertified = uncertified_by(args.motion, load_motion(args.motion, model), model)
-            if uncertified is not None:
-                raise uncertified
-        program = build_program(args.motion, model, profile, args.out, args.cycles, args.force)
+        if Path(args.motion).suffix != ".table":
+            check_certificate_of("flash", args.motion, load_motion(args.motion, model), model, args.force)
+        program = build_program(args.motion, model, profile, args.out, args.cycles, args.force, args.endless)
     for violation in program.violations:
         print(f"workbench flash: warning: {violation}", file=sys.stderr)
     table = program.table.table
-    print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints")
+    ends = f"ends after {program.table.cycles} cycles" if program.table.stops else "goes on until a person stops it"
+    print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints; it {ends}")
     if not profile.confirmed:
-        print(f"workbench flash: warning: no text in {profile.source} was seen on a real controller yet; it stops at the first "
-              "that differs, and the transcript shows it", file=sys.stderr)
+        print(f"workbench flash: warning: the workbench has seen no text in {profile.source} on a real controller yet, and "
+              "nobody has published those after LOAD; it stops at the first that differs (see the transcript)", file=sys.stderr)
     print(FACTORY)
+    print(MOVES)
     if args.dry_run:
         print(f"dry run: would hold '{profile.key.decode()}' at {profile.rate} bit/s until the loader's prompt, send "
               f"{profile.load.decode()}, {len(program.image)} bytes{' and their sum' if profile.byte_sum else ''}, "
-              f"{profile.start.decode()}, and wait for the program's word; no port was opened")
+              f"{profile.keep.decode()} and {profile.start.decode()}, and wait for the program's word; no port was opened")
         return 0
     if not args.yes and not _agreed():
         raise InputError("flash", "not loaded: say yes, or give --yes")
@@ -85,7 +88,9 @@ def run(args: argparse.Namespace) -> int:
 def _line(port: str | None, rate: int):  # type: ignore[no-untyped-def]  # its module is imported late
     from workbench.device.controller.serial_line import SerialLine, default_port
 
-    return SerialLine(port or default_port(), rate)
+    line = SerialLine(port or default_port(), rate)
+    line.lines_low()
+    return line
 
 
 def _agreed() -> bool:

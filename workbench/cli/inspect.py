@@ -12,7 +12,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "inspect",
-        help="say what a recording, motion, model, session or table is",
+        help="identify and check a file",
         description="Says what a file is, recognised by its content: kind, version, units, rate, frames, assets or joints, "
         "share of gaps, and what is wrong with it. FILE is a recording (Motive CSV, joint log, BAM log, SAGE), "
         "a motion table, a .mtn file, a rollout, a robot model (SDF, URDF or package://puppy/puppy.sdf), "

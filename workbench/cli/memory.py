@@ -12,11 +12,9 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
-from workbench.cli.output import runs
 from workbench.compare.session import Session
 from workbench.files import InputError
-from workbench.files.numerals import whole_of
-from workbench.identify.rollout_key import rollout_code
+from workbench.identify.rollouts.key import rollout_code
 
 STAYS = 16
 """Letters of the digest in the folder's name."""
@@ -41,10 +39,6 @@ def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> I
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as e:
         raise InputError(out, f"cannot be written ({e.strerror})") from None
-    for part in folder.glob("*.part.npy"):
-        process = whole_of(part.name.split(".")[-3])
-        if process is None or not runs(process):
-            part.unlink(missing_ok=True)
     try:
         yield folder
     except InputError:

@@ -21,29 +21,29 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "optimize",
         help="search for a gait that the servos can follow, as a certified table",
         description="Searches for a gait as the table of poses that the firmware plays, within the limits of joints, servos and "
-        "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv, start.csv (from neutral into "
-        "it), stop.csv, certificate.json and a page. A request that cannot be met says which limit binds, and exits with 2. "
-        "A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
-    parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as can be (default: max)")
+        "supply, on random variants of the robot (an ensemble), and certifies it: gait.csv (from neutral into the "
+        "gait, the cycle, and back), certificate.json and a page. A request that cannot be met says which limit binds, and exits "
+        "with 2. A run that was stopped continues when it is called again with the same arguments, and ends in the same table.")
+    parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as possible (default: max)")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--backward", action="store_true", help="go backwards")
     way.add_argument("--sideways", action="store_true", help="go to the left")
     way.add_argument("--turn", type=_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s")
-    way.add_argument("--arc", type=_positive, metavar="R", help="go round a circle of R m to the left")
+    way.add_argument("--arc", type=_positive, metavar="R", help="follow a circle of radius R m to the left")
     parser.add_argument("--slope", type=_positive, default=0.0, metavar="DEG", help="go uphill")
     parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of what "
                         "full duty gives; ROBOTIS advises a fifth)")
     best = parser.add_mutually_exclusive_group()
     best.add_argument("--least-energy", action="store_true", help="with the least electrical power, at the required speed or at "
                       "that of the ROBOTIS walk")
-    best.add_argument("--smoothest", action="store_true", help="with the least jerk of the base, likewise")
+    best.add_argument("--smoothest", action="store_true", help="minimise base jerk (speed as for --least-energy)")
     best.add_argument("--gentlest", action="store_true", help="with the least RMS torque, likewise")
     parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all point back, as the robot has them")
     parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the gait has to work, as YAML "
                         "(default: the file that ships)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all that is random (default: 0)")
-    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="threads and processes that simulate (default: 2)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_model(parser)
     add_out(parser, default="runs/optimize")
     parser.set_defaults(run=run)

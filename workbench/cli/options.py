@@ -40,7 +40,7 @@ def add_packages(parser: argparse.ArgumentParser) -> None:
 
 def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None:
     """--out: the folder for results."""
-    said = "; is made if need be, other files in it stay"
+    said = "; created if missing, other files in it are kept"
     parser.add_argument(
         "--out", metavar="DIR", type=_folder, required=default is None, default=default and Path(default),
         help=f"folder for the results{said}" + (f" (default: {default})" if default else ""))

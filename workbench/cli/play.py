@@ -5,9 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from workbench.cli.bus_options import add_bus, make_virtual, open_bus
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_cycles, add_model, add_out, load_model
+
+if TYPE_CHECKING:
+    from workbench.device.play import Played
+
+CTRL_C = "Ctrl-C"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -23,7 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     add_model(parser)
     add_cycles(parser, 3)
     parser.add_argument("--hold", action="store_true", help="keep torque on at the end")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--finish", metavar="JOURNAL", help="make the joint log from a NAME.play that was cut short")
     add_out(parser, default="runs/play")
     parser.set_defaults(run=run)
@@ -39,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.files import InputError
     from workbench.motion import load_motion
     from workbench.robot.servo_registers import save_registers
+    from workbench.robot.servo_units import known_units
 
     if (args.motion is None) == (args.finish is None):
         raise InputError(None, "expected either MOTION or --finish JOURNAL")
@@ -48,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
         return 0
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
+    known_units(model, motion.joints)
+    check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)
@@ -63,8 +73,20 @@ def run(args: argparse.Namespace) -> int:
         print(f"workbench play: warning: {departure}", file=sys.stderr)
     if bus.retries:
         print(f"workbench play: warning: {bus.retries.total()} answers had to be requested again", file=sys.stderr)
-    print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late; torque is "
-          f"{'off' if played.released else 'on'}")
+    return _tell(log, played)
+
+
+def _tell(log: Path, played: Played) -> int:
+    """Why it was stopped first, then what there is; the exit code."""
     if played.stopped:
-        print(f"workbench play: stopped: {played.stopped}; torque is off", file=sys.stderr)
-    return 0 if not played.stopped else 130 if played.stopped == "Ctrl-C" else 2
+        print(f"workbench play: stopped: {played.stopped}", file=sys.stderr)
+    if played.log_problem:
+        print(f"workbench play: warning: no joint log: {played.log_problem}", file=sys.stderr)
+    else:
+        print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late")
+    print(f"torque is {'off' if played.released else 'on'}" if not played.unknown else
+          f"workbench play: torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off",
+          file=sys.stderr if played.unknown else sys.stdout)
+    if played.stopped.startswith(CTRL_C):
+        return 130
+    return 2 if played.stopped or played.unknown else 0

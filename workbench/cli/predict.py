@@ -18,10 +18,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("session", metavar="SESSION", help="session.yaml, or its folder")
     parser.add_argument("--model", metavar="M.yaml", help="fitted model (default: the session's own, with nothing added)")
-    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
+                        help="foot-ground contact model (default: point)")
     add_packages(parser)
     add_yes(parser)
-    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_out(parser)
     parser.set_defaults(run=run)
 

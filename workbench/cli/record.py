@@ -18,7 +18,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "until Ctrl-C or --seconds, and writes beside it NAME.capture.json: frames lost, late, doubled and broken, and the "
         "server's clock. While it runs NAME.natnet holds what has come; after a crash --finish makes the take from it.")
     parser.add_argument("host", metavar="HOST", nargs="?", help="name or address of the computer that runs Motive")
-    parser.add_argument("--name", default="take", help="of the take, here and in Motive (default: take)")
+    parser.add_argument("--name", default="take", help="name of the take, here and in Motive (default: take)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="how long (default: until Ctrl-C)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     parser.add_argument("--port", type=int, default=1510, metavar="N", help="Motive's command port (default: 1510)")

@@ -6,6 +6,7 @@ import argparse
 import sys
 
 from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_pc_link
+from workbench.cli.check import check_certificate_of
 from workbench.cli.options import add_cycles, add_model, add_out, load_model, positive
 
 
@@ -26,10 +27,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
                         help="computer that runs Motive (default: the joint log alone; emulated robot: emulated cameras)")
     parser.add_argument("--interface", metavar="ADDRESS", help="this computer's address on that network (default: by the route)")
     add_cycles(parser, 10)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the emulated cameras")
-    parser.add_argument("--force", action="store_true", help="play it although a limit is broken")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed of the emulated cameras (default: 0)")
+    parser.add_argument("--force", action="store_true", help="play it although a limit is broken or its certificate missing")
     parser.add_argument("--diagnose", action="store_true", help="search for the physics that is missing, too")
-    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="processes that simulate (default: 2)")
+    parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
     add_out(parser, default="runs/run")
     parser.set_defaults(run=run)
 
@@ -42,14 +43,18 @@ def run(args: argparse.Namespace) -> int:
     from workbench.compare.compare_session import compare_session
     from workbench.compare.session import load_session
     from workbench.device.capture import Recorder, UdpLink
+    from workbench.device.controller.play import NothingPlayedError
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
+    from workbench.robot.servo_units import known_units
     from workbench.view.report.comparison import write_comparison
 
     model = load_model(args.model, args.packages)
     motion = load_motion(args.motion, model)
     cycles = motion.often(args.cycles, 10)
+    known_units(model, motion.joints)
+    check_certificate_of("run", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
     virtual = make_virtual(args, model)
     recorder = Recorder(UdpLink(args.motive, args.interface)) if args.motive else None
@@ -58,7 +63,11 @@ def run(args: argparse.Namespace) -> int:
         with stop_on_signals() as stop:
             if args.upload:
                 with open_pc_link(args, virtual) as port:
-                    done = run_by_controller(port, model, motion, cycles, args.out, lambda: stop.reason, **options)
+                    try:
+                        done = run_by_controller(port, model, motion, cycles, args.out, lambda: stop.reason, **options)
+                    except NothingPlayedError as e:
+                        print(f"workbench run: {e}", file=sys.stderr)
+                        return 130 if stop.interrupted else 2
             else:
                 with open_bus(args, model, virtual) as bus:
                     done = run_on_robot(bus, model, motion, cycles, args.out, lambda: stop.reason, **options)
@@ -66,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
         if done.played.stopped:
-            return 130 if done.played.stopped == "Ctrl-C" else 2
+            return 130 if done.played.stopped.startswith("Ctrl-C") else 2
         session = load_session(done.session)
         comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
         write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)

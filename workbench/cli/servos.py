@@ -1,4 +1,4 @@
-"""`workbench servos`: what hangs on the bus, against the model."""
+"""`workbench servos`: the servos on the bus, compared with the model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "servos",
-        help="show what hangs on the servos' bus, and every register that differs from the model",
+        help="list the servos on the bus and every register that differs from the model",
         description="Looks for a servo at every ID, and reads all registers of each. Shows who answers, in what state, and what "
         "differs from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing.")
     add_bus(parser)

@@ -18,13 +18,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
-    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point", help="of feet with the ground")
+    parser.add_argument("--contact", choices=("point", "hydroelastic"), default="point",
+                        help="foot-ground contact model (default: point)")
     parser.add_argument("--base", choices=("free", "fixed"), help="walking, or held level on a stand (default: as in the takes "
                         "of the session that the model is of, else free)")
     parser.add_argument("--drive", choices=("servo", "fast_servo", "ideal"), default="servo",
                         help="full servo law; its fast approximation; joints that follow the motion exactly")
     add_cycles(parser, 1)
-    parser.add_argument("--time-step", type=time_step, default=1e-3, metavar="S", help="of the simulation (default: 0.001)")
+    parser.add_argument("--time-step", type=time_step, default=1e-3, metavar="S",
+                        help="simulation time step [s] (default: 0.001)")
     add_yes(parser)
     add_out(parser, default="runs/simulate")
     parser.set_defaults(run=run)

@@ -20,10 +20,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("subject", metavar="MODEL|TAKE|SESSION")
     parser.add_argument("--take", metavar="NAME", help="which take of a session (default: its first)")
     parser.add_argument("--base", choices=("free", "fixed"),
-                        help="of a recording or motion (default: as the model's takes, else free)")
+                        help="base of a recording or motion (default: as in the model's takes, else free)")
     add_cycles(parser, 3)
-    parser.add_argument("--port", type=positive, metavar="N", help="of the server (default: the first free one from 7000 on)")
-    parser.add_argument("--seconds", type=seconds, metavar="S", help="end by itself after that long")
+    parser.add_argument("--port", type=positive, metavar="N", help="server port (default: the first free one from 7000 on)")
+    parser.add_argument("--seconds", type=seconds, metavar="S", help="stop after S seconds")
     add_model(parser, "the bundled puppy; whose take it is")
     parser.set_defaults(run=run)
 

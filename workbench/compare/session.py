@@ -106,7 +106,7 @@ def load_session(path: str | Path) -> Session:
         names = [e.name for e in entries]
         for i, name in enumerate(names):
             if name in names[:i]:
-                raise top.error(f"{key}[{i}].name", f"'{name}' stands twice")
+                raise top.error(f"{key}[{i}].name", f"duplicate name '{name}'")
     if not takes and not predict:
         raise top.error("takes", "expected at least one take")
     model = model.with_held(all(base == "fixed" for base in [*(t.base for t in takes), *(p.base for p in predict)]))

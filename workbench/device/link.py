@@ -54,6 +54,7 @@ REASONS = (
     "somebody babbles on the bus", "a joint did not arrive", "a servo does not take its goal",
     "a servo's angle limits are narrower than the table", "START was held", "the PC fell silent in bridge mode",
     "the built-in table is broken", "a joint was moving before torque went on",
+    "nobody used it for five minutes",
 )
 """Why a state was entered, by the controller's number."""
 

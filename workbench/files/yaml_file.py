@@ -33,7 +33,7 @@ class _CoreLoader(_Loader):  # type: ignore[misc]
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.MarkedYAMLError(problem="expected a name as key", problem_mark=key.start_mark)
             if key.value in seen:
-                raise yaml.MarkedYAMLError(problem=f"key '{_short(key.value)}' stands twice", problem_mark=key.start_mark)
+                raise yaml.MarkedYAMLError(problem=f"duplicate key '{_short(key.value)}'", problem_mark=key.start_mark)
             seen.add(key.value)
         return dict(super().construct_mapping(node, deep=deep))
 
@@ -58,7 +58,7 @@ def _checked(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> 
     sizes = {} if sizes is None else sizes
     if id(node) in sizes:
         if sizes[id(node)] < 0:
-            raise yaml.MarkedYAMLError(problem="an alias stands inside what it names", problem_mark=node.start_mark)
+            raise yaml.MarkedYAMLError(problem="recursive alias", problem_mark=node.start_mark)
         return sizes[id(node)]
     if depth > MOST_DEPTH:
         raise yaml.MarkedYAMLError(problem=f"nested deeper than {MOST_DEPTH} levels", problem_mark=node.start_mark)
@@ -127,7 +127,7 @@ class Fields:
     def __init__(self, path: Path, content: Any, place: str = "") -> None:
         self.path, self.place = path, place
         if not isinstance(content, Mapping):
-            raise InputError(path, f"{place or 'top level'}: expected keys with values, got {_show(content)}")
+            raise InputError(path, f"{place or 'top level'}: expected a mapping, got {_show(content)}")
         self._left = dict(content)
         self._known: list[str] = []
 
@@ -259,7 +259,7 @@ def top_of(path: Path, *keys: str) -> Fields:
     """The file's keys, of which none is unknown; its `format` is 1."""
     content = read_yaml(path)
     if not isinstance(content, Mapping):
-        raise InputError(path, "top level: expected keys with values, as a session.yaml or a model.yaml has; this is none "
+        raise InputError(path, "top level: expected a mapping, as a session.yaml or a model.yaml has; this is none "
                                "(`workbench inspect` says what it is)")
     top = Fields(path, content)
     said = top.raw("format")

@@ -28,10 +28,11 @@ PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six secon
 class Certificate:
     """What was found out about a gait. Angles in degrees.
 
-    kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait, start, stop). margins: of
+    kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait). margins: of
     limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the quantiles 0, 5, 50, 95, 100 % over the
     ensemble; falls, and how many were drawn. floor: by which steps and contact models move speed and heading. other_engine: the
-    same table elsewhere; empty where there was none. ways: the way in and out. provenance: versions, seeds, time.
+    same table elsewhere; empty where there was none. ways: the way in and out. cycle: how steady the gait is from cycle to cycle,
+    and after how many cycles it walks as before where it was entered otherwise or disturbed. provenance: versions, seeds, time.
     """
 
     kept: bool
@@ -44,6 +45,7 @@ class Certificate:
     floor: Mapping[str, Any]
     other_engine: Mapping[str, Any]
     ways: Mapping[str, Any]
+    cycle: Mapping[str, Any]
     shape: Mapping[str, Any]
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
@@ -70,11 +72,23 @@ class Certificate:
         advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)
         if advice is not None and advice.use > 1:
             lines.append(f"warning: beyond {advice}: it heats")
+        if self.cycle.get("cycles until it is back"):
+            lines.append(_returns(self.cycle))
         if self.other_engine:
             e = self.other_engine
             apart = f"heading {e['heading apart deg/m']:+.1f} deg/m apart"
             lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}")
         return "\n".join(lines)
+
+
+def _returns(cycle: Mapping[str, Any]) -> str:
+    """Whether the gait is one limit cycle, and how steady, in a line."""
+    back = cycle["cycles until it is back"]
+    lost = [entry for entry, cycles in back.items() if cycles is None]
+    scatter = f"heading scatters by {cycle['heading deg, standard deviation']:.2g} deg from cycle to cycle"
+    if lost:
+        return f"does not come back to its cycle: {', '.join(lost)}; {scatter}"
+    return f"entered otherwise, pushed, or with a pose lost it walks as before after {max(back.values())} cycles; {scatter}"
 
 
 def read_certificate(path: str | Path) -> Certificate:

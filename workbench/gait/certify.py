@@ -13,17 +13,20 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
-from workbench.gait.examine import CertifyOptions, Examiner, Measured, OtherEngine
+from workbench.gait.examine import CertifyOptions, Examiner, Measured, NominalRun, OtherEngine
 from workbench.gait.feet import FeetMeasure
-from workbench.gait.limits import contact_margin, run_margins, table_margins, violation
+from workbench.gait.limit_cycle import LimitCycle
+from workbench.gait.limits import contact_margin, return_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, fallen
 from workbench.gait.request import Request
 from workbench.gait.requirements import direction_margins, drift, speed_margins
 from workbench.gait.table import GaitTable
+from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
-from workbench.robot import GRAVITY, RobotModel
+from workbench.robot import GRAVITY, RobotModel, data_file
 
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
 
@@ -39,11 +42,11 @@ TOGETHER = 4
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate and the take of the nominal robot that it speaks of; whole: the way in, some cycles, and the way out."""
+    """A certificate and the take of the nominal robot that it speaks of, from power-on to standstill, and its cycles."""
 
     certificate: Certificate
     take: Take
-    whole: Take
+    cycles: int
 
 
 def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel], options: CertifyOptions,
@@ -58,28 +61,30 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     work += [(f"numerics, {v}", examiner.variant, (v,)) for v in variants]
     work += [] if other is None else [(f"the same table in {other[0]}", examiner.elsewhere, (other[1],))]
     work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
-    work += [("the way in and out", examiner.ways, ())]
+    work += [("back to its cycle", examiner.limit_cycle, (_vendor_table(machine),))] if options.watched else []
     work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
     results = _all(work, options.n_jobs, progress)
-    take, nominal, feet = next(results)
+    run: NominalRun = next(results)
+    nominal = run.measure
     floor = _floor(request, dict(zip(variants, _taken(results, len(variants)))))
     elsewhere = {} if other is None else _elsewhere(request, other[0], nominal, next(results))
     checks = _taken(results, len(robots[:options.checked]))
-    whole, ways = next(results)
+    cycle: LimitCycle | None = next(results) if options.watched else None
     measured = [m for group in results for m in group]
     told, on_draws = _on_draws(request, machine, measured)
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
-    margins = [*table_margins(machine, table, request.limits), contact_margin(machine, table, request.limits),
+    margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
                *run_margins(machine, nominal, request.limits), *direction_margins(request, nominal),
-               *speed_margins(request, nominal, on_draws)]
+               *speed_margins(request, nominal, on_draws),
+               *([] if cycle is None else [return_margin(cycle, request.limits)])]
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
-        tables=hashes(gait=table.cycle, start=table.start, stop=table.stop), model_sha256=machine.model.sha256,
-        margins=tuple(margins), nominal=_numbers(machine, request, nominal, feet), draws=told, floor=floor,
-        other_engine=elsewhere, ways=ways, shape=asdict(table.shape),
+        tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
+        margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=told, floor=floor,
+        other_engine=elsewhere, ways=run.ways, cycle=_cycle(cycle, run.measure, on_draws), shape=asdict(table.shape),
         provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
-    return Certified(certificate, take, whole)
+    return Certified(certificate, run.take, run.cycles)
 
 
 def _taken(results: Iterator[Any], count: int) -> list[Any]:
@@ -120,6 +125,28 @@ def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]]
     apart = np.array([request.progress(b) - request.progress(a) for a, b in checks])
     return {"count": len(checks), "seconds": options.checked_seconds, "step s": options.checked_step,
             "speed apart, RMS": float(np.sqrt((apart**2).mean()))}
+
+
+def _vendor_table(machine: GaitMachine) -> PoseTable | None:
+    """The ROBOTIS walk, as another table to come from; None for a robot that cannot play it."""
+    try:
+        return load_motion(data_file("robotis_walk.csv"), machine.model).as_table()
+    except InputError:
+        return None
+
+
+def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> dict[str, Any]:
+    """How the gait repeats, from cycle to cycle, and from where it comes back to that."""
+    told: dict[str, Any] = {"speed m/s, standard deviation": nominal.scatter[0],
+                            "heading deg, standard deviation": math.degrees(nominal.scatter[1])}
+    walked = [math.degrees(m.scatter[1]) for m in draws if not m.fell and math.isfinite(m.scatter[1])]
+    if walked:
+        told["heading deg, standard deviation, median of draws"] = float(np.median(walked))
+    if cycle is not None:
+        told["watched"] = cycle.watched
+        told["cycles until it is back"] = {r.entry: r.cycles for r in cycle.returns}
+        told["fell"] = [r.entry for r in cycle.returns if r.fell]
+    return told
 
 
 def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]:

@@ -36,10 +36,11 @@ SEARCH = SimulationConfig(base="free", time_step=2e-3, contact_period=0.0, log_p
 
 
 def table_sha256(*tables: PoseTable) -> str:
-    """Of what the firmware plays: joints, goals, speeds, dwells."""
+    """Of what the firmware plays: joints, goals, speeds, dwells, and which poses are played once."""
     digest = hashlib.sha256()
     for t in tables:
-        said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist()}
+        said = {"joints": t.joints, "goals": t.goals.tolist(), "speeds": t.speeds.tolist(), "dwells_ms": t.dwells_ms.tolist(),
+                **({"start": t.start, "stop": t.stop} if t.start or t.stop else {})}
         digest.update(json.dumps(said).encode())
     return digest.hexdigest()
 
@@ -117,7 +118,7 @@ class Evaluator:
             return None, []
         margins = table_margins(self.machine, table, limits)
         if violation(margins) == 0.0:
-            margins.append(contact_margin(self.machine, table, limits))
+            margins.append(contact_margin(self.machine.self_contact.nearest(table.asked), limits))
         return table, margins
 
     def _candidate(self, table: GaitTable | None, margins: list[Margin], nominal: GaitMeasure | None) -> Candidate:

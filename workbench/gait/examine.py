@@ -14,10 +14,12 @@ from scipy.ndimage import minimum_filter1d
 from workbench.files.option_checks import check_choice, check_positive, check_whole
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
+from workbench.gait.limit_cycle import LimitCycle, limit_cycle
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
+from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
-from workbench.motion import Commands
+from workbench.motion import Commands, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
@@ -35,6 +37,11 @@ VARIANTS: dict[str, dict[str, Any]] = {
 at 2 ms, which is what the floor of the steps allows for."""
 LEAD = 0.3
 """At rest before the first command [s]."""
+REST, SHORT_REST = 1.0, 0.3
+"""At rest after the last one [s]: of the nominal robot, and of others, which have only to stay on their feet."""
+SELF_CONTACT_EVERY = 0.02
+"""How often links are looked at for contact with each other [s]: a joint at no-load speed turns by 6 deg meanwhile, and feet pass
+each other no faster."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,7 @@ class CertifyOptions:
     the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too, beside
     the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the same discrete
     step is compared. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s].
-    n_jobs: processes."""
+    watched: cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -55,14 +62,28 @@ class CertifyOptions:
     checked_seconds: float = 1.0
     checked_step: float = 2e-3
     floor_seconds: float = 2.0
+    watched: int = 12
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
 
     def __post_init__(self) -> None:
-        check_whole(self, draws=0, checked=0, n_jobs=1)
+        check_whole(self, draws=0, checked=0, watched=0, n_jobs=1)
         check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds")
         for name in self.variants:
             check_choice("variants", name, VARIANTS)
+
+
+@dataclass(frozen=True)
+class NominalRun:
+    """The nominal robot from power-on to standstill. ways: of start, gait, stop and the rest after it, a few numbers each. near:
+    where links came closest. cycles: how often the loop was played."""
+
+    take: Take
+    measure: GaitMeasure
+    feet: FeetMeasure
+    ways: dict[str, Any]
+    near: Nearness
+    cycles: int
 
 
 @dataclass(frozen=True)
@@ -74,21 +95,29 @@ class Examiner:
     table: GaitTable
     options: CertifyOptions
 
-    def nominal(self) -> tuple[Take, GaitMeasure, FeetMeasure]:
-        """The nominal robot in Drake, with contact forces."""
+    def nominal(self) -> NominalRun:
+        """The nominal robot in Drake, with contact forces, from power-on to a second after the stop."""
         config = SimulationConfig(base="free", time_step=self.options.step, engine="drake")
-        (take,) = simulate_batch([self._job(self.model, config, self.options.seconds, "optimised gait")])
-        return take, *self._measured(take, self.model)
+        seconds = self.options.seconds
+        (take,) = simulate_batch([self._job(self.model, config, seconds, REST, "optimised gait")])
+        rows = np.flatnonzero(take.time >= 0)[::max(1, round(SELF_CONTACT_EVERY / float(np.median(np.diff(take.time)))))]
+        order = [take.joints.index(j) for j in self.model.joints]
+        near = SelfContact(self.model).nearest(take.q[rows][:, order])
+        return NominalRun(take, *self._measured(take, self.model, seconds), self._ways(take), near, self.cycles(seconds))
 
-    def ways(self) -> tuple[Take, dict[str, Any]]:
-        """In and out: a run of start, some cycles, stop, and a second at rest."""
-        cycles = max(2, math.ceil(1.0 / self.table.period))
-        commands = self.table.commands(cycles, whole=True)
-        job = Job(self.model, SimulationConfig(base="free", time_step=self.options.step), commands, commands.end + 1.0, LEAD,
-                  name="in and out")
-        (take,) = simulate_batch([job])
+    def limit_cycle(self, other: PoseTable | None) -> LimitCycle:
+        """The nominal robot again, entered and disturbed in other ways. other: another table, from which it comes."""
+        return limit_cycle(self.model, self.table, self.options.watched, self.options.step, other)
+
+    def cycles(self, seconds: float) -> int:
+        """How many are played to walk for so long [s], after the first."""
+        return 1 + max(2, math.ceil(seconds / self.table.period))
+
+    def _ways(self, take: Take) -> dict[str, Any]:
+        """Of the parts of a whole run: start, gait, stop, and what follows."""
         assert take.p_WB is not None
-        begin, end = self.table.start_seconds, commands.end - float(self.table.stop.dwells_ms.sum()) / 1000
+        begin, end = self.table.start_seconds, self._walked_until(self.options.seconds)
+        over = end + float(self.table.stop.dwells_ms.sum()) / 1000
         parts = {"start": (take.time >= 0) & (take.time < begin), "gait": (take.time >= begin) & (take.time < end),
                  "stop": take.time >= end}
         told: dict[str, Any] = {}
@@ -96,19 +125,20 @@ class Examiner:
             told[name] = {"seconds": float(np.ptp(take.time[inside])), "peak torque N m": float(_lasting(take, inside)),
                           "tilt deg": float(np.degrees(_tilt(take)[inside].max())),
                           "jerk of the base m/s^3": _jerk(take, inside)}
-        rest = take.time > commands.end + 0.5
+        rest = take.time > over + REST / 2
         told["at rest"] = {"speed m/s": float(np.abs(np.gradient(take.p_WB[rest], take.time[rest], axis=0)).max()),
                            "tilt deg": float(np.degrees(_tilt(take)[rest].max())),
                            "largest angle off neutral deg": float(np.degrees(np.abs(take.q[rest]).max()))}
         told["without a jerk"] = bool(max(told[k]["jerk of the base m/s^3"] for k in ("start", "stop"))
                                       <= 1.5 * told["gait"]["jerk of the base m/s^3"])
-        return take, told
+        return told
 
     def robots(self, robots: Sequence[RobotModel]) -> list[Measured | None]:
         """Robots of the ensemble, by the compiled station; None for one that lay on the floor or tripped over itself."""
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
-        takes = Rollouts(1).takes([self._job(r, config, self.options.draw_seconds) for r in robots])
-        return [None if take is None else self._measured(take, robot) for take, robot in zip(takes, robots)]
+        seconds = self.options.draw_seconds
+        takes = Rollouts(1).takes([self._job(r, config, seconds, SHORT_REST) for r in robots])
+        return [None if take is None else self._measured(take, robot, seconds) for take, robot in zip(takes, robots)]
 
     def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
         """One of them by the compiled station and by Drake, at the same step."""
@@ -116,32 +146,37 @@ class Examiner:
         config = SimulationConfig(base="free", time_step=o.checked_step, contact_period=0.0, log_period=0.01, settle=LEAD)
         (take,) = Rollouts(1).takes([self._job(robot, config, o.checked_seconds)])
         (again,) = simulate_batch([self._job(robot, replace(config, engine="drake"), o.checked_seconds)])
-        ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot)[0]
-        return ours, self._measured(again, robot)[0]
+        ours = fallen(len(self.model.joints)) if take is None else self._measured(take, robot, o.checked_seconds)[0]
+        return ours, self._measured(again, robot, o.checked_seconds)[0]
 
     def variant(self, name: str) -> GaitMeasure:
         """The nominal robot, computed in another way: one of VARIANTS."""
         config = replace(SimulationConfig(base="free", contact_period=0.0, log_period=0.01), **VARIANTS[name])
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
-        return self._measured(take, self.model)[0]
+        return self._measured(take, self.model, self.options.floor_seconds)[0]
 
     def elsewhere(self, engine: OtherEngine) -> Measured:
         """The nominal robot in another engine."""
-        commands, end = self._commands(self.options.seconds)
-        return self._measured(engine(self.model, commands, end), self.model)
+        seconds = self.options.seconds
+        commands = self.table.commands(self.cycles(seconds), whole=True)
+        return self._measured(engine(self.model, commands, commands.end + SHORT_REST), self.model, seconds)
 
-    def _measured(self, take: Take, model: RobotModel) -> Measured:
-        period = self.table.period
-        begin = self.table.start_seconds + period  # as in the search, the heading settles in the first whole cycle
-        feet = feet_measure(take, model, self.legs, begin, period)
-        return replace(measure(take, model, begin, period), clearance=feet.clearance), feet
+    def _measured(self, take: Take, model: RobotModel, seconds: float) -> Measured:
+        """As in the search, the heading settles in the first whole cycle; torque counts from power-on."""
+        period, end = self.table.period, self._walked_until(seconds)
+        begin = self.table.start_seconds + period
+        feet = feet_measure(take, model, self.legs, begin, period, end)
+        return replace(measure(take, model, begin, period, end=end, since=0.0), clearance=feet.clearance), feet
 
-    def _commands(self, seconds: float) -> tuple[Commands, float]:
-        cycles = 1 + max(2, math.ceil(seconds / self.table.period))
-        return self.table.commands(cycles), self.table.start_seconds + cycles * self.table.period
+    def _walked_until(self, seconds: float) -> float:
+        """When the last cycle ends [s]."""
+        return self.table.start_seconds + self.cycles(seconds) * self.table.period
 
-    def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, name: str = "gait") -> Job:
-        commands, end = self._commands(seconds)
+    def _job(self, model: RobotModel, config: SimulationConfig, seconds: float, rest: float | None = None, name: str = "gait",
+             ) -> Job:
+        """The motion as every verb plays it. rest: how long after it [s]; None: only to the end of the last cycle."""
+        commands = self.table.commands(self.cycles(seconds), whole=True)
+        end = self._walked_until(seconds) if rest is None else commands.end + rest
         return Job(model, config, commands, end, LEAD, name=name)
 
 

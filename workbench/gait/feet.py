@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,14 +31,15 @@ class FeetMeasure:
     tipping: float
 
 
-def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float) -> FeetMeasure:
-    """Of a free take from `begin` [s] on, in whole cycles of `period` [s]. Feet are where the model's kinematics put them; what
-    counts of a tilted one is its lowest point."""
+def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: float, period: float, end: float = math.inf,
+                 ) -> FeetMeasure:
+    """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping of all of it. Feet are
+    where the model's kinematics put them; what counts of a tilted one is its lowest point."""
     height, speed = _lowest(take, model, legs)
-    inside = take.time >= begin - 1e-9
+    inside = (take.time >= begin - 1e-9) & (take.time <= end + 1e-9)
     z = height - _floor(height, take.time < 0)
     down = (z < TOUCHING) & inside[:, None]
-    cycles = range(max(int((take.time[-1] - begin) / period + 1e-6), 1))
+    cycles = range(max(int((min(float(take.time[-1]), end) - begin) / period + 1e-6), 1))
     tops = [z[(take.time >= begin + k * period - 1e-9) & (take.time < begin + (k + 1) * period)].max(axis=0) for k in cycles]
     return FeetMeasure(slip=float(speed[down].mean()) if down.any() else float("nan"),
                        clearance=float(np.min(tops)), tipping=_tipping_angle(model, legs) - _tilt(take))

@@ -10,8 +10,10 @@ import numpy as np
 
 from workbench.device.tables.table_file import most_poses, other_family
 from workbench.files.option_checks import check_positive
+from workbench.gait.limit_cycle import LimitCycle
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
+from workbench.gait.self_contact import Nearness
 from workbench.gait.table import GaitTable
 
 
@@ -30,6 +32,7 @@ class GaitLimits:
     change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn
     that comes from a robot's own zero offsets and latency is seen on its first metre, and a table of another `turn` corrects it:
     0.06 rad a stance took 25 and 40 deg/m out of two gaits, one forward and one backward. aside: sideways speed by forward speed.
+    back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
     """
 
     rms: float | None = None
@@ -43,6 +46,7 @@ class GaitLimits:
     drift: float = float(np.radians(3))
     spread: float = float(np.radians(45))
     aside: float = 0.1
+    back: int = 8
 
     def __post_init__(self) -> None:
         check_positive(self, *(f.name for f in fields(self) if getattr(self, f.name) is not None))
@@ -93,18 +97,17 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
     for i, leg in enumerate(machine.legs):
         out.append(_of("reach", leg.foot, 1000 * float(table.reach[:, i].max()), 1000 * limits.reach, "mm off the path"))
     if not other_family(table.cycle):  # only the CM-530's program, which plays no other family, holds a table in its memory
-        poses = max(len(table.cycle), len(table.start), len(table.stop))  # each is a table of its own there
+        poses = len(table.whole)
         out.append(_of("poses", "table", poses, most_poses(len(model.joints)), "poses"))
     packet = 10 * (5 * len(model.joints) + 8) / limits.bus  # a Sync Write of goal and speed: ID and four bytes a servo
     out.append(_of("bus time", "robot", 1000 * packet, float(table.cycle.dwells_ms.min()), "ms of the shortest dwell"))
     return _worst(out)
 
 
-def contact_margin(machine: GaitMachine, table: GaitTable, limits: GaitLimits) -> Margin:
-    """Of links against each other, at the poses of the table, before rounding."""
-    near = machine.self_contact.nearest(table.asked)
+def contact_margin(near: Nearness, limits: GaitLimits) -> Margin:
+    """Of links against each other."""
     where = " and ".join(near.links) if near.links[0] else "robot"
-    return _of("self-contact", where, 1000 * limits.clearance, 1000 * max(near.distance, 1e-6), "mm of clearance")
+    return least("self-contact", where, 1000 * near.distance, 1000 * limits.clearance, "mm of clearance")
 
 
 def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) -> list[Margin]:
@@ -116,12 +119,20 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
         out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of what it has"))
         out.append(_of("RMS torque, ROBOTIS's fifth", joint, measure.rms[i], float(law.full_torque[i]) / 5, "N m", advice=True))
     if np.isfinite(measure.clearance):
-        lifted = 1000 * max(measure.clearance, 1e-6)
-        use = max(2 - lifted / (1000 * limits.lift), 0.0)
-        out.append(_of("foot clearance", "robot", lifted, 1000 * limits.lift, "mm, at least", use))
+        out.append(least("foot clearance", "robot", 1000 * measure.clearance, 1000 * limits.lift, "mm"))
     out.append(_of("supply current", "robot", measure.peak_current, limits.fuse, "A"))
     out.append(_of("tilt", "robot", float(np.degrees(measure.tilt)), float(np.degrees(limits.tilt)), "deg"))
     return out
+
+
+def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:
+    """Of the way into the gait from which it takes longest to walk as it does after its own start."""
+    slowest = cycle.slowest
+    if slowest.cycles is None:
+        use = max(2.0, cycle.watched / limits.back)
+        said = "cycles, fell" if slowest.fell else "cycles, and not back"
+        return Margin("way back to its cycle", slowest.entry, float(cycle.watched), float(limits.back), said, use)
+    return _of("way back to its cycle", slowest.entry, slowest.cycles, limits.back, "cycles")
 
 
 def binding(margins: Iterable[Margin]) -> Margin | None:
@@ -138,6 +149,12 @@ def violation(margins: Iterable[Margin]) -> float:
 def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False) -> Margin:
     share = use if use is not None else value / limit if limit > 0 else np.inf
     return Margin(name, where, float(value), float(limit), unit, float(share), advice)
+
+
+def least(name: str, where: str, value: float, limit: float, unit: str) -> Margin:
+    """A limit from below: use is 1 where the value is just enough, and grows by what is missing, as a share of the limit; 0 from
+    twice the limit on."""
+    return Margin(name, where, float(value), float(limit), f"{unit}, at least", max(2.0 - float(value / limit), 0.0))
 
 
 def _worst(margins: Sequence[Margin]) -> list[Margin]:

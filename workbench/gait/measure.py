@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from workbench.effects.apply import law_of, played
+from workbench.gait.cycles import cycles_of, scatter_of
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.servo import ServoLaw
@@ -39,7 +40,8 @@ class GaitMeasure:
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
     electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
-    cycles of how high a foot comes [m]; NaN where nobody looked.
+    cycles of how high a foot comes [m]; NaN where nobody looked. peak: of each joint, the largest torque that lasts LASTING, over
+    the same time as torque_use. scatter: from one of the cycles to the next, as `Scatter`.
     """
 
     fell: bool
@@ -58,6 +60,8 @@ class GaitMeasure:
     mechanical: float
     jerk: float
     clearance: float = math.nan
+    peak: tuple[float, ...] = ()
+    scatter: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def speed(self) -> float:
@@ -76,9 +80,12 @@ def fallen(joints: int) -> GaitMeasure:
     return GaitMeasure(True, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, math.pi / 2, nothing, nothing, nothing, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True) -> GaitMeasure:
+def measure(take: Take, model: RobotModel, begin: float, period: float, electrical: bool = True, end: float = math.inf,
+            since: float | None = None) -> GaitMeasure:
     """Of a free take with torques, from `begin` [s], when the first full cycle ends, in whole cycles of `period` [s].
 
+    end: of the last cycle [s], where something follows it. since: from when on peak and torque_use count [s], to the take's end;
+    None: in those cycles alone. fell, tilt and peak_current are of the whole take.
     electrical: whether current and power are wanted, which take the commands that reached each servo; else they are NaN."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
@@ -89,7 +96,7 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     height = take.p_WB[:, 2] / take.p_WB[0, 2]
     fell = bool(up.min() < np.cos(FALLEN_TILT) or height.min() < FALLEN_HEIGHT or not np.isfinite(take.p_WB).all())
-    cycles = max(int((take.time[-1] - begin) / period + 1e-6), 1)
+    cycles = max(int((min(float(take.time[-1]), end) - begin) / period + 1e-6), 1)
     first, last = np.searchsorted(take.time, [begin - 1e-9, begin + cycles * period - 1e-9])
     last = min(int(last), len(take) - 1)
     inside = slice(int(first), last + 1)
@@ -103,18 +110,21 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     law = law_of(model)
     torque, v = take.torque[inside], take.v[inside]
     unknown = np.full(len(take), np.nan)
+    scatter = scatter_of(cycles_of(take, begin, period, end))
     current, power = supply(take, model, law) if electrical else (unknown, unknown)
     every = float(np.median(np.diff(time)))
     smooth = uniform_filter1d(current, max(1, round(FUSE_WINDOW / every)))
+    counted = inside if since is None else slice(int(np.searchsorted(take.time, since - 1e-9)), len(take))
     return GaitMeasure(
         fell=fell, velocity=(forward, left), turn_rate=float((h[-1] - h[0]) / seconds), gone=float(np.hypot(*whole)),
         drift=float(h[-1] - h[0]), lateral=float(whole[1] * np.cos(heading[0]) - whole[0] * np.sin(heading[0])),
         tilt=float(np.arccos(np.clip(up.min(), -1, 1))), rms=_floats(np.sqrt((torque**2).mean(axis=0))),
-        torque_use=_floats(_torque_use(law, torque, v, every)),
+        torque_use=_floats(_torque_use(law, take.torque[counted], take.v[counted], every)),
         speed_use=_floats(np.quantile(np.abs(v), 0.995, axis=0) * law.back_emf / law.full_torque),
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
-        jerk=base_jerk(time, p))
+        jerk=base_jerk(time, p), peak=_floats(_lasting(np.abs(take.torque[counted]), every)),
+        scatter=(scatter.speed, scatter.heading))
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
@@ -154,7 +164,12 @@ def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
     along = v * np.sign(torque)
     line = law.full_torque - law.back_emf * along + np.where(along < 0, law.coulomb - law.viscous * along, 0.0)
     share = np.abs(torque) / np.maximum(line, 0.02 * law.full_torque)
-    return np.asarray(minimum_filter1d(share, max(1, round(LASTING / every)), axis=0).max(axis=0))
+    return _lasting(share, every)
+
+
+def _lasting(x: Array, every: float) -> Array:
+    """The largest value (n,) of each column that lasts LASTING, of samples `every` [s]."""
+    return np.asarray(minimum_filter1d(x, max(1, round(LASTING / every)), axis=0).max(axis=0))
 
 
 def base_jerk(time: Array, p: Array) -> float:

@@ -192,10 +192,9 @@ def robotis_walk(model: RobotModel) -> GaitMeasure:
 
 
 def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:
-    """Names and contents: the gait, the ways in and out, the certificate."""
-    files = {f"{name}.csv": motion_text(Motion.from_table(t), MARK)
-             for name, t in (("gait", table.cycle), ("start", table.start), ("stop", table.stop))}
-    return files | {NAME: certified.certificate.as_text()}
+    """Names and contents: the motion from power-on to standstill, as long as it was walked for the certificate, and that."""
+    motion = replace(Motion.from_table(table.whole), cycles=certified.cycles)
+    return {"gait.csv": motion_text(motion, MARK), NAME: certified.certificate.as_text()}
 
 
 def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Path]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from workbench.gait.limits import Margin
+from workbench.gait.limits import Margin, least
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.request import Request
 
@@ -53,10 +53,10 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
     fell, count = sum(m.fell for m in (nominal, *draws)), 1 + len(draws)
     out = [Margin("falls", f"of {count} robots", float(fell), 0.0, "allowed", 1.0 + FALLEN * fell / count if fell else 0.0)]
     if request.speed is not None:
-        out.append(_least("speed", request.progress(nominal), request.speed, request.unit))
+        out.append(least("speed", "robot", request.progress(nominal), request.speed, request.unit))
     if draws:
         if request.speed is not None:
-            out.append(_least("speed of the worse half of draws", worse_half([request.progress(m) for m in draws]),
+            out.append(least("speed of the worse half of draws", "robot", worse_half([request.progress(m) for m in draws]),
                               ROBUST * request.speed, request.unit))
         if request.way != "turn":
             spread = float(np.sqrt(np.mean([min(drift(request, m), 10.0) ** 2 for m in draws])))
@@ -83,8 +83,3 @@ def worse_half(values: Sequence[float]) -> float:
 
 def _margin(name: str, value: float, limit: float, unit: str) -> Margin:
     return Margin(name, "robot", float(value), float(limit), unit, float(value / limit))
-
-
-def _least(name: str, value: float, least: float, unit: str) -> Margin:
-    """A limit from below: use is 1 where the value is just enough, and grows by what is missing."""
-    return Margin(name, "robot", float(value), float(least), f"{unit}, at least", float(2.0 - value / least))

@@ -36,10 +36,14 @@ class GaitTable:
     reach: Array
     asked: Array
 
+    @property
+    def whole(self) -> PoseTable:
+        """What is played from power-on to standstill, as one table of three sections: what a certificate speaks of."""
+        return PoseTable.in_sections(self.start, self.cycle, self.stop)
+
     def commands(self, cycles: int, whole: bool = False) -> Commands:
         """Start and `cycles` cycles, and with `whole` the stop."""
-        parts = [self.start, *[self.cycle] * cycles, *([self.stop] if whole else [])]
-        return _joined(parts, self.cycle.source).commands()
+        return (self.whole if whole else PoseTable.in_sections(self.start, self.cycle, None)).commands(cycles)
 
     @property
     def start_seconds(self) -> float:

@@ -190,7 +190,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
     """Steps 4 to 6 of servo logs, by evidence. engine: whose rollouts these are, and how far it is from Drake."""
     progress = settings.progress
     evidence, everywhere = evaluator.evidence, tuple(range(len(evaluator.evidence)))
-    explained = explain(evaluator, known, pool, progress)
+    explained = explain(evaluator, known, pool, progress, thorough=settings.thorough)
     fitted = explained.model
     progress("judging the engine", None)
     final = {BESIDE_DRAKE.format("final"): judged(evaluator, fitted, "final")}
@@ -210,7 +210,7 @@ def _by_evidence(session: Session, known: RobotModel, seen: Prepared, evaluator:
         posterior=Posterior() if missed else explained.posterior(),
         provenance=provenance(session.model, evaluator.config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **final}} | how_logged([e.take for e in evidence]),
-        left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
+        stopped=explained.stopped, left_out=unreadable + seen.left_out, recalibrated=explained.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted)
     return DiagnosisResult(diagnosis, reports, explained.ties(), observation_models(evidence))
 
@@ -228,12 +228,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:
     """Rollouts beside the robot with its measured geometry: what steps and contact models leave open is another robot's."""
     read = [replace(t, model=known.model_of(t.spec)) for t in takes]
-    return RolloutEvaluator(
-        prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence,
-        evaluator.config,
-        evaluator.n_jobs,
-        evaluator.memory,
-    )
+    return evaluator.on(prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
 
 
 def _compared(chosen: SelectionResult, progress: Progress) -> _Explained:

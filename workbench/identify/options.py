@@ -70,6 +70,8 @@ class ProblemOptions:
     """Share of the robot's mass from which on a link's centre of mass is a candidate: of lighter ones it hardly shows."""
     most_stretches: int = 10_000
     """More than a take has: numbers of stretches count on by as many from take to take."""
+    remembered: int = 256
+    """Rollouts that are held in memory [MiB], those used last; others are read again from disk, where a folder keeps them."""
     engines_apart: float = 0.1
     """Of a channel's sigma: engines that part by more, RMS over a take, are not taken for one."""
     engines_compared: float = 20.0

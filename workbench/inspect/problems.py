@@ -152,7 +152,7 @@ def long_work(seconds: float) -> str | None:
     """A line where so much is to be simulated that it was probably a slip."""
     if seconds <= FILES.longest:
         return None
-    return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: a slip in times, frames or cycles?"
+    return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: check times, frames and cycles"
 
 
 def slow_poses(motion: Motion) -> str | None:

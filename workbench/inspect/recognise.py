@@ -15,6 +15,7 @@ from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
 from workbench.robot import ROBOTS, RobotModel, load_servo_constants
+from workbench.robot.servo_units import unknown_family
 
 if TYPE_CHECKING:
     from workbench.compare.session import Session
@@ -249,7 +250,7 @@ def _model(name: str, packages: Mapping[str, str] | None = None) -> Inspection:
 def _yaml(path: Path) -> Inspection:
     content = read_yaml(path)
     if not isinstance(content, Mapping):
-        raise InputError(path, "expected keys with values")
+        raise InputError(path, "expected a mapping")
     if "takes" in content or "predict" in content:
         return _session(path)
     if not {"effects", "servos", "robot"}.isdisjoint(content):
@@ -257,8 +258,9 @@ def _yaml(path: Path) -> Inspection:
     if "stall_torque" in content:
         servo = load_servo_constants(path)
         law = "proportional_gain" if servo.proportional_gain is not None else "compliance"
-        details = {"model": servo.model, "law": law}
-        return Inspection(str(path), "servo_constants", units="N m, rad/s, V", details=details, problems=servo.doubts)
+        details, unknown = {"model": servo.model, "law": law}, unknown_family(servo.model)
+        return Inspection(str(path), "servo_constants", units="N m, rad/s, V", details=details,
+                          problems=(*servo.doubts, *([f"{unknown}; simulated, but not sent to a robot"] if unknown else [])))
     raise InputError(path, "expected a session (takes), a model (effects, servos) or servo constants (stall_torque)")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
+from workbench.motion.lead_in import paced
 from workbench.robot.servo_units import AX12A, ServoUnits
 
 Array = NDArray[np.float64]
@@ -148,13 +149,14 @@ class PoseTable:
         return np.asarray(self.speeds * self._of(lambda u: u.table_unit), dtype=float)
 
     def commands(self, cycles: int = 1) -> Commands:
-        """What the firmware sends: each pose when the dwells before it are over; the start, so many loops, the stop."""
+        """What the firmware sends: each pose when the dwells before it are over; the start, so many loops, the stop. No joint is
+        told to go at once (`paced`)."""
         if not 1 <= cycles <= MOST_CYCLES:
             raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         played = self.order(cycles)
         ends = np.cumsum(self.dwells_ms[played]) / 1000
         goals = self.angles()[played]
-        return Commands(
+        return paced(Commands(
             times=np.concatenate([[0.0], ends[:-1]]),
             joints=self.joints,
             goals=goals,
@@ -162,7 +164,7 @@ class PoseTable:
             enabled=np.ones(goals.shape, dtype=bool),
             end=float(ends[-1]),
             poses=played,
-        )
+        ), self.count, self._of(lambda u: u.speed_unit))
 
     def _of(self, what: Callable[[ServoUnits], float]) -> Array:
         return np.array([what(u) for u in self.units], dtype=float)

@@ -94,7 +94,8 @@ class ServoProfile:
     alarms, refusals: what the bits of an answer's error byte mean, of the servo's state and of the instruction; with protocol
     2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
     control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
-    when the bus falls silent. marker: a register that does nothing to the joint and is forgotten when the servo restarts.
+    when the bus falls silent. maker: who builds it, for the rules that it gives. marker: a register that does nothing to the
+    joint and is forgotten when the servo restarts.
     """
 
     name: str
@@ -122,6 +123,7 @@ class ServoProfile:
     unlock: Switch | None = None
     watchdog: tuple[str, float] | None = None
     marker: str | None = None
+    maker: str = ""
     source: str = field(default="", compare=False)
 
     @property

@@ -29,7 +29,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
-                 "unlock", "watchdog", "marker", *TOLERANCES)
+                 "unlock", "watchdog", "marker", "maker", *TOLERANCES)
     position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
     registers = _registers(_needed(top, "registers"))
     profile = ServoProfile(
@@ -47,7 +47,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         tolerances={key: v for key in TOLERANCES if (v := top.number(key, least=0)) is not None},
         alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
-        marker=_marker(top, registers), source=str(path))
+        marker=_marker(top, registers), maker=top.text("maker") or "", source=str(path))
     if profile.protocol not in (1, 2):
         raise top.error("protocol", f"expected 1 or 2, got {profile.protocol}")
     for f in (position, speed, load, top):
@@ -78,7 +78,8 @@ def servo_profile(model: str) -> ServoProfile:
     for profile in servo_profiles().values():
         if wanted in (_plain(profile.name), *map(_plain, profile.models.values())):
             return profile
-    raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}")
+    raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
+                           f"profile of its own ({_plain(model)}.yaml; docs/extending.md says how), as its counts are unknown")
 
 
 def model_name(number: int, protocol: int) -> str:

@@ -49,6 +49,30 @@ def units_of(model: RobotModel, joints: Sequence[str]) -> tuple[ServoUnits, ...]
     return tuple(_units(model.servo(joint).model) for joint in joints)
 
 
+def known_units(model: RobotModel, joints: Sequence[str]) -> tuple[ServoUnits, ...]:
+    """As `units_of`, for what reaches a real servo; InputError where nobody knows a family, as another one's counts would turn
+    its joint to another angle."""
+    for joint in joints:
+        reason = unknown_family(model.servo(joint).model)
+        if reason:
+            raise InputError(model.description, f"joint {joint}: {reason}")
+    return units_of(model, joints)
+
+
+def unknown_family(model: str) -> str:
+    """Why nothing can be sent to a servo of this name, "" where its family is known."""
+    try:
+        servo_profile(model)
+    except InputError as e:
+        return e.problem
+    return ""
+
+
+def maker_of(model: str) -> str:
+    """Who builds a servo, "" where nobody knows."""
+    return "" if unknown_family(model) else servo_profile(model).maker
+
+
 def _units(model: str) -> ServoUnits:
     try:
         return ServoUnits.of(servo_profile(model))

@@ -115,7 +115,7 @@ class VirtualRobot:
     def __init__(self, model: RobotModel, base: str = "free", rate: int = 1_000_000) -> None:
         family = family_of(model)
         if family.name not in FAMILIES:
-            raise InputError(model.description, f"there is no virtual {family.name}; expected one of {', '.join(FAMILIES)}")
+            raise InputError(model.description, f"no emulator for {family.name}; available: {', '.join(FAMILIES)}")
         self.model, self.base, self.profile = model, base, family
         self.clock = Clock()
         self.bus = ServoBus(self.clock)

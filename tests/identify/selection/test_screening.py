@@ -155,12 +155,14 @@ def test_each_rollout_is_kept_before_the_next_is_there(quiet, tmp_path, monkeypa
         yield next(iter(simulate_stream(jobs, n_jobs)))
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("workbench.identify.rollouts.simulate_stream", killed)
+    monkeypatch.setattr("workbench.identify.rollouts.evaluator.simulate_stream", killed)
     with pytest.raises(KeyboardInterrupt):
         RolloutEvaluator(evidence, CONFIG, 1, tmp_path).residuals(
             [RolloutRequest(session.model, (0,)), RolloutRequest(session.model, (0,), until=1.5)]
         )
-    assert len(list(tmp_path.glob("*.npy"))) == 1
+    again = RolloutEvaluator(evidence, CONFIG, 1, tmp_path)
+    again.residuals([RolloutRequest(session.model, (0,))])
+    assert again.memory.played == 0
 
 
 def test_after_one_difference_per_number_slopes_are_updated_and_not_measured_again():

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from workbench.device import export
+from workbench.gait.engines import other_engine
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import Optimized, OptimizeOptions, optimize, options_of, write_gait
@@ -32,7 +33,7 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
     good."""
     request = Request(speed=SPEED)
     result = optimize(GaitMachine(model), request, load_ensemble(), demo_options(),
-                      lambda what, done: progress(f"a new gait: {what}", done))
+                      lambda what, done: progress(f"a new gait: {what}", done), None, other_engine())
     parts: list[Part] = [Text(_said(result))]
     if result.table is not None and result.certified is not None:
         write_gait(folder, result.table, result.certified)

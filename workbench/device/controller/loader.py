@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import struct
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol
 
-from workbench.device.link import FrameReader, StateMessage, message
-from workbench.files import InputError
-from workbench.files.yaml_file import read_yaml
-from workbench.robot import data_file
+from workbench.device.controller.loader_profile import LoaderProfile
+from workbench.device.link import FrameReader, FrameType, StateMessage, frame, message
 
 FACTORY = ("This replaces ROBOTIS's own program in the controller. To get that back: RoboPlus Manager, 'Controller Firmware "
            "Management' (R+ Manager on newer systems), with the controller on USB; the loader itself cannot be overwritten.")
-RAM, RAM_END = 0x20000000, 0x20010000
 PROMPT_WAIT, ANSWER_WAIT, START_WAIT = 20.0, 5.0, 2.0
 """How long the user has to switch on, the loader to answer, and the program to speak [s]."""
+DEAF, QUIET, PROMPT_AGAIN = 3.0, 0.2, 2.0
+"""Silence after which the port is opened anew while the key is held; silence after which the loader has said all; how long it has
+to answer an empty line [s]. A USB adapter may keep bytes for 16 ms."""
 CHUNK = 256
 
 
 class Line(Protocol):
     """A serial line; OSError where it is gone."""
+
+    def reopen(self) -> None:
+        """Closes and opens it again: after a reset of the controller its PC link may hear nothing until then."""
+        ...
 
     def write(self, data: bytes) -> None:
         """Sends."""
@@ -32,81 +34,6 @@ class Line(Protocol):
     def read(self, seconds: float) -> bytes:
         """What comes within this time; b"" for silence."""
         ...
-
-
-@dataclass(frozen=True)
-class LoaderProfile:
-    """What data/loaders says of a loader; texts as bytes, `confirmed` where a real one was heard to say them."""
-
-    name: str
-    confirmed: bool
-    rate: int
-    key: bytes
-    key_every: float
-    line_end: bytes
-    byte_sum: bool
-    prompt: tuple[bytes, ...]
-    identity: tuple[bytes, ...]
-    load: bytes
-    start: bytes
-    ready: tuple[bytes, ...]
-    success: tuple[bytes, ...]
-    failure: tuple[bytes, ...]
-    application: int
-    flash_end: int
-    source: str = field(default="", compare=False)
-
-
-def load_loader_profile(path: str | Path | None = None) -> LoaderProfile:
-    """Reads a loader's texts (default: the CM-530's); InputError names file and key."""
-    path = Path(path) if path else data_file("loaders/cm530.yaml")
-    content = read_yaml(path)
-    if not isinstance(content, dict):
-        raise InputError(path, "expected a mapping")
-    kinds: dict[str, type | tuple[type, ...]] = {
-        "format": int, "name": str, "confirmed": (bool, str), "rate": int, "key": str, "key_every": float, "line_end": str,
-        "byte_sum": bool, "prompt": list, "identity": list, "commands": dict, "ready": list, "success": list,
-        "failure": list, "application": (int, str), "flash_end": (int, str),
-    }
-    for key, kind in kinds.items():
-        if not isinstance(content.get(key), kind):
-            raise InputError(path, f"key '{key}' is missing or of another kind")
-    for key in content:
-        if key not in kinds:
-            raise InputError(path, f"unknown key '{key}'; expected one of {', '.join(sorted(kinds))}")
-
-    def texts(key: str) -> tuple[bytes, ...]:
-        found = tuple(str(t).encode() for t in content[key])
-        if not found or b"" in found:
-            raise InputError(path, f"key '{key}': expected at least one text, none of them empty")
-        return found
-
-    def address(key: str) -> int:
-        try:
-            return int(str(content[key]), 0)
-        except ValueError:
-            raise InputError(path, f"key '{key}': expected an address such as 0x08003000") from None
-
-    commands = content["commands"]
-    if set(commands) != {"load", "start"}:
-        raise InputError(path, "key 'commands': expected load and start")
-    return LoaderProfile(
-        content["name"], bool(content["confirmed"]), content["rate"], content["key"].encode(), content["key_every"],
-        content["line_end"].encode(), content["byte_sum"], texts("prompt"), texts("identity"), commands["load"].encode(),
-        commands["start"].encode(), texts("ready"), texts("success"), texts("failure"), address("application"),
-        address("flash_end"), str(path))
-
-
-def check_image(image: bytes, profile: LoaderProfile, source: str) -> None:
-    """InputError unless this can be a program for that place: stack in RAM, reset vector inside, not longer than the flash."""
-    room = profile.flash_end - profile.application
-    if not 256 <= len(image) <= room:
-        raise InputError(source, f"{len(image)} bytes; a program for the {profile.name} has 256 to {room}")
-    stack, start = struct.unpack_from("<II", image)
-    inside = profile.application <= start - 1 < profile.application + len(image)
-    if not (RAM < stack <= RAM_END and stack % 4 == 0 and start & 1 and inside):
-        raise InputError(source, f"its first words, {stack:#x} and {start:#x}, are no stack and start of a program at "
-                                 f"{profile.application:#x}")
 
 
 class LoadError(RuntimeError):
@@ -118,7 +45,10 @@ class LoadError(RuntimeError):
 
 
 UNTOUCHED = "the controller holds the program that it held before"
+ASKED = "LOAD was sent and not answered, so the old program may or may not be erased; the loader is whole"
 HALF = "the old program may be erased and the new one is not whole, so it may run nothing; its loader is whole"
+MOVES = ("The robot will move: once started, the program asks all servos, gives them torque and takes them to neutral, slowly. "
+         "Put it on a stand, with a hand on its switch.")
 UNKNOWN = "the image was sent whole, but the loader did not confirm it; the new program may or may not run"
 LOADED = "the new program is loaded but was not seen to start"
 AGAIN = "switch it off, and run this again"
@@ -158,8 +88,7 @@ class Loading:
         """Returns what the new program says of itself."""
         try:
             self._find_prompt()
-            self._command(self._profile.load)
-            self._expect(self._profile.ready, ANSWER_WAIT, "after LOAD")
+            self._load()
             self._send(image)
             self._state = UNKNOWN
             self._expect(self._profile.success, ANSWER_WAIT, "after the image")
@@ -173,7 +102,7 @@ class Loading:
         """The key, again and again, until the loader of the right controller waits for a command."""
         profile = self._profile
         heard = b""
-        waited = 0.0
+        waited, silent = 0.0, 0.0
         self._progress("1 of 4: waiting for the loader (switch the controller off and on)", None)
         while not self._at_prompt(heard):
             if waited > PROMPT_WAIT:
@@ -181,27 +110,49 @@ class Loading:
             self._write(profile.key)
             new = self._read(profile.key_every)
             waited = 0.0 if new and not heard else waited + profile.key_every
+            silent = 0.0 if new else silent + profile.key_every
+            if silent >= DEAF:
+                self._reopen()
+                silent = 0.0
             heard = (heard + new)[-4096:]
+        heard += self._fresh_prompt()
         if not any(name in heard for name in profile.identity):
-            heard = self._ask_again()
-            if not any(name in heard for name in profile.identity):
-                raise LoadError(f"the loader says {_shown(heard)}, which is no {profile.name} ({profile.source} knows "
-                                f"{_listed(profile.identity)})", self._state, "check which controller this is")
+            raise LoadError(f"the loader says {_shown(heard)}, which is no {profile.name} ({profile.source} knows "
+                            f"{_listed(profile.identity)})", self._state, "check which controller this is")
 
-    def _ask_again(self) -> bytes:
-        """An empty command makes it say its prompt again."""
-        self._write(self._profile.line_end)
-        return self._collect(1.0)
+    def _fresh_prompt(self) -> bytes:
+        """Has it forget what is left in its line, as keys that came after it had begun to listen: lines are ended until one is
+        answered by nothing but a prompt. All that it said."""
+        heard = self._until_quiet()
+        for _ in range(5):
+            self._write(self._profile.line_end)
+            new = self._until_prompt(PROMPT_AGAIN)
+            heard += new
+            if self._at_prompt(new) and not any(text in new for text in self._profile.refused):
+                return heard
+        self._nothing_known(new, "at an empty line")
+        return heard
 
     def _at_prompt(self, heard: bytes) -> bool:
-        said = heard.replace(self._profile.key, b"").rstrip()  # echoes of our key may be mixed in
-        return any(said.endswith(prompt) for prompt in self._profile.prompt)
+        """Its last line is a prompt and nothing else; echoes of our key may be mixed in."""
+        said = heard.replace(self._profile.key, b"").replace(b"\r", b"\n").rsplit(b"\n", 1)[-1].strip()
+        return said in self._profile.prompt
 
-    def _command(self, command: bytes) -> None:
+    def _load(self) -> None:
+        """LOAD, once more where it was refused: the line may have garbled it. Refused, it erases nothing."""
         self._progress("2 of 4: asking it to load a program", None)
-        self._drain()
-        self._state = HALF  # from LOAD on the old program may be erased
-        self._write(command + self._profile.line_end)
+        profile = self._profile
+        for last in (False, True):
+            self._state = ASKED
+            self._write(profile.load + profile.line_end)
+            heard = self._expect(profile.ready, ANSWER_WAIT, "after LOAD", refused=profile.refused)
+            if not any(text in heard for text in profile.refused):
+                self._state = HALF  # from here on the old program is erased
+                return
+            self._state = UNTOUCHED
+            if last:
+                raise LoadError(f"the loader said {_shown(heard)} after LOAD", self._state, AGAIN)
+            self._fresh_prompt()
 
     def _send(self, image: bytes) -> None:
         data = image + (bytes([sum(image) & 0xFF]) if self._profile.byte_sum else b"")
@@ -210,17 +161,19 @@ class Loading:
             self._progress("3 of 4: sending the program", at / len(data))
             self._line.write(data[at:at + CHUNK])
 
-    def _expect(self, texts: tuple[bytes, ...], seconds: float, when: str) -> None:
+    def _expect(self, texts: tuple[bytes, ...], seconds: float, when: str, refused: tuple[bytes, ...] = ()) -> bytes:
+        """What it says until one of these texts, or of `refused`; LoadError at a failure, or at nothing of all that."""
         heard, waited = b"", 0.0
-        while not any(text in heard for text in texts):
+        while not any(text in heard for text in (*texts, *refused)):
             failed = [text for text in self._profile.failure if text in heard]
-            if failed:
+            if failed and not any(text.startswith(f) for f in failed for text in refused):
                 raise LoadError(f"the loader said {_shown(heard)} {when}", self._state, AGAIN)
             if waited >= seconds:
                 self._nothing_known(heard, when)
             new = self._read(0.1)
             waited += 0.1
             heard += new
+        return heard
 
     def _nothing_known(self, heard: bytes, when: str) -> None:
         if not heard:
@@ -229,20 +182,55 @@ class Loading:
                         f"if that is right, add it there; {AGAIN}")
 
     def _start(self) -> StateMessage:
+        """The program is what starts after the next reset, too; then it is started, and says so itself."""
+        profile = self._profile
         self._progress("4 of 4: starting it", None)
-        self._collect(0.2)
-        self._write(self._profile.start + self._profile.line_end)
+        self._until_quiet()
+        self._write(profile.keep + profile.line_end)
+        said = self._until_prompt(PROMPT_AGAIN)
+        if any(text in said for text in profile.refused):
+            self._transcript.note("we note", f"{profile.keep.decode()} is unknown to it: it may wait for commands after a reset")
+        self._fresh_prompt()
+        self._write(profile.start + profile.line_end)
+        for again in (False, True):
+            found = self._first_word(b"" if not again else frame(FrameType.ASK))
+            if found is not None:
+                return found
+            self._reopen()
+        raise LoadError("the new program did not speak", self._state, RESTART)
+
+    def _first_word(self, ask: bytes) -> StateMessage | None:
         reader, waited = FrameReader(), 0.0
         while waited < START_WAIT:
-            for frame in reader.feed(self._read(0.1)):
-                said = message(frame)
+            if ask:
+                self._write(ask)
+            for got in reader.feed(self._read(0.1)):
+                said = message(got)
                 if isinstance(said, StateMessage):
                     return said
             waited += 0.1
-        raise LoadError("the new program did not speak", self._state, RESTART)
+        return None
 
-    def _drain(self) -> None:
-        self._collect(0.1)
+    def _reopen(self) -> None:
+        self._transcript.note("we note", "the port is closed and opened again")
+        self._line.reopen()
+
+    def _until_quiet(self) -> bytes:
+        """What it says until it has been silent for a while."""
+        heard = new = self._collect(QUIET)
+        while new:
+            new = self._collect(QUIET)
+            heard += new
+            if len(heard) > 65536:
+                break
+        return heard
+
+    def _until_prompt(self, seconds: float) -> bytes:
+        heard, waited = b"", 0.0
+        while waited < seconds and not self._at_prompt(heard):
+            heard += self._read(0.05)
+            waited += 0.05
+        return heard + self._collect(QUIET)
 
     def _collect(self, seconds: float) -> bytes:
         heard, waited = b"", 0.0

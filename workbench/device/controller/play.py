@@ -34,6 +34,12 @@ REST = 1.0
 """How long it stands there before it plays [s]; a recording needs half a second of it."""
 KEPT = 0.9
 """How much of that the joint log keeps [s]."""
+SPARE = 0.5
+"""How much longer than planned it may play [s]: its clock and the computer's, and a frame's way."""
+SILENT = 1.0
+"""Without a word from it while it plays, which sends 41 rounds a second [s]."""
+ENDED = "the table came to its end"
+UNCONFIRMED = "; the release was not confirmed, so the robot may still hold: hold START for 1.5 s, or switch it off"
 BYTE = 10 / 57_600
 FIRST_POSE = 0.004
 """From where it says that it plays to the first pose's packet [s]: POSE_GUARD_MS of its program."""
@@ -53,11 +59,30 @@ class ControllerRun:
     stopped: str
 
 
-class Controller:
-    """One conversation. port: dynamixel-sdk's, with `pause` (`SerialPort` at 57,600 bit/s, or a virtual one)."""
+class StopAskedError(Exception):
+    """The user wants it to end; `reason` in words."""
 
-    def __init__(self, port: Any) -> None:
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
+
+
+class NothingPlayedError(BusError):
+    """It was stopped before it played, and released; `reason` as `stop` said it."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"stopped: {reason}; nothing was played")
+
+
+class Controller:
+    """One conversation. port: dynamixel-sdk's, with `pause` (`SerialPort` at 57,600 bit/s, or a virtual one).
+
+    stop: "" until it should end, then why. Every wait looks at it and raises StopAskedError, once for each reason."""
+
+    def __init__(self, port: Any, stop: Callable[[], str] = lambda: "") -> None:
         self._port, self._reader = port, FrameReader()
+        self._stop, self._heeded = stop, ""
         self.heard: list[tuple[float, Message]] = []
 
     def now(self) -> float:
@@ -82,13 +107,19 @@ class Controller:
             self._send(frame(FrameType.PLAY))
         end = self.now() + TO_NEUTRAL
         while state.state != ControllerState.NEUTRAL:
-            found = self._wait(lambda m: isinstance(m, StateMessage), end - self.now())
-            if not isinstance(found, StateMessage):
-                raise BusError(f"it did not come to neutral in {TO_NEUTRAL:g} s; it is at {state.state.name}: {state.reason}")
-            state = found
+            state = self._next_state(state, end)
             if state.state == ControllerState.LIMP:
                 raise BusError(f"its torque stays off: {_reason(state)}")
         return state
+
+    def _next_state(self, state: StateMessage, end: float) -> StateMessage:
+        """The next state that it tells or, where that was lost on the way, that it tells when asked; BusError after `end`."""
+        while self.now() < end:
+            found = self._wait(lambda m: isinstance(m, StateMessage), min(1.0, end - self.now()))
+            if isinstance(found, StateMessage):
+                return found
+            self._send(frame(FrameType.ASK))
+        raise BusError(f"it did not come to neutral in {TO_NEUTRAL:g} s; it is at {state.state.name}: {state.reason}")
 
     def upload(self, table: TableFile) -> None:
         """Brings a table over, to be played from its first pose on; BusError with the controller's reason where it is refused."""
@@ -102,30 +133,50 @@ class Controller:
         if not answer.well:
             raise BusError(f"the table is refused: {answer.result}")
 
-    def play(self, seconds: float, stop: Callable[[], str], progress: Callable[[str, float | None], None]) -> tuple[float, str]:
-        """Plays for so long; the time at which it began on its own clock [s], and why it ended early."""
+    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
+        """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
         self._wait(lambda m: False, REST)
         self._send(frame(FrameType.PLAY))
-        began = self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.PLAY, ANSWER)
-        if not isinstance(began, StateMessage):
-            raise BusError("it was commanded to play, and does not")
-        end, stopped = self.now() + seconds, ""
-        while self.now() < end and not stopped:
-            progress("playing", 1 - (end - self.now()) / seconds)
-            left = self._wait(_left_play, min(0.1, end - self.now()))
-            if isinstance(left, StateMessage) and self.now() < end - 0.05:
-                stopped = _reason(left)
-            elif stop():
-                stopped = stop()
-        if stopped:
-            self._send(frame(FrameType.STOP))
-        return began.time, stopped
+        began = self._wait(_on_the_way, ANSWER)
+        if isinstance(began, StateMessage) and began.state == ControllerState.RAMP:  # the first pose is too far for its speed
+            began = self._wait(_plays_or_gave_up, TO_NEUTRAL)
+        if not isinstance(began, StateMessage) or began.state != ControllerState.PLAY:
+            why = f": {_reason(began)}" if isinstance(began, StateMessage) else ""
+            raise BusError("it was commanded to play, and does not" + why)
+        end = self.now() + seconds
+        while True:
+            left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
+            if left is not None:
+                said = left if isinstance(left, StateMessage) else self.state()
+                return began.time, "" if said.reason == ENDED else _reason(said)
+            if self.now() >= end + SPARE:
+                return began.time, f"it still plays {SPARE:g} s after its end"
+            if self.now() - self.heard[-1][0] > SILENT:
+                raise BusError("the controller fell silent; the robot plays on by itself: hold START for 1.5 s, or switch it off")
+            progress("playing", min(1 - (end - self.now()) / seconds, 1.0))
 
-    def release(self) -> None:
-        """Torque off, once it stands in neutral again, or after a while anyway."""
-        self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.NEUTRAL, 8.0)
-        self._send(frame(FrameType.RELEASE))
-        self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.LIMP, ANSWER)
+    def back(self) -> str:
+        """Waits until it stands in neutral, having told it to stop if it is on its way elsewhere; "", or what it says instead."""
+        end, state = self.now() + TO_NEUTRAL, self.state()
+        if state.state in (ControllerState.CHECK, ControllerState.RAMP, ControllerState.PLAY):
+            self._send(frame(FrameType.STOP))
+        while state.state not in (ControllerState.NEUTRAL, ControllerState.LIMP, ControllerState.STILL):
+            state = self._next_state(state, end)
+        return "" if state.state == ControllerState.NEUTRAL else _reason(state)
+
+    def release(self) -> bool:
+        """Torque off, whatever it is at and whatever is asked meanwhile; whether it said so."""
+        self._stop = lambda: ""
+        for _ in range(3):
+            self._send(frame(FrameType.RELEASE))
+            if self._wait(lambda m: isinstance(m, StateMessage) and m.state == ControllerState.LIMP, 0.5) is not None:
+                return True
+        return False
+
+    def began(self) -> float | None:
+        """When it last began to play [s of its own clock], None where it never did."""
+        told = [m for _, m in self.heard if isinstance(m, StateMessage) and m.state == ControllerState.PLAY]
+        return told[-1].time if told else None
 
     def clock_offset(self) -> float:
         """The computer's clock less the controller's [s]: the soonest arrival of a round, less what its bytes take."""
@@ -142,6 +193,10 @@ class Controller:
         """The first message that is wanted, None after so long; all are kept."""
         end = self.now() + seconds
         while self.now() < end:
+            reason = self._stop()
+            if reason and reason != self._heeded:
+                self._heeded = reason
+                raise StopAskedError(reason)
             try:
                 data = bytes(self._port.readPort(256))
             except GONE as e:
@@ -161,19 +216,24 @@ class Controller:
 
 def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, profile: ServoProfile, stop: Callable[[], str],
                        progress: Callable[[str, float | None], None] | None = None) -> ControllerRun:
-    """Neutral, upload, play, release, and the joint log of it. seconds: how long the table plays with its cycles.
+    """Upload, neutral, play, release, and the joint log of it. seconds: how long the table plays with its cycles.
 
-    BusError in one line where the controller is not there, does not get to neutral, or refuses the table."""
+    BusError in one line where the controller is not there, refuses the table, does not get to neutral, or was stopped before it
+    played. However this ends, the robot is released, or the message says that nobody knows."""
     tell = progress or (lambda what, done: None)
-    controller = Controller(port)
-    tell("to neutral", None)
-    controller.to_neutral()
-    tell("uploading", None)
-    controller.upload(table)
-    began, stopped = controller.play(seconds, stop, tell)
+    controller = Controller(port, stop)
+    try:
+        began, stopped = _perform(controller, table, seconds, tell)
+    except BusError as e:
+        raise BusError(f"{e}{'' if _let_go(controller) else UNCONFIRMED}") from None
+    except BaseException:
+        _let_go(controller)
+        raise
+    if not _let_go(controller):
+        raise BusError((stopped or "played") + UNCONFIRMED)
+    if began is None:
+        raise NothingPlayedError(stopped)
     first = began + FIRST_POSE + (8 + 5 * len(table.table.joints)) * BUS_BYTE
-    tell("back to neutral", None)
-    controller.release()
     rounds = [m for _, m in controller.heard if isinstance(m, LogMessage) and first - KEPT <= m.time <= first + seconds]
     write_telemetry(log, rounds, table.table.joints, profile)
     started = first + controller.clock_offset()
@@ -181,8 +241,44 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
     return ControllerRun(started, started + seconds, first - zero, len(rounds), stopped)
 
 
+def _perform(controller: Controller, table: TableFile, seconds: float,
+             tell: Callable[[str, float | None], None]) -> tuple[float | None, str]:
+    """Upload, neutral, play, neutral. The table goes first: one that is refused moves nothing. When it began (None: it did not),
+    and why it ended early."""
+    began, stopped = None, ""
+    try:
+        try:
+            tell("uploading", None)
+            controller.upload(table)
+            tell("to neutral", None)
+            controller.to_neutral()
+            began, stopped = controller.play(seconds, tell)
+        except StopAskedError as e:
+            began, stopped = controller.began(), e.reason
+        tell("back to neutral", None)
+        why = controller.back()
+        return began, stopped or why
+    except StopAskedError as e:
+        return began, e.reason
+
+
+def _let_go(controller: Controller) -> bool:
+    try:
+        return controller.release()
+    except BusError:
+        return False
+
+
 def _left_play(said: Message) -> bool:
-    return isinstance(said, StateMessage) and said.state != ControllerState.PLAY
+    return isinstance(said, StateMessage | LogMessage) and said.state != ControllerState.PLAY
+
+
+def _on_the_way(said: Message) -> bool:
+    return isinstance(said, StateMessage) and said.state in (ControllerState.PLAY, ControllerState.RAMP)
+
+
+def _plays_or_gave_up(said: Message) -> bool:
+    return isinstance(said, StateMessage) and said.state != ControllerState.RAMP
 
 
 def _reason(state: StateMessage) -> str:

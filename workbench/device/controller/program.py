@@ -7,13 +7,14 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from workbench.device.controller.loader import LoaderProfile, check_image
+from workbench.device.controller.loader_profile import LoaderProfile, check_image
 from workbench.device.tables.limits import Violation, refuse_broken_limits
-from workbench.device.tables.table_file import TableFile, bounds_of, encode_table, read_table_file, too_long
+from workbench.device.tables.table_file import TableFile, encode_table, read_table_file, table_file, too_long
 from workbench.files import InputError
 from workbench.files.resources import resource_dir
 from workbench.motion import load_motion
 from workbench.robot import RobotModel
+from workbench.robot.servo_units import known_units
 
 COMPILER = "arm-none-eabi-gcc"
 
@@ -27,23 +28,30 @@ class Program:
     violations: tuple[Violation, ...]
 
 
-def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: bool) -> tuple[TableFile, tuple[Violation, ...]]:
+CYCLES = 10
+"""After which a robot stops that nobody has told for how long: the radio that would stop it loses words."""
+
+
+def table_of(motion: str | Path, model: RobotModel, cycles: int | None, force: bool,
+             endless: bool = False) -> tuple[TableFile, tuple[Violation, ...]]:
     """The table of a motion (CSV or .mtn), or a binary table as it is; InputError where a limit is broken, unless `force`.
 
-    cycles: stops after so many; None: goes on until it is stopped.
+    cycles: stops after so many; None: as many as the motion says, else CYCLES. endless: goes on until it is stopped.
     """
     if Path(motion).suffix == ".table":
         return read_table_file(motion), ()
     loaded = load_motion(motion, model)
+    known_units(model, loaded.joints)
     table = loaded.as_table()
     violations = refuse_broken_limits(table, model, force, None, "not loaded")
-    return TableFile(table, bounds_of(table, model), cycles or 0, cycles is not None), tuple(violations)
+    often = 0 if endless else loaded.often(cycles, CYCLES)
+    return table_file(table, model, often, not endless), tuple(violations)
 
 
 def build_program(motion: str | Path, model: RobotModel, profile: LoaderProfile, folder: Path, cycles: int | None = None,
-                  force: bool = False) -> Program:
+                  force: bool = False, endless: bool = False) -> Program:
     """Conversion, compilation and a look at the result; all in `folder`. InputError names what is in the way."""
-    table, violations = table_of(motion, model, cycles, force)
+    table, violations = table_of(motion, model, cycles, force, endless)
     data = encode_table(table)
     long = too_long(len(table.joints), len(table.table))
     if long:

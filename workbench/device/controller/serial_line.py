@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from pathlib import Path
 
@@ -33,6 +34,17 @@ class SerialLine:
             if data or time.monotonic() >= until:
                 return data
             time.sleep(0.002)
+
+    def reopen(self) -> None:
+        """Closes and opens it again, with DTR and RTS low, which reset some boards; a board may be deaf until then."""
+        self._guard(self._port.close)
+        self._guard(self._port.open)
+        self.lines_low()
+
+    def lines_low(self) -> None:
+        """DTR and RTS low; nothing where a port has none."""
+        with contextlib.suppress(OSError):
+            self._port.dtr = self._port.rts = False
 
     def close(self) -> None:
         """Gives the port back."""

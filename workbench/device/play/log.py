@@ -22,6 +22,10 @@ HOLE = 4.0
 """Longest time between two readings of a servo that is bridged, in usual times between them."""
 
 
+class NothingPlayedError(InputError):
+    """A journal that holds no motion."""
+
+
 @dataclass
 class _Content:
     joints: tuple[str, ...]
@@ -40,7 +44,7 @@ def finish_log(journal: str | Path, log: str | Path) -> Path:
     """
     content = _read(journal)
     if not content.sent or not all(len(content.read.get(j, ())) > 1 for j in content.joints):
-        raise InputError(journal, "no goals, or a joint that was not read twice; expected a motion that was played")
+        raise NothingPlayedError(journal, "no goals, or a joint that was not read twice; expected a motion that was played")
     start = _rest_begins(content)
     end = max(rows[-1][0] for rows in content.read.values())
     poses = [t for t, _ in content.sent if t >= start]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
-from workbench.device.play.log import finish_log
+from workbench.device.play.log import NothingPlayedError, finish_log
 from workbench.device.play.player import Played, PlayOptions, play
 from workbench.device.play.watch import WatchOptions
 from workbench.files import InputError
@@ -27,7 +27,8 @@ def preflight(found: Survey) -> None:
 def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callable[[], str], options: PlayOptions | None = None,
             watching: WatchOptions | None = None, progress: Callable[[str, float | None], None] | None = None) -> Played:
     """Plays commands on servos that pass the preflight and writes the joint log. While it runs, LOG.play holds what was done; it
-    goes when the log is on the disk. BusError, or InputError, where it could not be played to an end that is in order."""
+    goes when the log is on the disk. BusError, or InputError, where it could not be played to an end that is in order; where it
+    was stopped before there was anything to log, `log_problem` says so."""
     preflight(found)
     joints = [servo.joint for servo in found.found.values() if servo.joint is not None]
     path = log.with_suffix(".play")
@@ -36,10 +37,23 @@ def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callab
             played = play(bus, found, commands, journal, stop, options, watching, progress)
         except BaseException:
             journal.close()
-            with suppress(InputError):
-                finish_log(path, log)
-                path.unlink()
+            _finish(path, log)
             raise
-    finish_log(path, log)
+    problem = _finish(path, log)
+    if problem is not None and not played.stopped:
+        raise problem
+    return replace(played, log_problem="" if problem is None else problem.problem)
+
+
+def _finish(path: Path, log: Path) -> InputError | None:
+    """Makes the log and takes the journal away; why there is no log. A journal without a motion in it goes as well, as it would
+    only be in the way of the next one; any other stays, for --finish."""
+    try:
+        finish_log(path, log)
+    except NothingPlayedError as e:
+        path.unlink()
+        return e
+    except InputError as e:
+        return e
     path.unlink()
-    return played
+    return None

@@ -6,17 +6,19 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from workbench.device.bus.bus import Bus, BusOptions
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.rig import Rig
-from workbench.device.play.watch import Reaction, Watch, WatchOptions
+from workbench.device.play.watch import Reaction, StopError, Watch, WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 
 Progress = Callable[[str, float | None], None]
+HOLDING = "the servos could not be told to let go and may hold their last goal: switch the robot's power off"
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,9 @@ class PlayOptions:
     how long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there
     itself before it is let down onto its droop [rad]; seat_seconds: how long it gets for that, and then to come to rest [s].
     rest: how long the robot stands in neutral before the first pose and after the last [s]; a recording needs half a second of
-    it. watchdog: silence after which servos that can stop by themselves do [s]. hold: torque stays on at the end.
+    it. watchdog: silence after which servos that can stop by themselves do [s]. start_torque: share of the torque limit that the
+    servos get for the first way to neutral, so that a joint that is caught somewhere is not torn off. torque: the same for the
+    motion. hold: torque stays on at the end.
     """
 
     ramp_speed: float = 0.6
@@ -39,6 +43,8 @@ class PlayOptions:
     seat_seconds: float = 0.3
     rest: float = 1.0
     watchdog: float = 0.5
+    start_torque: float = 0.5
+    torque: float = 1.0
     hold: bool = False
 
 
@@ -46,7 +52,8 @@ class PlayOptions:
 class Played:
     """How it went. started: when the first pose was sent, ended: when the last one's
     dwell was over or the motion was stopped, on the bus's clock [s]. worst_late: by which a pose was late [s].
-    stopped: why it ended early, "" where it did not. released: whether torque is off."""
+    stopped: why it ended early, "" where it did not. released: whether torque is off. unknown: joints that did not say so when
+    they were asked. log_problem: why there is no joint log, "" where there is one."""
 
     journal: Path
     started: float
@@ -55,22 +62,16 @@ class Played:
     worst_late: float
     stopped: str
     released: bool
-
-
-class _StopError(Exception):
-    """Ends the motion; carries the reaction."""
-
-    def __init__(self, reaction: Reaction) -> None:
-        super().__init__(reaction.reason)
-        self.reaction = reaction
+    unknown: tuple[str, ...] = ()
+    log_problem: str = ""
 
 
 def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop: Callable[[], str],
          options: PlayOptions | None = None, watching: WatchOptions | None = None, progress: Progress | None = None) -> Played:
     """Plays commands on the servos of a survey that had no problems.
 
-    stop(): why it should end, "" as long as it should not (a signal). BusError where the bus fails before anything moved, or for
-    good; then what is left of the bus has been told to release.
+    stop(): why it should end, "" as long as it should not (a signal); where what it says changes, torque goes off at once.
+    BusError where the bus fails before anything moved, or for good; then what is left of the bus has been told to release.
     """
     ids = {servo.joint: servo.id for servo in found.found.values() if servo.joint is not None}
     unknown = [joint for joint in commands.joints if joint not in ids]
@@ -78,7 +79,8 @@ def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop
         raise InputError(None, f"the motion moves joint {unknown[0]}, which is not on the bus")
     limits = {servo.id: servo.registers.get("temperature_limit", 70) for servo in found.found.values()}
     watch = Watch(bus.profile, {i: j for j, i in ids.items()}, limits, watching)
-    rig = Rig(bus, ids, watch, journal)
+    torque_limits = {s.joint: s.registers["torque_limit"] for s in found.found.values() if s.joint is not None}
+    rig = Rig(bus, ids, watch, journal, torque_limits)
     return _Performance(rig, stop, options or PlayOptions(), progress or (lambda what, done: None)).run(commands)
 
 
@@ -89,39 +91,41 @@ class _Performance:
         self.rig, self.stop, self.options, self.progress = rig, stop, options, progress
         self.started, self.ended, self.poses, self.worst_late = math.nan, math.nan, 0, 0.0
         self.goals: dict[str, float] = {}
+        self._asked = ""
+        self._energised = False
 
     def run(self, commands: Commands) -> Played:
         rig, bus = self.rig, self.rig.bus
         neutral = dict.fromkeys(rig.ids, 0.0)
         kept, bus.options = bus.options, BusOptions(tries=1, settle=bus.options.settle)
-        stopped = ""
-        released = False
+        stopped, released = "", not self.options.hold
+        unknown: tuple[str, ...] = ()
         try:
-            self._take_hold(kept)
             try:
-                self._ramp(neutral, "to neutral")
-                self._arrived(neutral)
-                self._seat(neutral)
+                self._take_hold(kept)
+                self._to_neutral(neutral)
                 self._rest()
                 self._poses(commands)
                 self._ramp(neutral, "back to neutral")
+                self._arrived(neutral)
                 self._rest()
-            except _StopError as e:
-                stopped = self._stopped(e.reaction, neutral)
-            if not self.options.hold or stopped:
-                bus.release(rig.ids.values())
-                rig.journal.write(t=bus.now(), torque=dict.fromkeys(rig.ids, False))
-                released = True
+            except StopError as e:
+                stopped, released = self._stopped(e.reaction, neutral), True
+            bus.options = kept
+            if released and self._energised:
+                unknown = rig.release()
             self._watchdog(0)
+            rig.limit_torque(1)
             rig.mark(False)
             bus.pause(0.002)
         except BaseException as e:
             rig.journal.write(t=_time(bus), stopped=str(e) or type(e).__name__)
-            self._let_go()
+            if self._energised and not self._let_go() and isinstance(e, BusError):
+                raise type(e)(f"{e.said}; {HOLDING}", e.servo, e.joint, e.register) from None
             raise
         finally:
             bus.options = kept
-        return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released)
+        return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown)
 
     def _take_hold(self, careful: BusOptions) -> None:
         """Torque on, each joint where it is: reads before it writes anything, with as many tries as it takes."""
@@ -131,12 +135,23 @@ class _Performance:
         self.goals = rig.measure()
         self._keep_in_range()
         slow = dict.fromkeys(rig.ids, self.options.ramp_speed)
+        self._look_at_stop()
+        self._energised = True
+        rig.limit_torque(self.options.start_torque)
         rig.send(self.goals, slow)
         rig.torque(True)
         rig.send(self.goals, slow)  # families that forget a goal while torque is off
         self._watchdog(self.options.watchdog)
         rig.mark(True)
         bus.options = BusOptions(tries=1, settle=careful.settle)
+        rig.watch.begin(bus.now())
+
+    def _to_neutral(self, neutral: Mapping[str, float]) -> None:
+        """The first way, with little torque; then with as much as the motion gets, so that the joints are where it begins."""
+        self._ramp(neutral, "to neutral")
+        self._arrived(neutral)
+        self.rig.limit_torque(self.options.torque)
+        self._seat(neutral)
 
     def _keep_in_range(self) -> None:
         profile = self.rig.bus.profile
@@ -150,10 +165,10 @@ class _Performance:
         """All joints to a pose, smoothly, the farthest at the ramp's speed."""
         start, options = dict(self.goals), self.options
         duration = max(max(abs(target[j] - start[j]) for j in start) / options.ramp_speed, 0.3)
-        bus, begin = self.rig.bus, self.rig.bus.now()
+        bus, last, gone = self.rig.bus, self.rig.bus.now(), 0.0
         speeds = dict.fromkeys(start, 2 * options.ramp_speed)
         while True:
-            s = min((bus.now() - begin) / duration, 1.0)
+            s = min(gone / duration, 1.0)
             weight = s * s * (3 - 2 * s)
             self.progress(what, s)
             self.goals = {j: start[j] + weight * (target[j] - start[j]) for j in start}
@@ -161,6 +176,8 @@ class _Performance:
             if s >= 1:
                 return
             self._read_until(bus.now() + options.step)
+            gone += min(bus.now() - last, 2 * options.step)  # a computer that stood still goes on where it was
+            last = bus.now()
 
     def _arrived(self, target: Mapping[str, float]) -> None:
         """Waits until every joint is near its goal; a joint that never is ends it: something holds it, or it has no strength."""
@@ -173,7 +190,7 @@ class _Performance:
             if bus.now() >= end:
                 joint, angle = next(iter(far.items()))
                 stands, wanted = math.degrees(angle), math.degrees(target[joint])
-                raise _StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): stands at {stands:.0f} deg and not "
+                raise StopError(Reaction("release", f"servo {self.rig.ids[joint]} ({joint}): stands at {stands:.0f} deg and not "
                                                      f"at {wanted:.0f}; what holds it?"))
 
     def _seat(self, target: Mapping[str, float]) -> None:
@@ -221,24 +238,38 @@ class _Performance:
         self.ended = bus.now()
 
     def _read_until(self, due: float) -> None:
-        self.rig.read_until(due, lambda: bool(self.stop()))
+        self.rig.read_until(due, lambda: self.stop() != self._asked)
         if self.rig.watch.reaction is not None:
-            raise _StopError(self.rig.watch.reaction)
-        if self.stop():
-            raise _StopError(Reaction("neutral", self.stop()))
+            raise StopError(self.rig.watch.reaction)
+        self._look_at_stop()
+
+    def _look_at_stop(self) -> None:
+        """Who asks once gets a ramp to neutral, who asks twice gets torque off at once."""
+        asked = self.stop()
+        if asked != self._asked:
+            how: Literal["neutral", "release"] = "release" if self._asked else "neutral"
+            self._asked = asked
+            raise StopError(Reaction(how, asked))
 
     def _stopped(self, reaction: Reaction, neutral: Mapping[str, float]) -> str:
-        """Does what the reaction says. On the way to neutral nothing but time and a lost port ends it any more."""
+        """Does what the reaction says, and says why, and what came in between. On the way to neutral only what releases, or a
+        second signal, ends it."""
         rig = self.rig
         self.ended = rig.bus.now() if math.isnan(self.ended) else self.ended
         rig.journal.write(t=rig.bus.now(), stopped=reaction.reason)
-        if reaction.how == "neutral":
-            rig.watch = Watch(rig.bus.profile, {}, {}, WatchOptions(confirm=10**9, silent=math.inf))
-            self.stop = lambda: ""
-            known = {j: a for j, a in rig.angles.items() if math.isfinite(a)}
-            self.goals = {j: known.get(j, g) if abs(known.get(j, g) - g) > 0.5 else g for j, g in self.goals.items()}
-            self._keep_in_range()
+        if reaction.how == "release" or not self._energised:
+            return reaction.reason
+        rig.watch.only_release()
+        self._watchdog(0)  # one that has stopped its servo refuses goals until it is cleared
+        self._watchdog(self.options.watchdog)
+        self.goals = {j: rig.angles[j] if abs(rig.angles[j] - g) > self.options.arrive else g for j, g in self.goals.items()}
+        self._keep_in_range()
+        try:
             self._ramp(neutral, f"stopping ({reaction.reason})")
+        except StopError as e:
+            rig.journal.write(t=rig.bus.now(), stopped=e.reaction.reason)
+            more = e.reaction.reason
+            return more if more.startswith(reaction.reason) else f"{reaction.reason}; then {more}"
         return reaction.reason
 
     def _watchdog(self, seconds: float) -> None:
@@ -248,12 +279,14 @@ class _Performance:
             name, unit = profile.watchdog
             self.rig.bus.sync_write({i: {name: round(seconds / unit)} for i in self.rig.ids.values()})
 
-    def _let_go(self) -> None:
-        """The last try, on a bus that may be gone."""
+    def _let_go(self) -> bool:
+        """On a bus that may be gone; whether it could be told."""
         try:
             self.rig.bus.release(self.rig.ids.values())
+            self.rig.limit_torque(1)
         except (BusError, InputError):
-            return
+            return False
+        return True
 
 
 def _time(bus: Bus) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,13 +19,21 @@ class Reaction:
     reason: str
 
 
+class StopError(Exception):
+    """Ends a motion; carries the reaction."""
+
+    def __init__(self, reaction: Reaction) -> None:
+        super().__init__(reaction.reason)
+        self.reaction = reaction
+
+
 @dataclass(frozen=True)
 class WatchOptions:
     """When a reading counts.
 
-    confirm: how many readings in a row of one servo. silent: how long it may say nothing [s]. cooler: how far below the limit at
-    which it shuts itself down it has to stay [deg C], so that there is torque left for the way to neutral. dead: share of the
-    lowest voltage below which a ramp would only brown out again.
+    confirm: how many readings, or unanswered questions, in a row of one servo. silent: how long it may go unheard [s], whether
+    it was asked or not. cooler: how far below the limit at which it shuts itself down it has to stay [deg C], so that there is
+    torque left for the way to neutral. dead: share of the lowest voltage below which a ramp would only brown out again.
     """
 
     confirm: int = 2
@@ -33,6 +42,8 @@ class WatchOptions:
     dead: float = 0.75
 
 
+TRIPPED = 255
+"""What the register of a bus watchdog holds once it has stopped the servo, which then refuses goals."""
 SUDDEN = ("electrical shock", "current")
 """Alarms of a servo that burns what it gets: torque goes at once."""
 
@@ -45,12 +56,29 @@ class Watch:
         self._profile, self._joints, self._limits = profile, dict(joints), dict(limits)
         self._options = options or WatchOptions()
         self._seen: Counter[tuple[int, str]] = Counter()
+        self._failed: Counter[int] = Counter()
         self._answered: dict[int, float] = {}
+        self._only_release = False
         self.reaction: Reaction | None = None
+
+    def begin(self, time: float) -> None:
+        """From this time [s] on every servo counts as unheard until it answers."""
+        self._answered = dict.fromkeys(self._joints, time)
+        self._failed.clear()
+
+    def only_release(self) -> None:
+        """For the way back to neutral: forgets the reaction, and from now on only those that release are left."""
+        self._only_release, self.reaction = True, None
+        self._seen.clear()
+
+    def heard(self, servo: int) -> float:
+        """When a servo last answered [s]."""
+        return self._answered.get(servo, -math.inf)
 
     def answered(self, servo: int, time: float, values: Mapping[str, int], alarms: tuple[str, ...]) -> None:
         """A whole answer at a time [s]: registers in counts, and the alarms of its error byte."""
         self._answered[servo] = time
+        self._failed[servo] = 0
         low = self._profile.supply[0]
         volts = values["present_voltage"] / 10 if "present_voltage" in values else None
         heat, limit = values.get("present_temperature"), self._limits.get(servo, 70)
@@ -70,12 +98,27 @@ class Watch:
         if "torque_enable" in values:
             self._judge(servo, "limp", not values["torque_enable"], "neutral",
                         "its torque is off")
+        if self._profile.watchdog and self._profile.watchdog[0] in values:
+            self._judge(servo, "watchdog", values[self._profile.watchdog[0]] == TRIPPED, "neutral",
+                        "its bus watchdog stopped it: it heard nothing for too long")
 
     def silent(self, servo: int, time: float) -> None:
-        """No answer, or none that could be read, at a time [s]."""
-        since = time - self._answered.setdefault(servo, time)
-        if since >= self._options.silent:
-            self._react("neutral", servo, f"silent for {since:.1f} s")
+        """It was asked and did not answer, or not so that it could be read, at a time [s]."""
+        self._answered.setdefault(servo, time)
+        self._failed[servo] += 1
+        self.check(time)
+
+    def check(self, time: float) -> None:
+        """Whether every servo was heard not too long before a time [s]: silent where it was asked, unread where it was not."""
+        for servo, last in self._answered.items():
+            since = time - last
+            if since < self._options.silent:
+                continue
+            if self._failed[servo] >= self._options.confirm:
+                self._react("neutral", servo, f"silent for {since:.1f} s")
+            else:
+                self._react("neutral", servo, f"could not be read for {since:.1f} s, as the computer or the adapter was held up")
+            return
 
     def _judge(self, servo: int, what: str, bad: bool, how: Literal["neutral", "release"], reason: str) -> None:
         if not bad:
@@ -86,6 +129,6 @@ class Watch:
             self._react(how, servo, reason)
 
     def _react(self, how: Literal["neutral", "release"], servo: int, reason: str) -> None:
-        if self.reaction is None:
+        if self.reaction is None and (how == "release" or not self._only_release):
             joint = self._joints.get(servo)
             self.reaction = Reaction(how, f"servo {servo}" + (f" ({joint})" if joint else "") + f": {reason}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.device.tables.limits import Violation, refuse_broken_limits
-from workbench.device.tables.table_file import JointBounds, TableFile, bounds_of, encode_table, unplayable
+from workbench.device.tables.table_file import TableFile, encode_table, table_file, unplayable
 from workbench.files import InputError
 from workbench.files.numerals import whole_of
 from workbench.files.reading import read_text, write_together
@@ -20,7 +20,7 @@ from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, RobotModel, bus_ids
 from workbench.robot.servo_profile_file import servo_profile
-from workbench.robot.servo_units import AX12A, ServoUnits
+from workbench.robot.servo_units import AX12A, ServoUnits, known_units
 
 Counts = NDArray[np.int64]
 
@@ -47,30 +47,44 @@ def export(
     where a limit is broken, unless `force`; warnings never stop it. What the registers cannot hold is refused by all means.
     motion.table is for the CM-530's program, and left out where that cannot play it (other servos, or too many poses).
     """
+    check_servos(motion, model)
     table = motion.as_table()
     violations = refuse_broken_limits(table, model, force, simulated, "not exported")
-    other = unplayable(table)
-    bounds = None if other else lambda: bounds_of(table, model)
-    return Export(tuple(write_tables(table, out_dir, bus_ids(model), bounds)), tuple(violations), other)
+    other, file = unplayable(table), None
+    if not other:
+        file = table_file(table, model)
+        other = unplayable(file.table)
+    return Export(tuple(write_tables(table, out_dir, bus_ids(model), None if other else file)), tuple(violations), other)
+
+
+def check_servos(motion: Motion, model: RobotModel) -> None:
+    """Before anything is simulated: InputError where a joint's servo has no profile, so that its counts are unknown, or no bus ID
+    of its own."""
+    known_units(model, motion.joints)
+    _check_ids(motion.joints, bus_ids(model), motion.source)
+
+
+def _check_ids(joints: Sequence[str], ids: Mapping[str, int], source: str) -> None:
+    for joint in joints:
+        if joint not in ids:
+            raise InputError(source, f"joint {joint} has no bus ID; those that have: {' '.join(ids)}")
+    shared = [j for j in joints if [ids[k] for k in joints].count(ids[j]) > 1]
+    if shared:
+        raise InputError(source, f"joints {' and '.join(shared)} share bus ID {ids[shared[0]]}")
 
 
 def write_tables(
     table: PoseTable, folder: str | Path, ids: Mapping[str, int] = BUS_IDS,
-    bounds: Callable[[], tuple[JointBounds, ...]] | None = None,
+    file: TableFile | None = None,
 ) -> list[Path]:
-    """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where the joints' bounds are known, motion.table; all or none.
+    """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where `file` holds it with its bounds, motion.table; all or none.
 
     The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
     line that says the order of joints, the same in all files; where servos are none of the AX-12A's family, a second line says
     which they are, as counts are theirs; where there are poses of a start or a stop, a line says how many (SECTIONS). InputError
     for a joint without a bus ID.
     """
-    for joint in table.joints:
-        if joint not in ids:
-            raise InputError(table.source, f"joint {joint} has no bus ID; those that have: {' '.join(ids)}")
-    shared = [j for j in table.joints if [ids[k] for k in table.joints].count(ids[j]) > 1]
-    if shared:
-        raise InputError(table.source, f"joints {' and '.join(shared)} share bus ID {ids[shared[0]]}")
+    _check_ids(table.joints, ids, table.source)
     order = f"{ORDER} {' '.join(table.joints)}"
     if any(u != AX12A for u in table.units):
         order += f"\n{FAMILIES} {', '.join(u.family for u in table.units)}"
@@ -80,7 +94,7 @@ def write_tables(
     def text(rows: Counts) -> str:
         return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
 
-    binary = {BINARY: encode_table(TableFile(table, bounds()))} if bounds else {}
+    binary = {BINARY: encode_table(file)} if file else {}
     return write_together(folder, {
         GOALS: text(table.goals),
         SPEEDS: text(table.speeds),

@@ -16,6 +16,7 @@ from workbench.motion import PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, ServoConstants
 from workbench.robot.ranges import joint_ranges
+from workbench.robot.servo_units import maker_of
 
 Array = NDArray[np.float64]
 
@@ -87,7 +88,8 @@ def _positions(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
 
 def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     """Moving speeds beyond the no-load speed at the supply voltage; a warning from the speed on at which full duty only just
-    overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell."""
+    overcomes the servo's own friction. Speed 0 (at once) needs the travel over the dwell; in the first pose, from neutral, a
+    warning, as the workbench's own programs do not send it."""
     angles = table.angles()
     before = np.vstack([np.zeros((1, len(table.joints))), angles[:-1]]) if table.start else np.roll(angles, 1, axis=0)
     if not table.start:
@@ -106,6 +108,11 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
             text = (f"moving speed {table.speeds[k, i]} is {asked[k, i]:.1f} rpm, beyond {what}, "
                     f"{limit:.1f} rpm at {servo.supply_voltage:g} V")
             yield Violation("speed", joint, float(asked[k, i]), limit, "rpm", text, pose=int(k) + 1, warning=not broken)
+        away, dwell = abs(float(angles[0, i])), float(table.dwells_ms[0]) / 1000
+        if table.speeds[0, i] == 0 and away / dwell > no_load * RPM:
+            text = (f"moving speed 0, but {math.degrees(away):.1f} deg from neutral: play, run and flash go there slowly first; "
+                    "a program of your own has to do so, too")
+            yield Violation("speed", joint, away / dwell / RPM, no_load, "rpm", text, pose=1, warning=True)
 
 
 def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violation]:
@@ -130,8 +137,14 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
             yield Violation("torque", joint, value, limit, "N m", text)
         rms, advised = float(np.sqrt(np.nanmean(torque**2))), RECOMMENDED * servo.torque_at_full_duty
         if rms > advised:
-            text = f"torque of {rms:.2f} N m (RMS) is above a fifth of the stall torque, {advised:.2f} N m (ROBOTIS's rule)"
+            text = (f"torque of {rms:.2f} N m (RMS) is above a fifth of the stall torque, {advised:.2f} N m "
+                    f"({_rule(servo.model)})")
             yield Violation("torque", joint, rms, advised, "N m", text, warning=True)
+
+
+def _rule(model: str) -> str:
+    """Whose advice the share of the stall torque is: ROBOTIS gives it for its own servos."""
+    return "ROBOTIS's rule" if maker_of(model) == "ROBOTIS" else "ROBOTIS's rule for its own servos; ask the maker of this one"
 
 
 def _available(servo: ServoConstants, torque: Array, speed: Array) -> Array:

@@ -6,7 +6,7 @@ import math
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,8 @@ from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_units import AX12A
 
 MAGIC = b"WBTB"
-VERSION = 1
+VERSION, SECTIONS_VERSION = 1, 2
+"""A table with a start or a stop says how many poses they have, behind the same head."""
 STOPS = 1
 AX12A_NUMBER = 12
 CENTRE, LARGEST = AX12A.centre, AX12A.highest
@@ -30,6 +31,7 @@ SHORTEST_MS, LONGEST_MS = 10, 600_000
 """Dwells: a Sync Write, its verification and a repair have to fit in; longer than ten minutes is a mistake [ms]."""
 
 _HEAD = struct.Struct("<4sBBHHHI")
+_SECTIONS = struct.Struct("<HH")
 _JOINT = struct.Struct("<BBHHHHH")
 
 
@@ -80,6 +82,21 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
     return tuple(bounds)
 
 
+def table_file(table: PoseTable, model: RobotModel, cycles: int = 0, stops: bool = False) -> TableFile:
+    """A motion's table for the controller, with every joint of the model in order of their names; those that the motion leaves
+    out are held in neutral, as the computer's player holds them, and are read. InputError as `bounds_of`."""
+    absent = [joint for joint in model.joints if joint not in table.joints and joint in bus_ids(model)]
+    if any(table.units[0] != u for u in table.units) or table.units[0] != AX12A:
+        absent = []  # not playable anyway
+    goals = np.hstack([table.goals, np.full((len(table), len(absent)), CENTRE)])
+    speeds = np.hstack([table.speeds, np.zeros((len(table), len(absent)), dtype=np.int64)])
+    joints = (*table.joints, *absent)
+    order = np.argsort(joints)
+    whole = replace(table, joints=tuple(joints[k] for k in order), goals=goals[:, order], speeds=speeds[:, order],
+                    units=(AX12A,) * len(joints) if absent else table.units)
+    return TableFile(whole, bounds_of(whole, model), cycles, stops)
+
+
 def unplayable(table: PoseTable) -> str:
     """Why the controller's program cannot play a table, "" where it can: another servo family, or more poses than fit."""
     return other_family(table) or too_long(len(table.joints), len(table))
@@ -103,9 +120,9 @@ def too_long(joints: int, poses: int) -> str:
             f"({most_poses(joints)} poses)")
 
 
-def table_bytes(joints: int, poses: int) -> int:
-    """Size of a binary table [bytes]."""
-    return _HEAD.size + _JOINT.size * joints + (4 + 4 * joints) * poses + 4
+def table_bytes(joints: int, poses: int, sections: bool = False) -> int:
+    """Size of a binary table [bytes]. sections: it has a start or a stop."""
+    return _HEAD.size + (_SECTIONS.size if sections else 0) + _JOINT.size * joints + (4 + 4 * joints) * poses + 4
 
 
 def most_poses(joints: int) -> int:
@@ -121,8 +138,12 @@ def encode_table(file: TableFile) -> bytes:
         raise InputError(table.source, f"bounds of {len(file.joints)} joints for {len(table.joints)} columns")
     if len(table) > 0xFFFF or not 0 <= file.cycles <= 0xFFFF:
         raise InputError(table.source, f"{len(table)} poses, {file.cycles} cycles: expected at most 65535 of each")
-    size = table_bytes(len(file.joints), len(table))
-    parts = [_HEAD.pack(MAGIC, VERSION, len(file.joints) & 0xFF, len(table), flags, file.cycles, size)]
+    sections = bool(table.start or table.stop)
+    size = table_bytes(len(file.joints), len(table), sections)
+    version = SECTIONS_VERSION if sections else VERSION
+    parts = [_HEAD.pack(MAGIC, version, len(file.joints) & 0xFF, len(table), flags, file.cycles, size)]
+    if sections:
+        parts.append(_SECTIONS.pack(table.start, table.stop))
     try:
         parts += [_JOINT.pack(j.bus_id, 0, j.model_number, j.low, j.high, j.fastest, j.neutral) for j in file.joints]
         for dwell, goals, speeds in zip(table.dwells_ms, table.goals, table.speeds):
@@ -145,19 +166,27 @@ def decode_table(data: bytes, names: Mapping[int, str] | None = None, source: st
     magic, version, n, poses, flags, cycles, size = _HEAD.unpack_from(data)
     if magic != MAGIC:
         raise InputError(source, f"starts with {magic!r}, expected {MAGIC!r}")
-    if version != VERSION:
-        raise InputError(source, f"version {version}; expected {VERSION}")
+    if version not in (VERSION, SECTIONS_VERSION):
+        raise InputError(source, f"version {version}; expected {VERSION} or {SECTIONS_VERSION}")
+    sections = version == SECTIONS_VERSION
+    if sections and len(data) < _HEAD.size + _SECTIONS.size:
+        raise InputError(source, f"{len(data)} bytes: too short for a table with sections")
+    start, stop = _SECTIONS.unpack_from(data, _HEAD.size) if sections else (0, 0)
     if not 1 <= n <= MOST_JOINTS or not poses:
         raise InputError(source, f"{poses} poses of {n} joints; expected at least one pose of 1 to {MOST_JOINTS} joints")
+    if start + stop >= poses:
+        raise InputError(source, f"{start} poses of start and {stop} of stop, of {poses} in all; expected a loop between them")
     if flags & ~STOPS or (flags & STOPS and not cycles):
         raise InputError(source, f"flags {flags:#x} with {cycles} cycles mean nothing")
-    if size != len(data) or size != table_bytes(n, poses):
-        takes = table_bytes(n, poses)
+    takes = table_bytes(n, poses, sections)
+    if size != len(data) or size != takes:
         raise InputError(source, f"{len(data)} bytes, its head says {size}; {poses} poses of {n} joints take {takes}")
-    joints = _joints(data, n, source)
+    head = _HEAD.size + (_SECTIONS.size if sections else 0)
+    joints = _joints(data, n, head, source)
     if zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
         raise InputError(source, "its CRC-32 does not fit its content")
-    table = _poses(data, joints, poses, names or {v: k for k, v in BUS_IDS.items()}, source)
+    table = _poses(data, joints, poses, head, names or {v: k for k, v in BUS_IDS.items()}, source)
+    table = replace(table, start=start, stop=stop)
     return TableFile(table, joints, cycles, bool(flags & STOPS))
 
 
@@ -170,10 +199,10 @@ def read_table_file(path: str | Path, names: Mapping[int, str] | None = None) ->
     return decode_table(data, names, str(path))
 
 
-def _joints(data: bytes, n: int, source: str) -> tuple[JointBounds, ...]:
+def _joints(data: bytes, n: int, head: int, source: str) -> tuple[JointBounds, ...]:
     joints: list[JointBounds] = []
     for k in range(n):
-        bus_id, zero, number, low, high, fastest, neutral = _JOINT.unpack_from(data, _HEAD.size + _JOINT.size * k)
+        bus_id, zero, number, low, high, fastest, neutral = _JOINT.unpack_from(data, head + _JOINT.size * k)
         place = f"joint {k + 1}"
         if bus_id > 253 or zero or bus_id in [j.bus_id for j in joints]:
             raise InputError(source, f"{place}: bus ID {bus_id} is above 253, or there twice, or the byte after it is not 0")
@@ -183,9 +212,10 @@ def _joints(data: bytes, n: int, source: str) -> tuple[JointBounds, ...]:
     return tuple(joints)
 
 
-def _poses(data: bytes, joints: Sequence[JointBounds], poses: int, names: Mapping[int, str], source: str) -> PoseTable:
+def _poses(data: bytes, joints: Sequence[JointBounds], poses: int, head: int, names: Mapping[int, str],
+           source: str) -> PoseTable:
     n = len(joints)
-    rows = np.frombuffer(data, np.uint8, (4 + 4 * n) * poses, _HEAD.size + _JOINT.size * n).reshape(poses, -1)
+    rows = np.frombuffer(data, np.uint8, (4 + 4 * n) * poses, head + _JOINT.size * n).reshape(poses, -1)
     dwells = rows[:, :4].copy().view("<u4")[:, 0].astype(np.int64)
     counts = rows[:, 4:].copy().view("<u2").reshape(poses, n, 2).astype(np.int64)
     goals, speeds = counts[..., 0], counts[..., 1]

@@ -51,7 +51,7 @@ WORTH_SAYING = 0.01
 @dataclass(frozen=True)
 class Explanation:
     """The likeliest model, and all that was believed beside it. regions, fits, posteriors: alike, one a region; robot: what acts
-    in all of them; rejected: refuted by registers or by takes kept back."""
+    in all of them; rejected: refuted by registers or by takes kept back; stopped: by the limit of work."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -60,6 +60,7 @@ class Explanation:
     robot: RobotFound
     rejected: tuple[Rejected, ...]
     options: EvidenceOptions
+    stopped: bool = False
 
     @property
     def model(self) -> RobotModel:
@@ -170,8 +171,8 @@ def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:
 
 
 def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Candidate], progress: Progress,
-            options: EvidenceOptions | None = None) -> Explanation:
-    """Searches each joint's effects by evidence."""
+            options: EvidenceOptions | None = None, thorough: bool = False) -> Explanation:
+    """Searches each joint's effects by evidence. thorough: without a limit of work."""
     options = options or EvidenceOptions()
     whole = evaluator
     evaluator = whole.on(_begun(whole.evidence, options.seconds))
@@ -181,7 +182,8 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     asked, refuted = within_registers(felt, [e.take for e in evidence], options)
     regions = tuple(_region(j, evidence, nominal, asked, options) for j in joints)
     shared = [c for c in asked if not c.where] if len(nominal.joints) > 1 else []
-    robot, rejected = _searched(Rollouts.of(evaluator, nominal, regions), shared, felt, options, progress)
+    most_work = math.inf if thorough else options.most_work
+    robot, rejected = _searched(Rollouts.of(evaluator, nominal, regions, most_work), shared, felt, options, progress)
     rollouts, found, rejected = robot.rollouts, robot.found, [*refuted, *rejected]
     for _ in range(NUMERICS.rounds):
         said = [at_their_end(f.best.hypothesis, felt) for f in found]
@@ -197,6 +199,7 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
         left = lockstep(rollouts, {k: without_names(f, options, gone) for k, (f, gone) in enumerate(zip(found, said)) if gone})
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = gone_on(rollouts, found, options, progress)
+    stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
@@ -208,10 +211,9 @@ def explain(evaluator: RolloutEvaluator, nominal: RobotModel, pool: Sequence[Can
     everywhere = Whole(fine, (), options)
     together = everywhere.fitted(everywhere.begun([f.best for f in found]))
     robot = replace(robot, together=replace(together, log_posterior=robot.together.log_posterior))
-    whole.rollouts += evaluator.rollouts
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
-                       tuple(rejected), options)
+                       tuple(rejected), options, stopped)
 
 
 def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,

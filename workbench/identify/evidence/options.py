@@ -24,7 +24,8 @@ class EvidenceOptions:
     iterations: most steps of a fit. beam: states that are extended, and moves of one effect that are fitted of each; refined:
     moves of one or two that are, led of these by the same one; paired: of the best moves, those that are also predicted two at a
     time. most: effects of one joint. seconds: of all takes together that the search looks at, their beginnings; the last fit
-    sees all.
+    sees all. most_work [s]: of a puppy's rollouts at the search's step (`RolloutEvaluator.work`), after which nothing more is
+    tried unless the search is to be thorough: about an hour of a processor, several times what twelve logs of a servo need.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
     factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
@@ -48,6 +49,7 @@ class EvidenceOptions:
     most: int = 6
     explored: float = 0.15
     seconds: float = 100.0
+    most_work: float = 2e6
     occam: float = 7.0
     veto: float = 3.0
     sure: float = 3.0

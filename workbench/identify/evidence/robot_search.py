@@ -91,7 +91,7 @@ def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Cand
         added = [whole.fitted(more)] if more is not None and more.log_posterior > now.log_posterior else []
         swaps = _swaps(whole, found, now)
         best = max([now, *added, *(t for _, t in swaps)], key=lambda t: t.log_posterior)
-        if best is now or len(best.shared.effects) > NUMERICS.rounds:
+        if best is now or len(best.shared.effects) > NUMERICS.rounds or rollouts.exhausted:
             rivals = {c.key: (t.shared.effects[-1], t.log_posterior - now.log_posterior) for c, t in swaps}
             return RobotFound(rollouts, tuple(found), now, rivals=rivals)
         rollouts, found = gone_on(*_beside(rollouts, found, best), options, report)

@@ -1,11 +1,10 @@
-"""Rollouts of several regions at once; of servo logs on a fixed base straight from the compiled station where it covers them."""
+"""Rollouts of several regions at once."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,77 +15,18 @@ from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
-from workbench.simulation import SimulationConfig
-from workbench.simulation.compiled import NotCoveredError
-from workbench.simulation.compiled.angles import servo_angles
-from workbench.simulation.job import Job
 
 Array = NDArray[np.float64]
 Wants = tuple[int, Hypothesis]
 """A region, by its index, and what it wants rolled out."""
-SETTLE = 0.02
-"""Rest of a robot whose log begins elsewhere [s]: it is put there."""
-
-
-def residuals_of(evaluator: RolloutEvaluator, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
-    """As `RolloutEvaluator.residuals`, as the rollouts are, whatever their step is wrong by; of logs without shifting their
-    start, which is known."""
-    by_drake = evaluator.config.engine == "drake"
-    if by_drake or not questions or not all(_is_log(evaluator, i) for q in questions for i in q.takes):
-        return [_uncorrected(evaluator, q, answer) for q, answer in zip(questions, evaluator.residuals(questions))]
-    with ThreadPoolExecutor(evaluator.n_jobs) as pool:  # kernels hold no lock
-        return list(pool.map(lambda q: _answer(evaluator, q), questions))
-
-
-def _uncorrected(evaluator: RolloutEvaluator, q: RolloutRequest, residuals: dict[int, Array]) -> dict[int, Array]:
-    """Without what `RolloutEvaluator` takes off for the search's step."""
-    if q.step < 1:
-        return residuals
-    return {i: r + e.offset / (e.sigma * e.rough) for i, r in residuals.items() for e in (evaluator.evidence[i],)}
-
-
-def _answer(evaluator: RolloutEvaluator, q: RolloutRequest) -> dict[int, Array]:
-    held = replace(evaluator.config, base="fixed", settle=SETTLE, time_step=q.step * evaluator.config.time_step)
-    models: dict[str, RobotModel] = {}
-    jobs = []
-    for i in q.takes:
-        spec = evaluator.evidence[i].take.spec
-        key = repr(sorted(spec.servos.items()))
-        models.setdefault(key, q.model.with_servos(spec.servos))
-        jobs.append(_job(evaluator, i, models[key], held))
-    try:
-        angles = servo_angles(jobs)
-    except NotCoveredError:
-        return _uncorrected(evaluator, q, evaluator.residuals([q])[0])
-    evaluator.rollouts += len(jobs)
-    out = {}
-    for i, q_servo in zip(q.takes, angles):
-        e = evaluator.evidence[i]
-        columns = [q.model.joints.index(j) for j in e.joints]
-        simulated = np.full(e.recorded.shape, np.nan)
-        simulated[(e.since >= 0) & (e.since <= e.until)] = q_servo[:, columns]
-        out[i] = (e.recorded - simulated) / (e.sigma * e.rough)
-    return out
-
-
-def _job(evaluator: RolloutEvaluator, i: int, model: RobotModel, held: SimulationConfig) -> Job:
-    take = evaluator.evidence[i].take
-    times = evaluator.evidence[i].since
-    times = times[(times >= 0) & (times <= evaluator.evidence[i].until)]
-    return Job(model, held, take.commands, float(times[-1]) + 2e-3, 0.1, name=take.spec.name,
-               times=times, start=take.start_state())
-
-
-def _is_log(evaluator: RolloutEvaluator, i: int) -> bool:
-    e = evaluator.evidence[i]
-    return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints
 
 
 @dataclass(frozen=True)
 class Rollouts:
     """Rolls hypotheses of all regions out. standing: what is taken for the others while one region's is looked at.
     errors: of the time step, which are subtracted; they are measured on `reference`, a model near those that are compared.
-    step: in steps of the search. shared: effects of the whole robot, which act in all regions."""
+    step: in steps of the search. shared: effects of the whole robot, which act in all regions. most_work: after
+    which nothing more is tried, as `RolloutEvaluator.work` counts it."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -96,12 +36,19 @@ class Rollouts:
     reference: RobotModel
     step: float = 1.0
     shared: Hypothesis = field(default_factory=lambda: start(()))
+    most_work: float = math.inf
 
     @classmethod
-    def of(cls, evaluator: RolloutEvaluator, nominal: RobotModel, regions: Sequence[Region]) -> Rollouts:
+    def of(cls, evaluator: RolloutEvaluator, nominal: RobotModel, regions: Sequence[Region], most_work: float = math.inf
+           ) -> Rollouts:
         """With the nominal law standing everywhere."""
         return cls(evaluator, nominal, tuple(regions), tuple(start(r.numbers) for r in regions),
-                   step_errors(evaluator, regions), nominal)
+                   step_errors(evaluator, regions), nominal, most_work=most_work)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether all the work was done that may be."""
+        return math.isfinite(self.most_work) and self.evaluator.work > self.most_work
 
     def model(self, hypotheses: Sequence[Hypothesis]) -> RobotModel:
         """One robot with a hypothesis for each region."""
@@ -143,10 +90,10 @@ class Rollouts:
     def _residuals(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
         """In the limit of a step of zero."""
         wrong = self.errors.at(self.reference, self.step) if questions else {}
-        return [{i: r - wrong[i] for i, r in answer.items()} for answer in residuals_of(self.evaluator, questions)]
+        return [{i: r - wrong[i] for i, r in answer.items()} for answer in self.evaluator.uncorrected(questions)]
 
 
 def step_errors(evaluator: RolloutEvaluator, regions: Sequence[Region]) -> StepErrors:
     """Of the takes that regions look at."""
     takes = tuple(sorted({p.take for region in regions for p in region.parts}))
-    return StepErrors(takes, partial(residuals_of, evaluator))
+    return StepErrors(takes, evaluator.uncorrected)

@@ -100,14 +100,14 @@ def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions
     if not exploring:
         everywhere(lambda f: _refitted(f, options), range(len(found)))
     open_ = set(range(len(found)))
-    for level in range(options.most):
+    for level in range(options.most if not rollouts.exhausted else 0):
         report(f"effects, {what}, level {level + 1}", level / options.most)
         everywhere(lambda f: _level(f, options), open_)
         if not exploring:
             everywhere(lambda f: _exchanged(f, options), open_)
         everywhere(lambda f: _renewed(f, options, exploring, len(found) > 1), range(len(found)))  # other joints moved
         open_ = {i for i in open_ if found[i].goes_on(options)}
-        if not open_:
+        if not open_ or rollouts.exhausted:
             break
     return rollouts, found
 

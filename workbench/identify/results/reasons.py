@@ -105,7 +105,7 @@ class LessLikely(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the likeliest model with it is {_times(self.behind)} less likely"
+        return f"the likeliest model with it is {_times(self.behind)} less probable"
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class SpokenAgainst(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"takes that were kept back are {_times(self.by)} less likely with it"
+        return f"takes that were kept back are {_times(self.by)} less probable with it"
 
 
 @dataclass(frozen=True)

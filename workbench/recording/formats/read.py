@@ -56,7 +56,7 @@ def read_recording(path: str | Path) -> Recording:
     names = known.parts(path)
     if known.read_part is None or part not in names:
         raise InputError(path, f"no programme '{part}'; expected one of {_listed(names)}" if names
-                         else f"'#{part}' chooses one of several recordings; this is one")
+                         else f"'#{part}' is not allowed: the file holds a single recording")
     return checked(known.read_part(path, part))
 
 

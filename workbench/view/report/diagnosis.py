@@ -216,8 +216,8 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
     if finding.tie:
         sure += f": {probable(finding.together)} for one of the two"
     f = finding.family
-    family = [] if f is None else [["of its family", f"{f.name}: {probable(f.confidence)}"]]
-    rows = [["how sure", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
+    family = [] if f is None else [["probability of the family", f"{f.name}: {probable(f.confidence)}"]]
+    rows = [["probability", sure], *family, *(row for name, e in finding.parameters.items() for row in intervals_of(name, e))]
     rows += [["error where it was fitted", change(finding.fit)], ["error on unseen stretches", change(finding.validation)]]
     parts.append(Table(["", "value (90 % interval)"], [[unbroken(name), value] for name, value in rows]))
     shown = _best_view(finding, takes, drawn, others)
@@ -280,14 +280,14 @@ def _walks(take: TakeReport) -> bool:
 def _left(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
         nothing = diagnosis.verdict in ("no_gap", "explained")
-        return Section("What is left", [Text("Nothing beyond what noise, numerics and chance make." if nothing else
+        return Section("Residuals", [Text("No residual above noise and numerical error." if nothing else
                                              "What is still beyond the green band above is not explained yet.")])
     order = sorted(diagnosis.unexplained, key=lambda u: -u.error / u.floor if u.floor > 0 else -math.inf)
     header = ["what is still off", "take", "by", "over noise", "and it varies"]
     off = [left_row(u) for u in order if is_error(u)]
     still = [Text("On unseen stretches the fitted model is still off by more than noise and numerics make (1×). No "
                   "effect that was tried explains it."), *folded(header, off, "more")] if off else []
-    return Section("What is left", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
+    return Section("Residuals", [*still, *(Text(f"{capital(in_words(u.description))}.") for u in order if not is_error(u))])
 
 
 def _next(diagnosis: Diagnosis) -> Section:

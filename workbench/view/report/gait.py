@@ -160,10 +160,28 @@ def _way_section(certificate: Certificate) -> Section:
             if isinstance(part, dict) and name != "at rest"]
     said = ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
             "The robot is jerked more than by the gait itself.")
-    return Section("In and out", [
-        Text("`start.csv` leads from neutral through the gait's stance and one cycle of half its size into the gait, `stop.csv` "
-             "back to neutral. " + said),
-        Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows)])
+    return Section("In, out and back", [
+        Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
+             "to neutral; both are in `gait.csv`, and all that is said here is of the whole. " + said),
+        Table(["part", "seconds", "peak torque [N m]", "tilt [deg]", "RMS jerk of the base [m/s³]"], rows),
+        *_cycle_parts(certificate)])
+
+
+def _cycle_parts(certificate: Certificate) -> list[Part]:
+    """Whether the gait comes back to its cycle, and how much its cycles differ."""
+    c = certificate.cycle
+    said = (f"From cycle to cycle heading scatters by {c['heading deg, standard deviation']:.2g} deg and speed by "
+            f"{100 * c['speed m/s, standard deviation']:.2g} cm/s (standard deviations, nominal robot)")
+    median = c.get("heading deg, standard deviation, median of draws")
+    parts: list[Part] = [Text(said + ("." if median is None else f"; over draws heading by {median:.2g} deg (median)."))]
+    back = c.get("cycles until it is back")
+    if back:
+        fell = set(c["fell"])
+        never = f"not in {c['watched']}"
+        rows = [[entry, "fell" if entry in fell else never if n is None else str(n)] for entry, n in back.items()]
+        parts.append(Table(["entered", "cycles until it walks as from neutral"], rows,
+                           "Forward and sideways speed and turn of a cycle within a tenth of the settled gait's."))
+    return parts
 
 
 def _table_section(table: GaitTable) -> Section:
@@ -172,8 +190,8 @@ def _table_section(table: GaitTable) -> Section:
     speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
     shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
     return Section("The table", [
-        Text("`workbench export gait.csv --out DIR` turns it into the firmware's tables; it needs `certificate.json` beside "
-             "it."),
+        Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that "
+             "file, and all but the first ask for `certificate.json` beside it."),
         Table(["pose", "dwell [ms]", *cycle.joints], rows, "; ".join(map(str, cycle.families)) + "."),
         Details("Moving speeds, and the gait in numbers", [Table(["pose", "dwell [ms]", *cycle.joints], speeds), Text(shape)])])
 

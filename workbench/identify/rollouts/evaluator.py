@@ -1,0 +1,281 @@
+"""Rollouts of models on every take, in batches and remembered, and the chi squared of their residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.channels import joint_of
+from workbench.effects.registry import known_effects
+from workbench.identify.options import PROBLEM
+from workbench.identify.problem import TakeEvidence, channel_gaps
+from workbench.identify.rollouts.key import ModelKeys, take_key
+from workbench.identify.rollouts.memory import RolloutMemory
+from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
+from workbench.recording.take import Take
+from workbench.robot import EffectSpec, RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.simulation.batch import Job, simulate_batch, simulate_stream
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RolloutRequest:
+    """A model on some takes (indices). step: in search steps; coarse ones are good for differences alone. until: how long after
+    the first command [s]; frames after that are NaN."""
+
+    model: RobotModel
+    takes: tuple[int, ...]
+    step: float = 1.0
+    until: float = np.inf
+
+
+class RolloutEvaluator:
+    """Rolls models out on the session's takes and evaluates the residuals. memory: what was rolled out before, or a folder in
+    which every rollout is kept, so that a killed run resumes; results are the same with and without."""
+
+    def __init__(self, evidence: Sequence[TakeEvidence], config: SimulationConfig, n_jobs: int = 2,
+                 memory: Path | RolloutMemory | None = None) -> None:
+        self.evidence = tuple(evidence)
+        self.config = config
+        self.n_jobs = n_jobs
+        self.memory = memory if isinstance(memory, RolloutMemory) else RolloutMemory(memory, PROBLEM.remembered << 20)
+        self._take_keys: dict[int, str] = {}
+        self._model_keys = ModelKeys()
+
+    @property
+    def rollouts(self) -> int:
+        """Distinct rollouts that were requested so far, of this evaluator and of those that share its memory."""
+        return self.memory.rollouts
+
+    @property
+    def work(self) -> float:
+        """Seconds of a puppy's rollouts requested so far, at the search's step; likewise."""
+        return self.memory.work
+
+    def residuals(self, questions: Sequence[RolloutRequest], corrected: bool = True) -> list[dict[int, Array]]:
+        """For each question, residuals (N, c) by take; NaN where a take is not looked at. corrected: for the search's step."""
+        answers: dict[str, Array] = {}
+        keys: list[dict[int, str]] = []
+        new: dict[str, tuple[RolloutRequest, int, RobotModel]] = {}
+        for q in questions:
+            felt = {i: self._felt(q.model, i) for i in q.takes}
+            keys.append({i: self._key(model, i, q) for i, model in felt.items()})
+            for i, key in keys[-1].items():
+                if key in answers or key in new:
+                    continue
+                if not self._until(i, q):
+                    answers[key] = np.full_like(self.evidence[i].recorded, np.nan)
+                elif not self._recalled(key, i, q, answers):
+                    new[key] = (q, i, felt[i])
+        # the longest first, so that no core waits at the end
+        order = sorted(new, key=lambda key: -self._length(new[key][1], self._until(new[key][1], new[key][0])) / new[key][0].step)
+        jobs = [self.job(model, i, replace(self.config, time_step=self.config.time_step * q.step), self._until(i, q))
+                for q, i, model in (new[k] for k in order)]
+        for key, rollout in zip(order, simulate_stream(jobs, self.n_jobs)):
+            q, i, _ = new[key]
+            e = self.evidence[i]
+            seen = np.where(e.since[:, None] <= self._until(i, q), e.simulated(rollout, q.model), np.nan)
+            kept = seen.astype(np.float32)  # there are a thousand; noise is a ten thousandth
+            self.memory.keep(key, kept)
+            answers[key] = kept.astype(float)
+        return [{i: self.evidence[i].residual(answers[key], q.model, corrected and q.step >= 1) for i, key in by_take.items()}
+                for q, by_take in zip(questions, keys)]
+
+    def uncorrected(self, questions: Sequence[RolloutRequest]) -> list[dict[int, Array]]:
+        """As `residuals`, whatever their step is wrong by. Servo logs are not shifted, as their start is known, and come straight
+        from the compiled station where it knows their physics."""
+        if self.config.engine == "drake" or not all(is_log(self.evidence[i]) for q in questions for i in q.takes):
+            return self.residuals(questions, corrected=False)
+        answers: dict[str, Array] = {}
+        keys, missing, seen = [], [], set[str]()
+        for q in questions:
+            keys.append({i: "log-" + self._key(self._felt(q.model, i), i, q) for i in q.takes})
+            new = {i: k for i, k in keys[-1].items()
+                   if k not in answers and k not in seen and not self._recalled(k, i, q, answers)}
+            seen |= set(new.values())
+            missing.append(new)
+        asked = [(q, new) for q, new in zip(questions, missing) if new]
+        for (_, new), angles in zip(asked, self._in_threads(asked)):
+            for key, q_servo in zip(new.values(), angles or ()):
+                self.memory.keep(key, q_servo)
+                answers[key] = q_servo
+        covered = [set(by_take.values()) <= set(answers) for by_take in keys]
+        others = iter(self.residuals([q for q, here in zip(questions, covered) if not here], corrected=False))
+        return [{i: self._log_residual(i, answers[key]) for i, key in by_take.items()} if here else next(others)
+                for by_take, here in zip(keys, covered)]
+
+    def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
+        """Angles of logs, by question, each as soon as those before it are there."""
+        def rolled(of: tuple[RolloutRequest, Mapping[int, str]]) -> list[Array] | None:
+            q, takes = of
+            config = replace(self.config, time_step=q.step * self.config.time_step)
+            return log_angles([self.evidence[i] for i in takes], q.model, config)
+
+        if self.n_jobs == 1 or len(asked) < 2:
+            yield from map(rolled, asked)
+            return
+        with ThreadPoolExecutor(self.n_jobs) as pool:  # kernels hold no lock
+            try:
+                yield from pool.map(rolled, asked)
+            finally:
+                pool.shutdown(cancel_futures=True)
+
+    def _log_residual(self, i: int, angles: Array) -> Array:
+        """Of a log's angles (M, c) at its `frames`."""
+        e = self.evidence[i]
+        simulated = np.full(e.recorded.shape, np.nan)
+        simulated[frames(e)] = angles
+        return np.asarray((e.recorded - simulated) / (e.sigma * e.rough))
+
+    def on(self, evidence: Sequence[TakeEvidence]) -> RolloutEvaluator:
+        """The same on other takes of the same robot, or on these looked at otherwise; what one is answered the other knows."""
+        return RolloutEvaluator(evidence, self.config, self.n_jobs, self.memory)
+
+    @property
+    def seconds(self) -> float:
+        """A rollout of every take is this much work."""
+        return sum(self._length(i) for i in range(len(self.evidence)))
+
+    def any_floating(self, takes: Sequence[int]) -> bool:
+        """Whether the base is free in any of these takes."""
+        return any(self.evidence[i].take.spec.base == "free" for i in takes)
+
+    def observed(self, model: RobotModel, config: SimulationConfig) -> list[Take]:
+        """All takes as a model left to itself would show them, in another configuration (a finer step), seen like recordings."""
+        everywhere = range(len(self.evidence))
+        rollouts = simulate_batch([replace(self.job(model, i, config), steadied=None) for i in everywhere], self.n_jobs)
+        return [self.evidence[i].take.observed(r, model) for i, r in zip(everywhere, rollouts)]
+
+    def job(self, model: RobotModel, take: int, config: SimulationConfig, until: float = np.inf) -> Job:
+        """One rollout; each take's own servo changes apply."""
+        e = self.evidence[take]
+        spec = e.take.spec
+        frames = e.since
+        times = np.concatenate([[-PROBLEM.rest, -PROBLEM.rest / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
+        duration = float(times[-1]) + 2e-3
+        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, PROBLEM.rest,
+                   name=spec.name, times=times, start=e.take.start_state(), steadied=e.steadied)
+
+    def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:
+        """Residuals of one use as one vector, weighted, gaps as zeros: comparable between models. joint: its channels alone."""
+        parts = [np.empty(0)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            parts.append(np.nan_to_num(r[e.uses[use]][:, columns] * np.sqrt(e.weight[columns])).ravel())
+        return np.concatenate(parts)
+
+    def cost(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> float:
+        """Chi squared: the sum of squares of `vector`."""
+        left = self.vector(residuals, use, joint)
+        return float(left @ left)
+
+    def beyond(self, residuals: dict[int, Array], use: str, before: dict[int, Array] | None = None,
+               share: float | Array = 0.0, everywhere: bool = False) -> float:
+        """Chi squared beyond what is expected of a right model, of the channels that have a gap, and beyond this share of what
+        has gone of it since `before`. everywhere: of floating-base takes beyond noise, as steps and contact models rarely make
+        them as wrong as they may, and of all channels, as what moves the robot shows a little in each."""
+        cost, expected = self.by_channel(residuals, use)
+        was = cost if before is None else self.by_channel(before, use)[0]
+        may_err = share * np.maximum(was - cost, 0.0)
+        widths = [r.shape[1] for _, r in sorted(residuals.items())]
+        walking = np.repeat([everywhere and self.any_floating((i,)) for i in sorted(residuals)], widths)
+        noisy = np.concatenate([np.broadcast_to(self.evidence[i].noisy, n) for i, n in zip(sorted(residuals), widths)])
+        ill = walking | (cost > self._without_gap(residuals, cost, expected))
+        return float(np.sum(np.maximum(cost - expected * np.where(walking, noisy, 1.0) - may_err, 0.0)[ill]))
+
+    def closed(self, before: dict[int, Array], after: dict[int, Array], use: str, joint: str | None = None,
+               without: Collection[str] = ()) -> float:
+        """Share of `before`'s gaps that is gone in `after`, in the channels that had one: what is well there hides nothing.
+        without: joints whose channels do not count."""
+        cost, expected = self.by_channel(before, use, joint)
+        left, _ = self.by_channel(after, use, joint)
+        most = self._without_gap(before, cost, expected, joint)
+        names = [self.evidence[i].channels[k] for i in sorted(before) for k in self.evidence[i].columns(joint)]
+        ill = (cost > most) & ~np.isin([joint_of(c) for c in names], list(without))
+        return float(np.sum((cost - np.maximum(left, most))[ill]) / max(1.0, float(np.sum((cost - most)[ill]))))
+
+    def stretches(self, takes: Sequence[int], use: str, joint: str | None = None) -> NDArray[np.int_]:
+        """For each number of `vector`, which stretch of which take it is of."""
+        parts = [np.empty(0, dtype=int)]
+        for i in sorted(takes):
+            e = self.evidence[i]
+            stretch = i * PROBLEM.most_stretches + np.floor(e.since[e.uses[use]] / PROBLEM.block).astype(int)
+            parts.append(np.repeat(stretch, len(e.columns(joint))))
+        return np.concatenate(parts)
+
+    def expected(self, takes: Sequence[int], use: str) -> float:
+        """The sum of squares of `vector` that noise, numerics and contact models make."""
+        frames = (np.isfinite(self.evidence[i].recorded[self.evidence[i].uses[use]]).sum(axis=0) for i in takes)
+        return float(sum(np.sum(n * self.evidence[i].weight) for i, n in zip(takes, frames)))
+
+    def by_channel(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> tuple[Array, Array]:
+        """Chi squared of each take's each channel, and what is expected of it."""
+        cost, expected = [np.empty(0)], [np.empty(0)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            columns = e.columns(joint)
+            rows = r[e.uses[use]][:, columns]
+            cost.append(np.nansum(np.square(rows), axis=0) * e.weight[columns])
+            expected.append(np.isfinite(rows).sum(axis=0) * e.weight[columns])
+        return np.concatenate(cost), np.concatenate(expected)
+
+    def _without_gap(self, residuals: dict[int, Array], cost: Array, expected: Array, joint: str | None = None) -> Array:
+        """What chi squared of each channel, in the order of `by_channel`, may be without a gap: of a robot on a fixed base no
+        more than expected, where running means alone show one."""
+        most = PROBLEM.gap_ratio**2 * expected
+        slight = [np.empty(0, dtype=bool)]
+        for i, r in sorted(residuals.items()):
+            e = self.evidence[i]
+            gaps = channel_gaps(e, r) if e.take.spec.base == "fixed" else {}
+            slight.append(np.array([e.channels[c] in gaps for c in e.columns(joint)], dtype=bool))
+        return np.where(np.concatenate(slight) & (cost <= most), expected, most)
+
+    def _length(self, take: int, until: float = np.inf) -> float:
+        """Of a rollout [s of a puppy's], a walk counting more as it takes longer, few joints less."""
+        e = self.evidence[take]
+        share = (len(e.joints) + PROBLEM.station_joints) / (PROBLEM.puppy_joints + PROBLEM.station_joints)
+        return min(until, float(e.take.recorded.time[-1])) * (1.5 if e.take.spec.base == "free" else 1.0) * share
+
+    def _felt(self, model: RobotModel, take: int) -> RobotModel:
+        """The model as this take can tell it: where the base is fixed, no floor and no mass of the base is felt."""
+        if self.evidence[take].take.spec.base != "fixed":
+            return model
+        felt = tuple(e for e in model.effects if not _of_the_floor(e) and e.where != (model.base,))
+        return model if len(felt) == len(model.effects) else replace(model, effects=felt)
+
+    def _key(self, felt: RobotModel, take: int, q: RolloutRequest) -> str:
+        if take not in self._take_keys:
+            self._take_keys[take] = take_key(self.evidence[take], replace(self.config, base=self.evidence[take].take.spec.base))
+        until = self._until(take, q)
+        late = "" if np.isinf(until) else f"-until{until:.6g}"
+        return f"{self._model_keys.of(felt)}-{self._take_keys[take]}-{q.step:g}{late}"
+
+    def _until(self, take: int, q: RolloutRequest) -> float:
+        """How long a question looks at a take [s]."""
+        return min(q.until, self.evidence[take].until)
+
+    def _recalled(self, key: str, take: int, q: RolloutRequest, answers: dict[str, Array]) -> bool:
+        """Counts a rollout; whether it is known, from this run or from one before: then it is among the answers."""
+        self.memory.request(key, self._length(take, self._until(take, q)) / q.step)
+        known = self.memory.get(key)
+        if known is not None:
+            answers[key] = known.astype(float)
+        return known is not None
+
+
+def take_of(stretches: NDArray[np.int_]) -> NDArray[np.int_]:
+    """Of `RolloutEvaluator.stretches`."""
+    return stretches // PROBLEM.most_stretches
+
+
+def _of_the_floor(e: EffectSpec) -> bool:
+    effect = known_effects().get(e.effect)
+    return effect is not None and not effect.observable_when_fixed

@@ -1,0 +1,55 @@
+"""Servo logs of a robot on a fixed base, straight from the compiled station: angles at the frames that are looked at, no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.robot import RobotModel
+from workbench.simulation import SimulationConfig
+from workbench.simulation.compiled import NotCoveredError
+from workbench.simulation.compiled.angles import servo_angles
+from workbench.simulation.job import Job
+
+if TYPE_CHECKING:
+    from workbench.identify.problem import TakeEvidence
+
+Array = NDArray[np.float64]
+SETTLE = 0.02
+"""Rest of a robot whose log begins elsewhere [s]: it is put there."""
+REST = 0.1
+"""Before the first command [s]."""
+
+
+def is_log(e: TakeEvidence) -> bool:
+    """Whether a take is a log of its servos' own angles, of a held robot, and nothing else was seen."""
+    return not e.take.recorded.zeroed and e.take.spec.base == "fixed" and e.channels == e.joints
+
+
+def frames(e: TakeEvidence) -> NDArray[np.bool_]:
+    """Frames of a log that are looked at."""
+    return np.asarray((e.since >= 0) & (e.since <= e.until))
+
+
+def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig) -> list[Array] | None:
+    """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
+    config: base and rest apart, which are a log's."""
+    held = replace(config, base="fixed", settle=SETTLE)
+    models: dict[str, RobotModel] = {}
+    jobs = []
+    for e in takes:
+        spec = e.take.spec
+        servos = repr(sorted(spec.servos.items()))
+        models.setdefault(servos, model.with_servos(spec.servos))
+        times = e.since[frames(e)]
+        jobs.append(Job(models[servos], held, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
+                        start=e.take.start_state()))
+    try:
+        angles = servo_angles(jobs)
+    except NotCoveredError:
+        return None
+    return [q[:, [model.joints.index(j) for j in e.joints]] for e, q in zip(takes, angles)]
