@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from studies.concealed_effects.catalogue import CATALOGUE, MOVES, PULLS, TIES, crowded, possible
+from studies.concealed_effects.catalogue import CATALOGUE, HIDEABLE, MOVES, PULLS, TIES, crowded, possible
 from studies.concealed_effects.robots import Robot, arm, puppy, quadruped, rig
-from studies.other_engine.hidden import OUTSIDE, VOCABULARY
+from studies.other_engine.hidden import OUTSIDE
 
 MAKERS = {"quadruped": quadruped, "puppy": puppy, "arm": arm, "rig": rig}
 
@@ -39,7 +39,7 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
     several = np.flatnonzero([k in ("two", "three") for k in kinds])
     with_two = len(several) + len(range(0, kinds.count("outside"), 3))
     masks = set(rng.permutation(several)[: (with_two + 1) // 2])
-    named, unnamed = _deck(VOCABULARY, rng), _deck(OUTSIDE, rng)
+    named, unnamed = _deck(HIDEABLE, rng), _deck(OUTSIDE, rng)
     plans: list[SessionPlan] = []
     order = rng.permutation(count)
     walkers = ("quadruped", "quadruped", "quadruped", "quadruped", "puppy")
@@ -60,7 +60,7 @@ def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
 def dealt_again(plan: SessionPlan, rng: np.random.Generator) -> SessionPlan:
     """The same session with other named effects, as many: some never show together, or cannot mask each other."""
     stay = [e for e in plan.effects if e in OUTSIDE]
-    hand = _deal(_deck(VOCABULARY, rng), _some(plan.robot), stay, len(plan.effects) - len(stay), False, plan.masked)
+    hand = _deal(_deck(HIDEABLE, rng), _some(plan.robot), stay, len(plan.effects) - len(stay), False, plan.masked)
     return replace(plan, effects=(*stay, *hand))
 
 
@@ -99,4 +99,4 @@ def _too_alike(card: str, hand: list[str]) -> bool:
     return card in hand or any(frozenset((card, other)) in TIES for other in hand)
 
 
-assert all(e in CATALOGUE for e in (*VOCABULARY, *OUTSIDE))
+assert all(e in CATALOGUE for e in (*HIDEABLE, *OUTSIDE))

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
+from workbench.compare.logged import how_logged
 from workbench.compare.session import Base, Session
 from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
 from workbench.effects.registry import effect_named
@@ -167,7 +168,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
-        | subset_used(found.looked_at),
+        | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings or found.recalibrated else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))

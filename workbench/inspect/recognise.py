@@ -18,6 +18,7 @@ from workbench.robot import ROBOTS, RobotModel, load_servo_constants
 from workbench.robot.servo_units import unknown_family
 
 if TYPE_CHECKING:
+    from workbench.compare.session import Session
     from workbench.motion import Motion
 
 _LISTED = 20
@@ -153,7 +154,9 @@ def _recording(path: Path) -> Inspection:
     missing = {name: np.isnan(body.p).any(axis=1) for name, body in r.rigid_bodies.items()}
     missing |= {name: np.isnan(p).any(axis=1) for name, p in r.markers.items()}
     missing |= {name: np.isnan(values) for name, values in r.channels.items()}
-    metadata = {k: v for k, v in r.metadata.items() if v and k not in _SAID}
+    metadata: dict[str, Any] = {k: v for k, v in r.metadata.items() if v and k not in _SAID}
+    if r.notes:
+        metadata["logged"] = "; ".join(r.notes)
     return Inspection(
         str(path), r.kind, r.version or None, r.units or None, _finite(r.rate), len(r.time), _duration(r.time),
         tuple(r.rigid_bodies), tuple(r.markers), r.joints, *_gaps(missing), details=metadata,
@@ -266,11 +269,25 @@ def _session(path: Path) -> Inspection:
     from workbench.inspect.problems import session_problems
 
     session = load_session(path)
+    logged = _logged(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,
         details={"model": session.model.description, "base": session.model.base,
-                 "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict]},
+                 "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict], **logged},
         problems=tuple(session_problems(session)))
+
+
+def _logged(session: Session) -> dict[str, str]:
+    """How servo logs were logged; nothing where the takes cannot be read, which is told as their problem."""
+    from workbench.compare.logged import how_logged
+    from workbench.compare.session_takes import read_takes
+
+    try:
+        told = how_logged(read_takes(session)[0])
+    except InputError:
+        return {}
+    notes = {f"logged: {name}": "; ".join(lines) for name, lines in told.get("logs", {}).items()}
+    return notes | {f"register of {joint}": law for joint, law in told.get("duty_registers", {}).items()}
 
 
 def _fitted_model(path: Path) -> Inspection:

@@ -40,4 +40,7 @@ def _renamed(recording: Recording, names: Mapping[str, str]) -> Recording:
         channels[f"{what}{dot}{names.get(joint, joint)}"] = values
     sent = recording.commands
     commands = sent and replace(sent, joints=tuple(names.get(j, j) for j in sent.joints))
-    return replace(recording, channels=channels, commands=commands)
+    notes = recording.notes
+    for old, new in names.items():
+        notes = tuple(text.replace(f".{old} ", f".{new} ") for text in notes)
+    return replace(recording, channels=channels, commands=commands, notes=notes)

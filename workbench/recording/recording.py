@@ -25,7 +25,8 @@ class Recording:
     frames: (N,) frame numbers. time: (N,) [s] from the first frame. rigid_bodies: asset -> path in the capture's axes
     (Motive: x forward up to a yaw, y up, z right). markers: name -> (N, 3) [m]. channels: joint channel
     ("goal.J", "speed.J" of moving, "position.J", "velocity.J", "duty.J", "current.J", "voltage", "temperature.J",
-    "enabled.J") -> (N,). metadata: what the header said. problems: one line each. nameless: the file does not name its one joint.
+    "enabled.J") -> (N,). metadata: what the header said. problems: one line each. notes: how it was logged, as found in
+    it, one line each. nameless: the file does not name its one joint.
     aliases: names that the model may have for the joints, by those of the file.
     """
 
@@ -42,6 +43,7 @@ class Recording:
     commands: Commands | None = None
     metadata: Mapping[str, str] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     sensing: Sensing = "encoders"
     nameless: bool = False
     aliases: Mapping[str, str] = field(default_factory=dict)

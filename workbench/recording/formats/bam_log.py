@@ -15,6 +15,7 @@ from workbench.recording.formats.log_commands import commands_of_rows, order_pro
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
+from workbench.recording.servo_log.duty_register import duty_of
 
 Array = NDArray[np.float64]
 _FULL_DUTY = 885.0
@@ -54,16 +55,24 @@ def read_bam_log(path: str | Path) -> Recording:
             channels[f"duty.{joint}"] = load / _FULL_DUTY
         else:
             problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, so that there is no duty")
+    metadata = {k: str(v) for k, v in content.items() if isinstance(v, (str, int, float)) and not isinstance(v, bool)}
+    notes: tuple[str, ...] = ()
+    if f"duty.{joint}" not in channels and "torque" in entries[0]:
+        enabled = _column(source, entries, "torque_enable", False) if "torque_enable" in entries[0] else np.ones(len(time))
+        error = channels[f"goal.{joint}"] - channels[f"position.{joint}"]
+        duty = duty_of(_column(source, entries, "torque", False), error, enabled != 0)
+        if duty is not None:
+            channels[f"duty.{joint}"], problems = duty, []
+            notes = (f"duty.{joint} is the servo's own register, which the column `torque` holds",)
     if "input_volts" in entries[0]:
         channels["voltage"] = _column(source, entries, "input_volts", False)
         problems += _supply_problems(content.get("vin"), channels["voltage"])
     enabled = np.ones(len(time))
     if "torque_enable" in entries[0]:
         enabled = channels[f"enabled.{joint}"] = _column(source, entries, "torque_enable", False)
-    metadata = {k: str(v) for k, v in content.items() if isinstance(v, (str, int, float)) and not isinstance(v, bool)}
     goals = channels[f"goal.{joint}"]
     return Recording(source=source, kind="bam_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
-                     units="radians", channels=channels, metadata=metadata, problems=tuple(problems), nameless=True,
+                     units="radians", channels=channels, metadata=metadata, problems=tuple(problems), notes=notes, nameless=True,
                      commands=commands_of_rows(time, (joint,), goals[:, None], enabled[:, None] != 0))
 
 

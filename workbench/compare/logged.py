@@ -1,0 +1,36 @@
+"""How a session's servo logs were logged, as they themselves tell: found before anything is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from workbench.compare.session_takes import ReadTake
+from workbench.recording.servo_log.duty_register import RegisterLaw, RegisterLog, law_of
+
+
+def how_logged(takes: Sequence[ReadTake]) -> dict[str, Any]:
+    """For provenance: notes by take, and by joint the law that the register of duty tells; empty where there is nothing to
+    say."""
+    notes = {t.spec.name: list(t.recording.notes) for t in takes if t.recording.notes}
+    laws = {joint: str(law) for joint, law in register_laws(takes).items()}
+    found: dict[str, Any] = {"logs": notes} if notes else {}
+    return found | ({"duty_registers": laws} if laws else {})
+
+
+def register_laws(takes: Sequence[ReadTake]) -> dict[str, RegisterLaw]:
+    """By joint, the servo's law as its register of duty tells it over all logs, where they have one."""
+    logs: dict[str, list[RegisterLog]] = {}
+    for t in takes:
+        channels = t.recording.channels
+        for joint in t.model.joints:
+            goal, position, duty = (channels.get(f"{name}.{joint}") for name in ("goal", "position", "duty"))
+            gain = t.model.servo(joint).proportional_gain
+            if goal is None or position is None or duty is None or gain is None:
+                continue
+            on = channels.get(f"enabled.{joint}", np.ones(len(t.recording.time))) != 0
+            logs.setdefault(joint, []).append(RegisterLog(t.recording.time, goal, position, duty, on, gain))
+    laws = {joint: law_of(of_joint) for joint, of_joint in logs.items()}
+    return {joint: law for joint, law in laws.items() if law is not None}

@@ -1,0 +1,160 @@
+"""A sensor that is refreshed more slowly than it is read: its positions are older than their stamps, by more and less in turn.
+
+A servo measures its position every few milliseconds and answers with the last one it has. Where that period is near the log's
+own, the age of what is read goes round: at 8 ms, read every 10 ms, it is 0, 2, 4, 6, 0 ms, and a moving joint seems to shake.
+Period and phase are told by the log alone: they are those by which positions lie best on a line between their neighbours. """
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.servo_log.state import resolution
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldChecks:
+    """When a sensor is said to be held.
+
+    shortest, longest: period looked for, in rows; of a shorter one little can be told, of a longer one rows repeat. span: rows
+    of fastest motion that are looked at first. phases: of a period that are tried. drift: of the ages over what is looked at, at
+    most, between two periods that are tried, in periods. left: share of the error of interpolation that is left at most; in 20
+    of 24 logs of a servo whose sensor is held it was 0.22 to 0.67, in logs of other servos 0.78 and more. hopeless: share over
+    the first rows beyond which no more is looked at. alike: errors that differ by less are of one pattern of ages, which several
+    periods give: the longest is taken. cut: of a single error [rad], as stick and slip are no line. fewest: rows that tell.
+    counts: by which the joint moves in a row at least, in the 90th percentile.
+    """
+
+    shortest: float = 0.5
+    longest: float = 2.0
+    span: int = 80
+    phases: int = 8
+    drift: float = 0.15
+    left: float = 0.71
+    hopeless: float = 0.8
+    alike: float = 1.1
+    cut: float = 0.03
+    fewest: int = 60
+    counts: float = 3.0
+
+
+HELD = HeldChecks()
+
+
+@dataclass(frozen=True)
+class Refresh:
+    """period, phase [s]: the sensor is refreshed at phase + k period on the log's clock. left: share of the error of
+    interpolation that is left with positions at those times."""
+
+    period: float
+    phase: float
+    left: float
+
+    def ages(self, time: Array) -> Array:
+        """How old what is read at times (N,) [s] is (N,) [s]."""
+        return np.asarray(np.mod(time - self.phase, self.period))
+
+
+def refresh_of(time: Array, position: Array, c: HeldChecks = HELD) -> Refresh | None:
+    """How a sensor whose positions (N,) [rad] were read at times (N,) [s] is refreshed; None where it is not held, or the log
+    does not tell."""
+    known = np.isfinite(position)
+    t, q = time[known], position[known]
+    if len(t) < c.fewest or np.percentile(np.abs(np.diff(q)), 90) < c.counts * max(resolution(q), 1e-9):
+        return None
+    row = float(np.median(np.diff(t)))
+    first = _fastest(q, c.span)
+    t0, q0 = t[first], q[first]
+    step = c.drift * row / (len(t0) / c.shortest)  # of the period: what ages drift by over these rows
+    periods = np.arange(c.shortest * row, c.longest * row, step)
+    scores = _errors(t0, q0, periods, c)
+    if scores.min() > c.hopeless * _plain(t0, q0, c):
+        return None
+    found = []
+    for k in _lowest(scores, 8):
+        period, width = float(periods[k]), 2 * step
+        for rows in (2 * c.span, 4 * c.span, len(t)):
+            inside = _around(first, rows, len(t))
+            fine = c.drift * row / (rows / c.shortest)
+            near = period + np.arange(-width, width + fine, fine)
+            period, width = float(near[int(np.argmin(_errors(t[inside], q[inside], near, c)))]), 2 * fine
+        found.append((*_phase(t, q, period, c), period))
+    least = min(error for error, _, _ in found)
+    error, phase, period = max((f for f in found if f[0] <= c.alike * least), key=lambda f: f[2])
+    left = error / _plain(t, q, c)
+    return Refresh(period, phase, left) if left <= c.left else None
+
+
+def at_their_stamps(time: Array, position: Array, refresh: Refresh) -> Array:
+    """Positions (N,) [rad] at the times (N,) [s] at which they were read, between those at which they were measured; the last
+    ones go on as the two before."""
+    measured = time - refresh.ages(time)
+    known = np.isfinite(position)
+    at, first = np.unique(measured[known], return_index=True)
+    q = position[known][first]
+    out = np.interp(time, at, q)
+    if len(at) > 1:
+        late = time > at[-1]
+        out[late] = q[-1] + (q[-1] - q[-2]) / (at[-1] - at[-2]) * (time[late] - at[-1])
+    return np.asarray(np.where(known, out, np.nan))
+
+
+def _fastest(q: Array, span: int) -> slice:
+    """The rows of most motion."""
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))])
+    if len(q) <= span:
+        return slice(0, len(q))
+    begin = int(np.argmax(way[span - 1:] - way[:len(q) - span + 1]))
+    return slice(begin, begin + span)
+
+
+def _around(rows: slice, count: int, most: int) -> slice:
+    begin = max(min((rows.start + rows.stop - count) // 2, most - count), 0)
+    return slice(begin, min(begin + count, most))
+
+
+def _lowest(scores: Array, count: int) -> list[int]:
+    """Where the score is lowest, no two of them neighbours."""
+    local = np.flatnonzero((scores <= np.roll(scores, 1)) & (scores <= np.roll(scores, -1)))
+    return [int(k) for k in local[np.argsort(scores[local])][:count]]
+
+
+def _errors(t: Array, q: Array, periods: Array, c: HeldChecks) -> Array:
+    """For each period (K,) the error of interpolation at its best phase."""
+    out = np.full(len(periods), np.inf)
+    chunk = max(1, 400_000 // len(t))
+    for begin in range(0, len(periods), chunk):
+        part = periods[begin:begin + chunk]
+        for share in np.arange(c.phases) / c.phases:
+            error = _at(t, q, part, share * part, c)
+            out[begin:begin + chunk] = np.minimum(out[begin:begin + chunk], error)
+    return out
+
+
+def _plain(t: Array, q: Array, c: HeldChecks) -> float:
+    """The error of interpolation with positions at their stamps."""
+    return float(np.minimum(np.abs(_interpolation(t[None, :], q)), c.cut).sum())
+
+
+def _phase(t: Array, q: Array, period: float, c: HeldChecks) -> tuple[float, float]:
+    """The error of a period at its best phase, and that."""
+    phases = np.arange(4 * c.phases) / (4 * c.phases) * period
+    errors = _at(t, q, np.full(len(phases), period), phases, c)
+    best = int(np.argmin(errors))
+    return float(errors[best]), float(phases[best])
+
+
+def _at(t: Array, q: Array, periods: Array, phases: Array, c: HeldChecks) -> Array:
+    measured = t - np.mod(t - phases[:, None], periods[:, None])
+    return np.asarray(np.minimum(np.abs(_interpolation(measured, q)), c.cut).sum(axis=1))
+
+
+def _interpolation(measured: Array, q: Array) -> Array:
+    """By how much positions (N,) measured at times (K, N) miss the line between their neighbours (K, N - 2)."""
+    whole = measured[:, 2:] - measured[:, :-2]
+    share = np.divide(measured[:, 1:-1] - measured[:, :-2], whole, out=np.zeros_like(whole), where=whole > 0)
+    return np.asarray(q[1:-1] - (q[:-2] + share * (q[2:] - q[:-2])))
