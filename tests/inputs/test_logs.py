@@ -137,7 +137,7 @@ def test_positions_beyond_the_models_range() -> None:
 @pytest.mark.parametrize(("header", "said"), [
     ("timestamp,action.arm.pos,observation.state.arm.pos", "rename timestamp to time, action.arm.pos to goal.arm"),
     ("Time;pos_arm;cmd_arm", "columns Time, pos_arm, cmd_arm"),
-    ("stamp,/joint_states/knee/position", "to position.knee"),
+    ("stamp,/joint_states/knee/position", "nearly a motion table"),
 ])
 def test_foreign_columns_are_named_with_those_wanted(tmp_path: Path, header: str, said: str) -> None:
     (tmp_path / "x.csv").write_text(header + "\n0,1,2\n")

@@ -28,7 +28,7 @@ def plain_table(content: bytes) -> tuple[bytes, str]:
     if b"\r" in head and b"\n" not in head:
         content = content.replace(b"\r", b"\n")
         said.append("lines that end in CR")
-    first = next((line for line in content[:HEAD].split(b"\n") if line.strip()), b"")
+    first = next((line for line in content[:HEAD].split(b"\n") if line.strip() and not line.startswith(b"#")), b"")
     for cell, name in ((b";", "';'"), (b"\t", "tabs")):
         if first.count(cell) > first.count(b",") and first.count(cell) >= _cells_least(first, cell):
             content = content.replace(b",", b".").replace(cell, b",")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import read_json
-from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
+from workbench.recording.formats.log_commands import commands_of_rows, order_problem
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
@@ -19,6 +19,8 @@ from workbench.recording.recording import Recording
 Array = NDArray[np.float64]
 _FULL_DUTY = 885.0
 """PWM register of an XL-330 at full duty; its load register holds the PWM, negatives as unsigned 16 bit."""
+_SUPPLY, _LEAST_VOLTS = 0.1, 0.5
+"""By how much the supply may differ from what was measured: a share of it, a drop under load, and [V] at least."""
 _CHANNELS = {"goal_position": "goal", "position": "position", "speed": "velocity", "temp": "temperature"}
 _REQUIRED = ("timestamp", "position", "goal_position")
 
@@ -37,9 +39,8 @@ def read_bam_log(path: str | Path) -> Recording:
         raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)
-    bad = np.flatnonzero(out_of_order(time))
-    if len(bad):
-        raise InputError(source, f"entries[{bad[0]}].timestamp: expected increasing times")
+    if (problem := order_problem(time)) is not None:
+        raise InputError(source, f"entries[{problem.row}].timestamp: {problem.text}")
     joint = str(content.get("motor", "servo"))[:40]
     channels = {f"{channel}.{joint}": _column(source, entries, key, key in _REQUIRED) for key, channel in _CHANNELS.items()
                 if key in _REQUIRED or key in entries[0]}
@@ -55,6 +56,7 @@ def read_bam_log(path: str | Path) -> Recording:
             problems.append(f"load exceeds {_FULL_DUTY:.0f}: it is no PWM register, so that there is no duty")
     if "input_volts" in entries[0]:
         channels["voltage"] = _column(source, entries, "input_volts", False)
+        problems += _supply_problems(content.get("vin"), channels["voltage"])
     enabled = np.ones(len(time))
     if "torque_enable" in entries[0]:
         enabled = channels[f"enabled.{joint}"] = _column(source, entries, "torque_enable", False)
@@ -63,6 +65,19 @@ def read_bam_log(path: str | Path) -> Recording:
     return Recording(source=source, kind="bam_log", version="", time=time, frames=np.arange(len(time)), rate=rate_of(time),
                      units="radians", channels=channels, metadata=metadata, problems=tuple(problems), nameless=True,
                      commands=commands_of_rows(time, (joint,), goals[:, None], enabled[:, None] != 0))
+
+
+def _supply_problems(said: Any, measured: Array) -> list[str]:
+    """A line where the supply that the header says is not that which the servo measured (N,) [V]."""
+    seen = measured[np.isfinite(measured) & (measured > 0)]
+    if isinstance(said, bool) or not isinstance(said, (int, float)) or not len(seen):
+        return []
+    volts = float(np.median(seen))
+    if abs(said - volts) <= max(_SUPPLY * volts, _LEAST_VOLTS):
+        return []
+    return [f"vin says {said:g} V, but the servo measured {volts:.4g} V (input_volts, {seen.min():.4g} to {seen.max():.4g}): "
+            f"give the "
+            "supply that was there as the servo's supply_voltage"]
 
 
 def _column(source: str, entries: list[Any], key: str, required: bool) -> Array:

@@ -3,52 +3,133 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 from workbench.files import InputError
+from workbench.files.kinds import kind_of_file, lfs_pointer
 from workbench.files.numerals import number_of
-from workbench.files.tables import is_binary, split_row
+from workbench.files.tables import is_binary
 from workbench.recording.formats.registry import known_formats
+from workbench.recording.formats.table_header import table_header
 
 _SHOWN = 6
 """Columns named in one line."""
-_RENAMES = (
-    (r"(?i)time|timestamp|t|stamp|__time|%time|secs|time[ _]?\[?\(?s\)?\]?", "time"),
-    (r"(?i)(?:.*/)?(.+?)[._/](?:velocity|vel|speed)", "velocity."),
-    (r"(?i)(?:action|command|cmd|target|goal|desired|reference|setpoint|ref)[._/ ](.+?)(?:[._/](?:pos|position|q))?", "goal."),
-    (r"(?i)(.+?)[._/](?:goal|target|command|cmd|desired|reference|goal_position|position_cmd|pos_cmd)", "goal."),
-    (r"(?i)(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|q|/?joint_states)[._/ ](.+?)"
-     r"(?:[._/](?:pos|position|q))?", "position."),
-    (r"(?i)(.+?)[._/](?:position|pos|present_position|angle|q)", "position."),
+_UNIT = re.compile(r"(?i)[\s_./]*[\[(]\s*(rad|deg|degrees?|radians?|°|s|sec|seconds?|ms|us|ns|rad/s|deg/s|counts?|ticks?|v|a|nm)"
+                   r"\s*[\])]$|[\s_]+(rad|deg|degrees|radians|counts|ticks|sec|secs|seconds|s|ms)$")
+"""What stands after a column's name: its unit, in brackets or after a line."""
+_TIME = re.compile(r"(?i)%?_*(time|timestamp|t|stamp|secs?|seconds?|elapsed)(_?(since|from)_?(start|boot))?(_?stamp)?")
+_GOAL = r"(?:action|actions|command|commanded|cmd|target|goal|desired|reference|setpoint|set_point|ref|des)"
+_SEEN = (r"(?:observation[._/]state|state|present|measured|actual|feedback|position|pos|angle|q|meas|motor_position|"
+         r"/?joint_states)")
+_PLACE = r"(?:[._/](?:pos|position|angle|q))?"
+_NAMED = (
+    ("velocity", re.compile(r"(?i)(?:.*/)?(.+?)[._/ ](?:velocity|vel|speed)")),
+    ("goal", re.compile(rf"(?i){_GOAL}[._/ ](?!pos$|position$)(.+?){_PLACE}")),
+    ("goal", re.compile(rf"(?i)(.+?)[._/ ](?:{_GOAL}(?:_position|_pos)?|(?:position|pos)_{_GOAL})")),
+    ("position", re.compile(rf"(?i){_SEEN}[._/ ](.+?){_PLACE}")),
+    ("position", re.compile(r"(?i)(.+?)[._/ ](?:position|pos|present_position|angle|actual|measured|q)")),
 )
-"""Names that other tools give to columns of a joint log, and ours, to which the joint's name is added."""
+"""Names that other tools give to columns of a joint log: what they hold, and the joint."""
+_BARE = {"goal": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_GOAL}[._/ ]?(?:pos|position|angle|q)?"),
+         "position": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_SEEN}[._/ ]?(?:pos|position|angle|q)?")}
+"""Of a log of one servo, whose columns name no joint."""
+_OTHER = re.compile(r"(?i).*(vel|speed|torque|tau|effort|current|load|volt|temp|duty|pwm|error|mode|status|id)\w*")
+"""Columns that are neither goal nor position."""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column as it is called, without its unit, and that unit."""
+
+    called: str
+    plain: str
+    unit: str
 
 
 def refusal(path: Path, head: bytes) -> InputError:
     """The error that says what a file of no known format is, and what was expected of it."""
     wanted = ", ".join(f.called for f in known_formats() if f.called)
+    if (pointer := lfs_pointer(head)) is not None:
+        return InputError(path, pointer)
+    if (kind := kind_of_file(head, path.suffix)) is not None:
+        return InputError(path, f"{kind} (expected a recording: {wanted})")
     if is_binary(head):
         return InputError(path, f"a binary file of no known kind; expected a recording ({wanted})")
-    lines = [line for line in head.decode("utf-8-sig", "replace").splitlines() if line.strip() and not line.startswith("#")]
-    cells = split_row(lines[0]) if lines else []
+    header = table_header(head)
+    cells = list(header.names)
     if len(cells) < 2:
         return InputError(path, f"line 1: not a recording; expected one of {wanted}")
     if all(number_of(c) is not None for c in cells if c):
         return InputError(path, f"line 1: {len(cells)} columns of numbers without names; expected a header (of a joint log: "
                                 "time, goal.J and position.J of each joint J in degrees; of a Motive export: its own)")
     more = f" and {len(cells) - _SHOWN} more" if len(cells) > _SHOWN else ""
-    text = f"line 1: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected time [s], " \
-           f"goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
-    renames = [f"{c[:40]} to {new[:50]}" for c in cells if (new := _renamed(c)) and new != c]
+    text = f"line {header.lines}: not a recording; columns {', '.join(c[:40] for c in cells[:_SHOWN])}{more}; expected " \
+           f"time [s], goal.J and position.J [deg] of each joint J of a joint log, or one of {wanted}"
+    return InputError(path, text + _hint([_column(c) for c in cells]))
+
+
+def _column(name: str) -> _Column:
+    found = _UNIT.search(name)
+    if found is None or found.start() == 0:
+        return _Column(name, name, "")
+    return _Column(name, name[:found.start()].strip(), (found.group(1) or found.group(2)).lower())
+
+
+def _hint(columns: list[_Column]) -> str:
+    """How to make a joint log or a motion of the columns; empty where they are neither."""
+    time = next((c for c in columns if _TIME.fullmatch(c.plain)), None)
+    renames = _pairs(columns) or _bare_pair(columns)
+    unit = next((c.unit for c in columns if c.unit.startswith(("rad", "deg", "count", "tick"))), "")
+    into = ", and turn radians into degrees" if unit.startswith("rad") else \
+        ", and turn counts into degrees" if unit.startswith(("count", "tick")) else ""
     if renames:
+        if time is not None and time.called != "time":
+            renames.insert(0, (time.called, "time"))
+        shown = ", ".join(f"{a[:40]} to {b[:50]}" for a, b in renames[:3])
         rest = f" and so on ({len(renames) - 3} more)" if len(renames) > 3 else ""
-        text += f"; rename {', '.join(renames[:3])}{rest}, in seconds and degrees"
-    return InputError(path, text)
+        return f"; rename {shown}{rest}, in seconds and degrees{into}"
+    others = [c for c in columns if c is not time and c.plain and not _OTHER.fullmatch(c.plain)]
+    if time is None or not others or any(_marked(c) == "goal" for c in others):
+        return ""
+    joints = ", ".join(_joint_of(c)[:30] for c in others[:3])
+    more = " and so on" if len(others) > 3 else ""
+    return ("; a column for each joint and no goals is nearly a motion table: to play it as a motion, rename them to time, "
+            f"{joints}{more}, poses in degrees{into}; as a recording it lacks the goals")
 
 
-def _renamed(name: str) -> str | None:
-    for pattern, new in _RENAMES:
-        found = re.fullmatch(pattern, name)
-        if found:
-            return new + (found.group(1).replace("/", "_").strip("_") if found.groups() else "")
-    return None
+def _marked(column: _Column) -> str | None:
+    return next((kind for kind, pattern in _NAMED if pattern.fullmatch(column.plain)), None) \
+        or next((kind for kind, pattern in _BARE.items() if pattern.fullmatch(column.plain)), None)
+
+
+def _joint_of(column: _Column) -> str:
+    for _, pattern in _NAMED:
+        if (found := pattern.fullmatch(column.plain)) is not None:
+            return _plain(found.group(1))
+    return column.plain
+
+
+def _plain(joint: str) -> str:
+    return joint.replace("/", "_").strip("_ .")
+
+
+def _pairs(columns: list[_Column]) -> list[tuple[str, str]]:
+    """New names of the columns of joints of which both goal and position are there."""
+    found: dict[str, dict[str, _Column]] = {}
+    for column in columns:
+        for kind, pattern in _NAMED:
+            if (match := pattern.fullmatch(column.plain)) is not None:
+                found.setdefault(_plain(match.group(1)), {}).setdefault(kind, column)
+                break
+    whole = {joint: kinds for joint, kinds in found.items() if {"goal", "position"} <= set(kinds)}
+    return [(c.called, f"{kind}.{joint}") for joint, kinds in whole.items() for kind, c in kinds.items()
+            if c.called != f"{kind}.{joint}"]
+
+
+def _bare_pair(columns: list[_Column]) -> list[tuple[str, str]]:
+    """New names of the one goal and the one position of a log that names no joint."""
+    found = {kind: [c for c in columns if pattern.fullmatch(c.plain)] for kind, pattern in _BARE.items()}
+    if any(len(of) != 1 for of in found.values()):
+        return []
+    return [(of[0].called, f"{kind}.J (J is the joint's name)" if kind == "goal" else f"{kind}.J") for kind, of in found.items()]

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
-from workbench.files.tables import is_binary, split_row
-from workbench.recording.formats.log_commands import commands_of_rows, out_of_order
+from workbench.files.tables import is_binary
+from workbench.recording.formats.log_commands import commands_of_rows, order_problem
 from workbench.recording.formats.numbers import column, rate_of, read_columns, strings, table_bytes
 from workbench.recording.formats.registry import RecordingFormat
+from workbench.recording.formats.table_header import table_header
 from workbench.recording.recording import Recording
 
 Array = NDArray[np.float64]
@@ -28,12 +29,8 @@ _TRUE, _FALSE = {"1", "1.0", "true"}, {"0", "0.0", "false"}
 
 def looks_like_joint_log(head: bytes) -> bool:
     """Whether a file that begins with `head` has a header with `time` and goals or positions of joints."""
-    cells = [] if is_binary(head) else _cells(head.partition(b"\n")[0])
+    cells = () if is_binary(head) else table_header(head).names
     return "time" in cells and any(c.startswith(("goal.", "position.")) for c in cells)
-
-
-def _cells(line: bytes) -> list[str]:
-    return split_row(line.decode("utf-8-sig", "replace").rstrip("\r"))
 
 
 def read_joint_log(path: str | Path) -> Recording:
@@ -44,17 +41,17 @@ def read_joint_log(path: str | Path) -> Recording:
     """
     source = str(path)
     content, written = table_bytes(path)
-    end = content.find(b"\n")
-    names = _cells(content[:end] if end >= 0 else content[:])
-    _check_names(source, names)
+    header = table_header(content)
+    names = list(header.names)
+    _check_names(source, names[1:] if header.index else names, header.lines)
     text = {i for i, name in enumerate(names) if name.startswith("enabled.")}
-    table = read_columns(source, content, len(content) if end < 0 else end + 1, 1, len(names), text)
+    wanted = set(range(int(header.index), len(names)))
+    table = read_columns(source, content, header.end, header.lines, len(names), text, wanted)
     time = column(table, names.index("time"))
-    bad = out_of_order(time)
-    if bad.any():
-        n = int(np.argmax(bad))
-        raise InputError(source, f"line {n + 2}: time {time[n]:g} does not follow; expected increasing times")
-    channels = {name: _channel(source, table, i, name) for i, name in enumerate(names) if name != "time"}
+    if (problem := order_problem(time)) is not None:
+        raise InputError(source, f"line {problem.row + header.lines + 1}: {problem.text}")
+    channels = {name: _channel(source, table, i, name, header.lines) for i, name in enumerate(names)
+                if name != "time" and i in wanted}
     joints = tuple(n.removeprefix("goal.") for n in names if n.startswith("goal."))
     goals = np.column_stack([channels[f"goal.{j}"] for j in joints])
     on = np.ones(len(time))
@@ -67,21 +64,21 @@ def read_joint_log(path: str | Path) -> Recording:
                      metadata={"written with": written} if written else {})
 
 
-def _check_names(source: str, names: list[str]) -> None:
+def _check_names(source: str, names: list[str], line: int) -> None:
     for i, name in enumerate(names):
         kind, dot, joint = name.partition(".")
         if name in names[:i]:
-            raise InputError(source, f"line 1: column '{name}' stands there twice")
+            raise InputError(source, f"line {line}: column '{name}' stands there twice")
         if name not in ("time", "voltage") and not (dot and joint and kind in _SCALE):
-            raise InputError(source, f"line 1: unknown column '{name[:40]}'; expected time, voltage, or one of "
+            raise InputError(source, f"line {line}: unknown column '{name[:40]}'; expected time, voltage, or one of "
                                      f"{', '.join(k + '.JOINT' for k in _SCALE)}")
         if dot and f"goal.{joint}" not in names:
-            raise InputError(source, f"line 1: column '{name}' without 'goal.{joint}'")
+            raise InputError(source, f"line {line}: column '{name}' without 'goal.{joint}'")
     if "time" not in names or not any(n.startswith("goal.") for n in names):
-        raise InputError(source, "line 1: expected a column 'time' and goals of joints")
+        raise InputError(source, f"line {line}: expected a column 'time' and goals of joints")
 
 
-def _channel(source: str, table: pa.Table, index: int, name: str) -> Array:
+def _channel(source: str, table: pa.Table, index: int, name: str, above: int) -> Array:
     kind = name.partition(".")[0]
     if kind != "enabled":
         return column(table, index) * _SCALE.get(kind, 1.0)
@@ -89,7 +86,7 @@ def _channel(source: str, table: pa.Table, index: int, name: str) -> Array:
     for n, cell in enumerate(strings(table, index)):
         word = cell.strip().lower()
         if word and word not in _TRUE | _FALSE:
-            raise InputError(source, f"line {n + 2}, {name}: expected 1 or 0, got '{cell}'")
+            raise InputError(source, f"line {n + above + 1}, {name}: expected 1 or 0, got '{cell}'")
         last = last if not word else float(word in _TRUE)  # a blank repeats the last one
         out[n] = last
     return out

@@ -29,6 +29,8 @@ COUNT = 360 / 4096
 MOST = 512 << 20
 """Largest file [bytes]."""
 _ACTION, _STATE, _TIME, _EPISODE = "action", "observation.state", "timestamp", "episode_index"
+_RATE = 0.05
+"""By how much the rate of time stamps may differ from the one that info.json says, as a share."""
 _CLEAN = 0.02
 """Of a count: how far it may be from 360/4096 deg for angles in degrees."""
 
@@ -59,10 +61,20 @@ def read_lerobot(path: Path, episode: str | None = None) -> Recording:
     channels = {f"goal.{j}": goals[:, i] for i, j in enumerate(joints)}
     channels |= {f"position.{j}": positions[:, i] for i, j in enumerate(joints)}
     info = _info(path)
+    problems += _rate_problems(info.get("fps"), time)
     return Recording(source=source, kind="lerobot", version=str(info.get("codebase_version", "")), time=time,
                      frames=np.arange(len(time)), rate=rate_of(time), units="degrees", channels=channels,
                      problems=tuple(problems), metadata={"episode": chosen, "robot_type": str(info.get("robot_type") or "")},
                      commands=commands_of_rows(time, joints, goals, np.ones(goals.shape, dtype=bool)))
+
+
+def _rate_problems(fps: Any, time: Array) -> list[str]:
+    """A line where the frame rate that info.json says is not that of the time stamps (N,) [s]."""
+    step = float(np.median(np.diff(time)))
+    if isinstance(fps, bool) or not isinstance(fps, (int, float)) or fps <= 0 or abs(fps * step - 1) <= _RATE:
+        return []
+    return [f"meta/info.json says {fps:g} fps, the time stamps say {1 / step:.4g}: the time stamps are used; was the data set "
+            "resampled, or recorded at another rate than asked?"]
 
 
 def episodes(path: Path) -> tuple[str, ...]:

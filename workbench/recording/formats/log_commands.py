@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 
 Array = NDArray[np.float64]
+_EPOCH = 1e8
+"""Seconds since 1970 are more than that [s]."""
 
 
 def out_of_order(time: Array) -> NDArray[np.bool_]:
@@ -18,6 +22,31 @@ def out_of_order(time: Array) -> NDArray[np.bool_]:
         bad = ~np.isfinite(since)
         bad[1:] |= ~(np.diff(since) > 0)
     return np.asarray(bad)
+
+
+@dataclass(frozen=True)
+class OrderProblem:
+    """row: the first whose time does not follow. text: what is wrong with it."""
+
+    row: int
+    text: str
+
+
+def order_problem(time: Array) -> OrderProblem | None:
+    """What is wrong with times (N,) [any unit] that do not increase; None where they do."""
+    bad = np.flatnonzero(out_of_order(time))
+    if not len(bad):
+        return None
+    row = int(bad[0])
+    here, before = (f"{float(t):.15g}" for t in (time[row], time[max(row - 1, 0)]))
+    text = f"time {here} does not follow {before}" if row else f"time {here}"
+    known = time[np.isfinite(time)]
+    steps = np.diff(np.unique(known))
+    coarse = float(steps.min()) if len(steps) else 0.0
+    if len(known) > 2 and np.all(np.diff(known) >= 0) and (coarse >= 1 or (not coarse and known[0] > _EPOCH)):
+        lost = "the same time stands in several rows: its digits were lost when it was written (rounded)"
+        return OrderProblem(row, f"{text}: {lost}; write seconds since the first row, or with all digits")
+    return OrderProblem(row, f"{text}; expected increasing times")
 
 
 def commands_of_rows(time: Array, joints: tuple[str, ...], goals: Array, enabled: NDArray[np.bool_],

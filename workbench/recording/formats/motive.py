@@ -60,6 +60,11 @@ def read_motive(path: str | Path) -> Recording:
             namesake = asset.kind != "Marker" and asset.name in raw  # a solved marker makes way for the raw one
             name = _unused(f"{asset.name} ({asset.kind})" if namesake else asset.name, markers)
             markers[name] = stacked(table, _in_order(asset.position, "XYZ")).T * scale
+    names = [a.name for a in header.assets if a.kind in _BODIES and (a.rotation or a.position)]
+    for name in dict.fromkeys(n for n in names if names.count(n) > 1):
+        problems.append(f"{names.count(name)} rigid bodies are called '{name}': which is which nothing says; rename them in "
+                        f"Motive and "
+                        "export again (the others are called by the name and a number)")
     metadata = dict(header.metadata)
     metadata |= {f"Parent of {child}": parent for child, parent in header.parents.items()}
     if header.timecode is not None:

@@ -188,7 +188,7 @@ def _all_of(source: str, names: list[str], parts: list[Recording]) -> Recording:
 
 
 def _npz(head: bytes) -> bool:
-    return head.startswith(b"PK")
+    return head.startswith(b"PK") and head[30:30 + int.from_bytes(head[26:28], "little")].endswith(b".npy")
 
 
 def _raw(head: bytes) -> bool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording.recording import Recording
+from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.units import UNITS, unit_problems
@@ -63,13 +64,16 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
         if name in channels and not (goal is not None and _in_another_unit(goal)):
             channels[name], said = without_leaps(time, channels[name])
             problems += [f"{name}: {text}" for text in said]
-    mended = replace(recording, channels=channels)
+    read = replace(recording, channels=channels)
     for check in (_clock, _no_command, _standing):
-        problems += check(mended, checks)
-    problems += unit_problems(mended)
+        problems += check(read, checks)
+    problems += unit_problems(read)
+    mended = without_faults(read, frozenset(j for j in read.joints if any(
+        text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
+    problems += mended.lines
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
-        problems += lead_problems(mended)
-    return replace(mended, problems=tuple(problems))
+        problems += lead_problems(mended.recording)
+    return replace(mended.recording, problems=tuple(problems))
 
 
 def _bounded(r: Recording, c: LogChecks) -> None:

@@ -22,9 +22,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModelChecks:
-    """gyration: of a link's radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m].
-    dense: no link of its reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
+    """dummy: a link that weighs no more than that stands for a frame; nothing of its inertia matters [kg]. outside: how far a
+    centre of mass may lie outside the box about its link's shapes and joints, in diagonals of that. gyration: of a link's
+    radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m]. dense: no link of its
+    reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
 
+    dummy: float = 1e-5
+    outside: float = 1.0
     gyration: float = 1.5
     smallest: float = 0.03
     dense: float = 12000.0
@@ -151,8 +155,9 @@ def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any], held: str) -> Ite
         name, mass, reach = body.name(), body.default_mass(), reaches[body.name()]
         if reach > CHECKS.longest:
             yield f"link '{name}' reaches {reach:.3g} m from its frame: are lengths in millimetres?"
-        if mass <= 0 or name == held:
+        if mass <= CHECKS.dummy or name == held:
             continue
+        yield from _centre_outside(plant, scene_graph, body)
         about = body.default_rotational_inertia().CopyToFullMatrix3()
         c = body.default_com()
         central = about - mass * (c @ c * np.eye(3) - np.outer(c, c))
@@ -164,6 +169,21 @@ def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any], held: str) -> Ite
         if mass > CHECKS.dense * max(reach, CHECKS.smallest) ** 3:
             yield (f"link '{name}' weighs {mass:.4g} kg and reaches {reach:.2g} m: heavier than lead; are masses in grams, or "
                    "lengths in another unit?")
+
+
+def _centre_outside(plant: Any, scene_graph: Any, body: Any) -> Iterator[str]:
+    """Whether a link's centre of mass lies far outside all that the description says of its extent."""
+    points = _points(plant, scene_graph, body)[1:]  # the first is the centre itself
+    if len(points) < 2:
+        return
+    lower, upper, c = points.min(axis=0), points.max(axis=0), body.default_com()
+    size = max(float(np.linalg.norm(upper - lower)), CHECKS.smallest)
+    away = float(np.linalg.norm(c - np.clip(c, lower, upper)))
+    if away > CHECKS.outside * size:
+        x, y, z = c
+        yield (f"link '{body.name()}': its centre of mass at {x:.3g} {y:.3g} {z:.3g} m lies {away:.2g} m outside its shapes "
+               f"and joints, "
+               f"which are {size:.2g} m across: is its origin in millimetres, or in another frame?")
 
 
 def _reach(plant: Any, scene_graph: Any, body: Any) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from workbench.files import InputError
+from workbench.files.kinds import lfs_pointer
 from workbench.files.reading import regular_file, write_whole
 from workbench.files.resources import resource_dir
 
@@ -81,10 +82,16 @@ def drake_mesh(path: Path, model: Path, place: str, cache: Path) -> Path:
     """A mesh that Drake reads: the file itself, or an OBJ made of it in `cache`. InputError where it holds no triangles."""
     kind = path.suffix.lower()
     if kind in READ:
+        with regular_file(path, _MOST).open("rb") as file:
+            pointer = lfs_pointer(file.read(200))
+        if pointer is not None:
+            raise InputError(model, f"{place}: mesh '{path.name}': {pointer}")
         return path
     if kind not in CONVERTED:
         raise InputError(model, f"{place}: mesh '{path.name}': expected {', '.join(x[1:].upper() for x in READ + CONVERTED)}")
     content = regular_file(path, _MOST).read_bytes()
+    if (pointer := lfs_pointer(content[:200])) is not None:
+        raise InputError(model, f"{place}: mesh '{path.name}': {pointer}")
     made = cache / f"{path.stem}-{hashlib.sha256(content).hexdigest()[:16]}.obj"
     if not made.is_file():
         write_whole(made, _triangles(path, model, place).export(file_type="obj", include_texture=False))

@@ -9,6 +9,8 @@ from workbench.files import InputError
 from workbench.robot.model_source.xml_file import DRAKE
 
 _TYPES = {"revolute": "revolute", "continuous": "revolute", "fixed": "fixed", "prismatic": "prismatic"}
+_FREE = "floating"
+"""Type of a joint that gives its child six degrees of freedom: a free base, where it hangs on `world`."""
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -32,13 +34,15 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
             raise InputError(path, f"link '{child}' hangs on joints '{carrier[child]}' and '{joint.get('name')}': a kinematic "
                                    "loop; expected a tree")
         carrier[child] = joint.get("name") or ""
+    free, left_behind = _free_bases(joints, links, path)
+    joints = [j for j in joints if _end(j, "child", path) not in free]
     colours = {m.get("name"): m for m in root.findall("material")}
     for link in links:
         name = link.get("name") or ""
-        if name == "world":
+        if name == "world" or name in left_behind:
             continue
         out = SubElement(model, "link", {"name": names[name]})
-        if name in carrier:
+        if name in carrier and name not in free:
             SubElement(out, "pose", {"relative_to": carrier[name]}).text = "0 0 0 0 0 0"
         _inertial(out, link.find("inertial"))
         for kind in ("visual", "collision"):
@@ -49,6 +53,24 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
     for group in root.findall(f"{{{DRAKE}}}collision_filter_group"):
         _filter_group(model, group, names)
     return sdf, said
+
+
+def _free_bases(joints: list[Element], links: list[Element], path: Path) -> tuple[set[str], set[str]]:
+    """Links that a floating joint hangs on the world, or on a root that stands for it (odom, map): each is a base that floats
+    anyway, wherever the joint puts it. And those roots, which nothing else hangs on."""
+    free, roots = set(), set()
+    weigh = {k.get("name") for k in links if k.find("inertial") is not None}
+    for joint in joints:
+        if joint.get("type") == _FREE:
+            parent, child = _end(joint, "parent", path), _end(joint, "child", path)
+            if parent in weigh or any(_end(j, "child", path) == parent for j in joints):
+                raise InputError(path, f"joint '{joint.get('name')}' is floating, from '{parent}' to '{child}', within the "
+                                       f"robot; "
+                                       "expected revolute, continuous, prismatic or fixed there")
+            free.add(child)
+            roots.add(parent)
+    others = {_end(j, "parent", path) for j in joints if _end(j, "child", path) not in free}
+    return free, {r for r in roots if r not in others}
 
 
 def _end(joint: Element, tag: str, path: Path) -> str:
@@ -114,7 +136,8 @@ def _shape(out: Element, shape: Element, name: str, colours: dict[str | None, El
 def _joint(model: Element, joint: Element, names: dict[str, str], path: Path) -> list[str]:
     name, kind = joint.get("name") or "", joint.get("type") or ""
     if kind not in _TYPES:
-        raise InputError(path, f"joint '{name}' is {kind or 'of no type'}; expected revolute, continuous or fixed")
+        raise InputError(path, f"joint '{name}' is {kind or 'of no type'}; expected revolute, continuous, prismatic or fixed (or "
+                               "floating, from world to the base)")
     parent, child = _end(joint, "parent", path), _end(joint, "child", path)
     for link in (parent, child):
         if link not in names and link != "world":
@@ -122,14 +145,15 @@ def _joint(model: Element, joint: Element, names: dict[str, str], path: Path) ->
     to = SubElement(model, "joint", {"name": name, "type": _TYPES[kind]})
     pose = SubElement(to, "pose")
     pose.text = _pose(joint.find("origin"))
-    if parent != "world":
-        pose.set("relative_to", names[parent])
+    pose.set("relative_to", "__model__" if parent == "world" else names[parent])
     _value(to, "parent", names.get(parent, parent))
     _value(to, "child", names[child])
     if _TYPES[kind] == "fixed":
         return []
     axis = SubElement(to, "axis")
     given = joint.find("axis")
+    if given is not None and not any(float(x) for x in given.get("xyz", "1 0 0").split()):
+        raise InputError(path, f"joint '{name}': axis {given.get('xyz')} has no direction; expected one, as 0 1 0")
     _value(axis, "xyz", "1 0 0" if given is None else given.get("xyz", "1 0 0"))
     limit = joint.find("limit")
     if limit is not None:

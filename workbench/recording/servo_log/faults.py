@@ -1,0 +1,89 @@
+"""What a servo log gets wrong joint by joint: found, set right where that is certain, left out of the evidence where not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.recording.recording import Recording
+from workbench.recording.servo_log.astray import without_astray
+from workbench.recording.servo_log.exchanged import exchanged
+from workbench.recording.servo_log.following import JointLog, joint_logs
+from workbench.recording.servo_log.let_go import lets_go
+from workbench.recording.servo_log.relative import relative_goals
+from workbench.recording.servo_log.repeats import without_repeats
+from workbench.recording.servo_log.zero_shift import zero_shifts
+
+
+@dataclass(frozen=True)
+class Mended:
+    """recording: with what is certain set right and what is no evidence blanked (NaN). lines: of each joint that has one.
+    no_goals: joints whose goals are none of theirs, of which nothing more is to be said."""
+
+    recording: Recording
+    lines: tuple[str, ...]
+    no_goals: frozenset[str]
+
+
+def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) -> Mended:
+    """A servo log without the readings that were not taken, with its zeros set right, and without the evidence of joints whose
+    goals are none or that their servos let go. skipped: joints of which another check has told already."""
+    channels, lines = dict(recording.channels), []
+    joints = [j for j in recording.joints if f"position.{j}" in channels and j not in skipped]
+    for joint in joints:
+        name = f"position.{joint}"
+        for read in (without_astray, without_repeats):
+            channels[name], said = read(recording.time, channels[name])
+            lines += [f"{name}: {text}" for text in said]
+    mended = replace(recording, channels=channels)
+    logs = {j: log for j, log in joint_logs(mended).items() if j in joints}
+    swapped = exchanged(logs)
+    no_goals = set(swapped)
+    for joint, other in swapped.items():
+        back = " and the other way round" if swapped.get(other) == joint else ""
+        lines.append(f"position.{joint}: follows goal.{other}, not goal.{joint}{back}: are the columns of {joint} and {other} "
+                     "exchanged? Its evidence is left out")
+    for joint, log in logs.items():
+        if joint in swapped:
+            continue
+        text = relative_goals(log)
+        if text is not None:
+            no_goals.add(joint)
+            lines.append(f"goal.{joint}: {text}; the joint's evidence is left out")
+            continue
+        log, said = _zeroed(channels, log)
+        lines += said + _released(channels, recording, log)
+    for joint in no_goals:
+        channels[f"position.{joint}"] = np.full(len(recording.time), np.nan)
+    return Mended(replace(recording, channels=channels), tuple(lines), frozenset(no_goals))
+
+
+def _zeroed(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, list[str]]:
+    name = f"position.{log.name}"
+    off, said = zero_shifts(log)
+    if not said:
+        return log, []
+    values = channels[name].copy()
+    values[log.rows] -= off
+    channels[name] = values
+    return replace(log, position=log.position - off), [f"{name}: {text}" for text in said]
+
+
+def _released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
+    """Blanks the positions of a joint from when on it does not depend on its goals, and says so."""
+    row = lets_go(log)
+    if row is None:
+        return []
+    name, at = f"position.{log.name}", log.rows[row]
+    duty = channels.get(f"duty.{log.name}")
+    off = duty is not None and np.nanmax(np.abs(duty[at:]), initial=0.0) < 0.02 < np.nanmax(np.abs(duty[:at]), initial=0.0)
+    stands = bool(np.ptp(log.position[row + 1:]) == 0) if row + 1 < len(log.rows) else False
+    causes = ("its duty is 0 from then on: the servo let go (overload, heat, low supply)" if off else
+              "its sensor stood still, or the servo let go (overload, heat, low supply, a cable)" if stands else
+              "the servo let go (overload, heat, low supply, a cable), or its horn slips")
+    values = channels[name].copy()
+    values[at:] = np.nan
+    channels[name] = values
+    return [f"{name}: no longer depends on goal.{log.name} from {recording.time[at]:.3f} s (row {at + 1}) on: {causes}; its "
+            "evidence ends there"]

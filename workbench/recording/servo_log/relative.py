@@ -1,0 +1,73 @@
+"""Goals that are steps, from row to row or from where the joint is, and not angles: relative actions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.servo_log.following import JointLog, followed
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RelativeChecks:
+    """spans: rows over which a joint's way is compared with the sum of its goals, and from its place with the goal (which then
+    gives `from_place` of its variance). later: rows by which it may come later. explained: share of the way's variance that the
+    goals give. alike: of 1, how far the ratio of the two may be, for steps from row to row; from where the joint is, a servo
+    makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they
+    are angles, if the joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period
+    later. smaller: the goals' range is at most so much of the position's. fewest: rows that tell."""
+
+    spans: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
+    later: int = 6
+    explained: float = 0.85
+    alike: float = 0.4
+    from_place: float = 0.7
+    least: float = 0.25
+    largest: float = 4.0
+    absolute: float = 0.6
+    beyond: float = 2.0
+    smaller: float = 0.6
+    fewest: int = 30
+
+
+RELATIVE = RelativeChecks()
+
+
+def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
+    """A line where goals are steps and not angles; None where they are angles, or nothing tells."""
+    goal, position = log.goal, log.position
+    if len(goal) < c.fewest + max(c.spans) + c.later or np.ptp(goal) > c.smaller * np.ptp(position) or np.ptp(goal) == 0:
+        return None
+    fit = followed(log.time, goal, position)
+    if fit.explained > c.absolute and fit.gain < c.beyond:
+        return None
+    if _best(goal, position, c, summed=True):
+        return ("looks like the change of the position from row to row: relative actions (deltas); add them up to angles before "
+                "use")
+    if _best(goal, position, c, summed=False):
+        return ("looks like the way from the position to the goal: relative actions; add each row's position to get angles "
+                "before "
+                "use")
+    return None
+
+
+def _best(goal: Array, position: Array, c: RelativeChecks, summed: bool) -> bool:
+    total = np.concatenate([[0.0], np.cumsum(goal)])
+    for span in c.spans:
+        for later in range(c.later + 1):
+            n = len(goal) - span - later
+            way = position[later + span:later + span + n] - position[later:later + n]
+            asked = total[span:span + n] - total[:n] if summed else goal[:n]
+            if np.ptp(way) == 0 or np.ptp(asked) == 0:
+                continue
+            r = float(np.corrcoef(way, asked)[0, 1])
+            slope = r * float(np.std(way) / np.std(asked))
+            right = (r * r > c.explained and abs(slope - 1) < c.alike) if summed else \
+                (r * r > c.from_place and c.least < slope < c.largest)
+            if r > 0 and right:
+                return True
+    return False

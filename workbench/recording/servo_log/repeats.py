@@ -1,0 +1,75 @@
+"""Readings that repeat the last one while the joint moves on, as a reader does when the bus times out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RepeatChecks:
+    """rows: a value has to repeat in so many rows after its own. longest: and in so many at most, else the sensor
+    stood still. counts: of the sensor that the joint moves in each row around, at least; slower joints stick and slip by
+    themselves. catches: the next reading leaps by so much of what it moves in the rows that were repeated. around: as many rows
+    on each side, in lengths of the repetition. stretches: so many at least. slowest: rows further apart tell nothing [s]."""
+
+    rows: int = 2
+    longest: int = 15
+    counts: float = 1.5
+    catches: float = 0.6
+    around: int = 2
+    stretches: int = 3
+    slowest: float = 0.1
+
+
+REPEATS = RepeatChecks()
+
+
+def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> tuple[Array, list[str]]:
+    """Positions (N,) [rad] at times (N,) [s] with readings that only repeat the last one blanked (NaN), and a line for them."""
+    seen = np.flatnonzero(np.isfinite(position))
+    if len(seen) < 20 or float(np.median(np.diff(time))) > c.slowest:
+        return position, []
+    values = position[seen]
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 1e-9]
+    if len(moving) < c.stretches:
+        return position, []
+    count = float(moving.min())
+    found = [(a, b) for a, b in runs_of_equals(values) if c.rows <= b - a < c.longest and _catches_up(values, a, b, count, c)]
+    if len(found) < c.stretches:
+        return position, []
+    out = position.copy()
+    for a, b in found:
+        out[seen[a + 1:b + 1]] = np.nan
+    lengths = [b - a + 1 for a, b in found]
+    rows = sum(n - 1 for n in lengths)
+    lasts = f"{min(lengths)} to {max(lengths)}" if min(lengths) < max(lengths) else f"{lengths[0]}"
+    return out, [f"repeats the same reading for {lasts} rows while the joint moves, in {len(found)} stretches, the first from "
+                 f"{time[seen[found[0][0]]]:.3f} s (row {seen[found[0][0]] + 1}): as a reader does when the bus times out; "
+                 f"{rows} repeated reading(s) taken out"]
+
+
+def runs_of_equals(values: Array) -> list[tuple[int, int]]:
+    """First and last index of each run of equal values."""
+    same = np.concatenate([[False], values[1:] == values[:-1], [False]])
+    return [(int(a), int(b)) for a, b in np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2)]
+
+
+def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChecks) -> bool:
+    """Whether a joint that was on its way before a repetition is, right after it, where it would be had it gone on."""
+    if first < 1 or last + 2 >= len(values):
+        return False
+    n = last - first + 1
+    leap = values[last + 1] - values[last]
+    before = values[first] - values[max(first - c.around * n, 0)]
+    after = values[min(last + 1 + c.around * n, len(values) - 1)] - values[last + 1]
+    rates = before / min(c.around * n, first), after / min(c.around * n, len(values) - 2 - last)
+    slower, faster = sorted(map(abs, rates))
+    if slower < c.counts * count or leap * rates[0] <= 0 or leap * rates[1] <= 0:
+        return False
+    return bool(c.catches * n * slower < abs(leap) < 3 * n * faster)

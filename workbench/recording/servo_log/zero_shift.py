@@ -1,0 +1,111 @@
+"""A joint's zero that shifts within a log: its readings step aside, no goal having stepped, and stay there or step back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.recording.servo_log.following import JointLog, followed
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ShiftChecks:
+    """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the
+    `near` rows on each side. alike: how far, in shares of the step, the level of the readings against the goals may differ from
+    it. goal: a goal that steps by that share of it within `before` explains it [s]. rows: of a stretch, at least. slowest: rows
+    further apart tell nothing [s]. explained: share of the position's variance that the goals have to give. doubt: of two
+    levels, the one nearer to the goals counts as the right one, the first where they are alike to that share."""
+
+    least: float = 1.0
+    times: float = 4.0
+    near: int = 8
+    alike: float = 0.35
+    goal: float = 0.4
+    before: float = 0.3
+    rows: int = 5
+    slowest: float = 0.1
+    explained: float = 0.5
+    doubt: float = 0.3
+
+
+SHIFT = ShiftChecks()
+
+
+def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]]:
+    """What is to be subtracted from the positions of a log (K,) [rad], 0 where its zero is as it was, and a line that says so."""
+    none = np.zeros(len(log.rows))
+    if float(np.median(np.diff(log.time))) > c.slowest:
+        return none, []
+    steps = np.diff(log.position)
+    large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
+    inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
+    at = [k for k in inside if _stands_out(steps, k, c) and not _asked(log, k, float(steps[k]) - _usual(steps, k), c)]
+    if not at:
+        return none, []
+    edges = [0, *(k + 1 for k in at), len(log.rows)]
+    jumps = np.array([steps[k] - _usual(steps, k) for k in at])
+    level = np.concatenate([[0.0], np.cumsum(jumps)])
+    undone = log.position - np.repeat(level, np.diff(edges))
+    fit = followed(log.time, log.goal, undone)
+    if fit.explained < c.explained:
+        return none, []
+    away = log.position - fit.predicted(log.time, log.goal)
+    middle = [float(np.median(away[a:b])) for a, b in pairwise(edges)]
+    for i, jump in enumerate(jumps):
+        if min(edges[i + 1] - edges[i], edges[i + 2] - edges[i + 1]) < c.rows:
+            return none, []
+        if abs(middle[i + 1] - middle[i] - jump) > c.alike * abs(jump):
+            return none, []
+    true = _true_level(level, edges, middle, fit.offset, c)
+    off = np.repeat(level - level[true], np.diff(edges))
+    return off, [_line(log, off, edges)]
+
+
+def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:
+    """Whether step `k` differs from those beside it, which are alike, by more than steps differ nearby."""
+    bend = np.abs(steps[1:-1] - (steps[:-2] + steps[2:]) / 2)  # of step i + 1
+    around = np.concatenate([bend[max(k - 2 - c.near, 0):max(k - 2, 0)], bend[k + 1:k + 1 + c.near]])
+    jump = abs(steps[k] - _usual(steps, k))
+    return bool(jump > max(np.deg2rad(c.least), c.times * float(np.max(around, initial=0.0)))
+                and abs(steps[k + 1] - steps[k - 1]) < jump / 3)
+
+
+def _usual(steps: Array, k: int) -> float:
+    """What the joint moves between the rows beside step `k` [rad]."""
+    return float(steps[k - 1] + steps[k + 1]) / 2
+
+
+def _asked(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
+    """Whether a goal stepped the same way shortly before."""
+    before = (log.time >= log.time[k] - c.before) & (log.time <= log.time[k + 1])
+    goals = np.diff(log.goal[before])
+    bend = goals[1:-1] - (goals[:-2] + goals[2:]) / 2
+    return bool(len(bend) and np.max(bend * np.sign(step)) > c.goal * abs(step))
+
+
+def _true_level(level: Array, edges: list[int], middle: list[float], offset: float, c: ShiftChecks) -> int:
+    """The stretch whose zero is right: that nearest to the goals, or the first where there is little between them."""
+    distance = np.abs(np.array(middle) + offset)
+    best = int(np.argmin(distance))
+    spread = max(float(np.ptp(level)), 1e-9)
+    return 0 if distance[0] - distance[best] < c.doubt * spread else best
+
+
+def _line(log: JointLog, off: Array, edges: list[int]) -> str:
+    shifted = [(a, b) for a, b in pairwise(edges) if abs(off[a]) > 0]
+    a, b = shifted[0]
+    size = f"{np.rad2deg(off[a]):+.2f} deg"
+    if len(shifted) == 1 and b == len(off):
+        where = f"from {log.time[a]:.3f} s (row {log.rows[a] + 1}) on"
+    elif len(shifted) == 1:
+        where = f"from {log.time[a]:.3f} to {log.time[b - 1]:.3f} s (rows {log.rows[a] + 1} to {log.rows[b - 1] + 1})"
+    else:
+        where = f"in {len(shifted)} stretches, the first from {log.time[a]:.3f} s (row {log.rows[a] + 1})"
+    return (f"its zero jumps: the readings stand {size} off {where}, no goal having stepped (a change of mode or homing "
+            f"offset, a "
+            "slipped horn or sensor); set right by that much")
