@@ -2,6 +2,7 @@
 #include "robot.h"
 
 void bridge_begin(struct robot *r) {
+    r->bridge.off = r->state == STATE_LIMP;
     enter(r, STATE_BRIDGE, REASON_LINK, 0xFF);
     r->bridge.got = 0;
     r->bridge.whole = r->bridge.asked = r->bridge.moved = false;
@@ -17,6 +18,7 @@ void bridge_end(struct robot *r, uint8_t reason) {
 }
 
 void bridge_tick(struct robot *r) {
+    if (r->bridge.off && !r->bridge.moved && r->now % OFF_AGAIN_MS == 0) r->send_release = true;
     if (r->now - r->bridge.heard >= BRIDGE_SILENCE_MS) bridge_end(r, REASON_BRIDGE_SILENT);
 }
 
@@ -51,12 +53,16 @@ static void take(struct robot *r) {
 /* Called where the bus is free: what was under way when the bridge began, or the packet before, is over. */
 void bridge_send(struct robot *r) {
     struct bridge *b = &r->bridge;
-    if (!b->whole) return;
+    if (!b->whole) {
+        if (r->send_release) motion_send(r);
+        return;
+    }
     uint32_t n = b->got;
     b->got = 0;
     b->whole = false;
     b->asked = true;
     b->moved = b->moved || moves(b->packet);
+    r->send_release = r->send_release && !b->moved;
     memcpy(r->bus.tx, b->packet, n);
     bus_ask(&r->bus, n, answer_length(b->packet), BRIDGE_TIMEOUT_MS, r->now);
 }

@@ -45,9 +45,16 @@ static void button(struct robot *r) {
     }
 }
 
+/* Torque off once more, where a servo is not known to have heard it; without a table none is. */
+static void off_again(struct robot *r) {
+    bool known = r->joints > 0;
+    for (uint32_t j = 0; j < r->joints; j++) known = known && r->servo[j].off;
+    if (!known) r->send_release = true;
+}
+
 void commands_tick(struct robot *r) {
     button(r);
-    if (r->joints == 0 && r->state == STATE_LIMP && r->now % 64u == 0) r->send_release = true; /* no servo is read that could say it heard */
+    if (r->state == STATE_LIMP && r->now % OFF_AGAIN_MS == 0) off_again(r);
     bool waits = r->state == STATE_NEUTRAL || (r->state == STATE_STILL && r->joints);
     if (waits && r->now - r->entered >= IDLE_MS) react(r, REASON_IDLE, 0xFF);
 }
@@ -119,6 +126,11 @@ static void remote(struct robot *r, uint8_t byte) {
 void commands_bytes(struct robot *r) {
     for (uint8_t link = 0; link < LINKS; link++) {
         struct links *l = &r->link[link];
+        bool gap = r->now - l->heard > FRAME_MS;
+        if (ring_used(&l->rx)) {
+            if (gap) frame_reset(&l->reader);
+            l->heard = r->now;
+        }
         for (uint32_t k = 0; k < 16u && ring_used(&l->rx); k++) {
             bool bridged = link == LINK_PC && r->state == STATE_BRIDGE;
             if (bridged && r->bridge.whole) break;

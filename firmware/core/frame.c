@@ -31,6 +31,8 @@ static void feed_head(struct frame_reader *r, uint8_t byte) {
     if (r->state > LENGTH && r->length > FRAME_PAYLOAD) r->state = FIRST;
 }
 
+void frame_reset(struct frame_reader *r) { r->state = FIRST; }
+
 bool frame_feed(struct frame_reader *r, uint8_t byte) {
     switch (r->state) {
     case FIRST:

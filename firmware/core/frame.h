@@ -22,6 +22,9 @@ struct frame_reader {
 /* Takes one byte; true when a whole frame with a right sum has ended with it. */
 bool frame_feed(struct frame_reader *r, uint8_t byte);
 
+/* What came of a frame so far is none: the next byte begins one. */
+void frame_reset(struct frame_reader *r);
+
 /* Puts a frame with at most FRAME_PAYLOAD bytes into a ring, whole or not at all. */
 bool frame_send(struct ring *to, uint8_t type, uint8_t number, const uint8_t *payload, uint32_t length);
 

@@ -23,6 +23,8 @@
 #define LIMIT_SPREAD 2u       /* counts by which a servo's angle limits may be narrower than the table's bounds: rounding */
 
 #define DEAD_ROUNDS 4u        /* rounds without an answer: about 100 ms, 300 ms are allowed; four by chance: 1e-12 at 0.1 % flips */
+#define DEAD_MS 200u          /* or for so long, where many servos fail and rounds take longer */
+#define FAILED_ROW 16u        /* reads that failed in a row, of whichever servos: 50 ms, before servos that restarted have started */
 #define SUPPLY_ROUNDS 2u      /* rounds that more than half of the servos missed: not a servo has died, but the supply */
 #define ALARM_READINGS 3u     /* readings one after another that say the same before it is believed */
 #define HOT_CELSIUS 65u       /* the servo itself gives up at 70 */
@@ -44,6 +46,9 @@
 
 #define RAMP_TORQUE 512u      /* half of full torque until neutral is reached for the first time: whatever is caught is not crushed */
 #define IDLE_MS 300000u       /* held for so long without being used, torque goes: servos that hold get hot */
+
+#define OFF_AGAIN_MS 12u      /* torque off is told again to those that are not known to have heard it */
+#define FRAME_MS 100u         /* a frame that stops for so long is over: a wrong length would swallow those that follow */
 
 #define BUTTON_MS 20u         /* a button is pressed once it has been so for this long */
 #define HELD_MS 1500u         /* START held this long releases at once */

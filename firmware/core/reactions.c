@@ -67,7 +67,8 @@ void judge_round(struct robot *r) {
     for (uint32_t j = 0; j < r->joints && r->state != STATE_LIMP; j++) {
         const struct servo *s = &r->servo[j];
         uint8_t id = table_id(playing(r), j);
-        if (s->missed >= DEAD_ROUNDS) react(r, 2u * s->garbled >= s->missed ? REASON_GARBLED : REASON_SILENT, id);
+        bool silent = s->missed >= DEAD_ROUNDS || (s->missed >= SUPPLY_ROUNDS && r->now - s->heard >= DEAD_MS);
+        if (silent) react(r, 2u * s->garbled >= s->missed ? REASON_GARBLED : REASON_SILENT, id);
         if (s->overloaded >= ALARM_READINGS) react(r, REASON_OVERLOAD, id);
         if (s->hot >= ALARM_READINGS) react(r, REASON_HOT, id);
     }

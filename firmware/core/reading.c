@@ -13,6 +13,7 @@ void read_begin(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
         struct servo *s = &r->servo[j];
         s->missed = s->garbled = s->hot = s->overloaded = 0;
+        s->heard = r->now;
     }
 }
 
@@ -29,7 +30,7 @@ bool read_next(struct robot *r) {
     return true;
 }
 
-static void keep(struct servo *s, const uint8_t *ram, uint8_t error) {
+static void keep(struct servo *s, const uint8_t *ram, uint8_t error, uint32_t now) {
     s->position = get16(ram + DXL_POSITION - FIRST_READ);
     s->present_speed = get16(ram + DXL_PRESENT_SPEED - FIRST_READ);
     s->load = get16(ram + DXL_LOAD - FIRST_READ);
@@ -37,6 +38,7 @@ static void keep(struct servo *s, const uint8_t *ram, uint8_t error) {
     s->heat = ram[DXL_HEAT - FIRST_READ];
     s->error = error;
     s->missed = s->garbled = 0;
+    s->heard = now;
     s->fresh = true;
 }
 
@@ -94,7 +96,7 @@ static void keep_settings(struct servo *s, const uint8_t *all) {
 
 static void good(struct robot *r, uint32_t j, const uint8_t *ram, uint8_t error) {
     struct servo *s = &r->servo[j];
-    keep(s, ram, error);
+    keep(s, ram, error, r->now);
     count_alarms(s, ram);
     if (torque_on(r)) {
         verify_goal(r, j, ram);
@@ -148,7 +150,7 @@ static void check_answer(struct robot *r, bool right, uint8_t trouble) {
         if (r->tries >= CHECK_TRIES) enter(r, STATE_LIMP, against, table_id(playing(r), j));
         return;
     }
-    keep(&r->servo[j], all + FIRST_READ, r->bus.rx[4]);
+    keep(&r->servo[j], all + FIRST_READ, r->bus.rx[4], r->now);
     keep_settings(&r->servo[j], all);
     advance(r);
     if (r->turn) return;
@@ -164,7 +166,7 @@ static void bad(struct robot *r, uint32_t j, bool noise) {
         r->garbled_row++;
         r->noise = true;
     }
-    if (r->failed_row > 2u * r->joints) {
+    if (r->failed_row > FAILED_ROW && r->failed_row > r->joints) {
         react(r, 2u * r->garbled_row > r->failed_row ? REASON_BABBLE : REASON_DEAD_SUPPLY, 0xFF);
         r->failed_row = r->garbled_row = 0;
     }
@@ -175,14 +177,13 @@ static void bad(struct robot *r, uint32_t j, bool noise) {
     advance(r);
 }
 
-/* After a round: no pause before every goal is known to be there; torque off is told again to whoever is not known to be. */
+/* After a round: no pause before every goal is known to be there. */
 static void look_again(struct robot *r) {
     for (uint32_t j = 0; j < r->joints; j++) {
         if (r->round_over && torque_on(r) && !r->servo[j].verified && r->servo[j].missed == 0) {
             r->round_over = false;
             r->sweep_started = r->now;
         }
-        if (r->state == STATE_LIMP && !r->servo[j].off) r->send_release = true;
     }
 }
 

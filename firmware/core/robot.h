@@ -45,11 +45,13 @@ struct servo {
     bool verified;         /* was read to have the goal and speed that were sent last */
     bool off;              /* was read to have torque off since it was told */
     bool fresh;            /* answered in this round */
+    uint32_t heard;        /* when it answered last [ms] */
 };
 
 struct links {
     struct ring rx, tx;
     struct frame_reader reader;
+    uint32_t heard;        /* when its last byte came [ms] */
 };
 
 enum { LINK_PC, LINK_ZIGBEE, LINKS };
@@ -59,6 +61,7 @@ struct bridge {
     bool whole;            /* a packet waits for the bus */
     bool asked;            /* what is under way on the bus is the PC's */
     bool moved;            /* torque or goals went through: silence ends in a ramp */
+    bool off;              /* torque was to be off when it began; those that do not hear yet are told again */
     uint32_t heard;
 };
 

@@ -11,7 +11,7 @@ static uint32_t *number(struct sim *s, const char *what) {
     const struct { const char *name; uint32_t *at; } fields[] = {
         {"poses", &s->poses}, {"goal_errors", &s->goal_errors}, {"wrong_longest", &s->wrong_longest}, {"events", &s->events},
         {"flip_to", &s->flip_to}, {"flip_from", &s->flip_from}, {"cycle", &s->r.cycle}, {"pose", &s->r.pose},
-        {"stray", &s->r.bus.stray}};
+        {"stray", (uint32_t *)&s->r.bus.stray}};
     for (size_t k = 0; k < sizeof fields / sizeof *fields; k++)
         if (!strcmp(what, fields[k].name)) return fields[k].at;
     return NULL;

@@ -113,7 +113,7 @@ static void sync_write(struct sim *s, const uint8_t *p, uint32_t parameters) {
     uint32_t n = p[6];
     for (uint32_t k = 2; n && k + n < parameters; k += n + 1u)
         for (uint32_t j = 0; j < s->joints; j++)
-            if (s->servo[j].powered && s->servo[j].table[DXL_ID] == p[5 + k]) store(s, &s->servo[j], p[5], p + 6 + k, n);
+            if (s->servo[j].powered && s->us / 1000u >= s->servo[j].boots_until && s->servo[j].table[DXL_ID] == p[5 + k]) store(s, &s->servo[j], p[5], p + 6 + k, n);
 }
 
 /* What the servos make of the packet that was sent. */
@@ -133,7 +133,7 @@ static void hear(struct sim *s) {
         if (p[2] == DXL_BROADCAST) continue;
         sense(s, v);
         if (p[4] == DXL_READ && p[5] + p[6] <= (int)DXL_END) reply(s, v, v->table + p[5], p[6]);
-        else if (p[4] <= DXL_RESET) reply(s, v, NULL, 0);
+        else if (p[4] <= DXL_RESET && !v->level1) reply(s, v, NULL, 0);
     }
 }
 
@@ -168,7 +168,10 @@ static void begin_transaction(struct sim *s) {
     if (b->tx[4] == DXL_SYNC_WRITE) note(s, LOG_GOALS);
     if (b->tx[4] == DXL_SYNC_WRITE && s->r.state == STATE_PLAY && s->r.resends == 0) s->poses++;
     if (b->tx[4] == DXL_WRITE && b->tx[5] == DXL_TORQUE && b->tx[6] == 0) note(s, LOG_OFF);
+    s->transactions++;
+    if (s->before) s->before(s);
     hear(s);
+    if (s->after) s->after(s);
     uint64_t sent = s->us + 10u * b->tx_length;
     if (s->babble && b->expected) {
         for (uint32_t k = 0; k < b->expected; k++) s->answer[k] = (uint8_t)sim_random(s, 256);
@@ -177,7 +180,7 @@ static void begin_transaction(struct sim *s) {
     } else if (b->expected == 0) {
         s->busy_until = sent;
     } else if (s->answer_length >= b->expected) {
-        s->busy_until = sent + 520u + sim_random(s, 131) + 10u * s->answer_length;
+        s->busy_until = sent + 520u + sim_random(s, 131u + s->jitter) + 10u * s->answer_length;
     } else {
         s->busy_until = UINT64_MAX; /* the core's time-out ends it */
     }

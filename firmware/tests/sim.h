@@ -9,6 +9,7 @@ struct sim_servo {
     int64_t milli; /* position, thousandths of a count */
     bool powered, mute, twin, overload;
     uint32_t boots_until; /* ms: starting, and answers nothing */
+    bool level1;          /* answers reads alone */
     uint8_t lead, lacks;  /* stray bytes before each answer; first bytes that each answer lacks */
     bool held;     /* something is in its way: it does not move */
     uint8_t heat, drop; /* deg C; 0.1 V less than the others have */
@@ -40,6 +41,9 @@ struct sim {
     uint32_t wrong_since, wrong_longest; /* ms for which some servo's goal was not the one meant */
     uint8_t state_seen;
     void (*sent)(const struct sim *s); /* called at each transaction, where set */
+    void (*before)(struct sim *s);     /* before the servos hear a packet; after the answer is there */
+    void (*after)(struct sim *s);
+    uint32_t transactions, jitter;     /* jitter: us by which answers come later, at most */
 };
 
 struct sim *sim_new(void);

@@ -34,7 +34,8 @@ class CellRun(ctypes.Structure):
 def compile_core(flags: tuple[str, ...] = ("-O2",)) -> Path:
     """A shared library of core and tests, made anew where a source has changed."""
     source = FIRMWARE
-    sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in ("sim", "cells", "access"))])
+    tests = ("sim", "cells", "access", "rude", "monitor")
+    sources = sorted([*source.glob("core/*.c"), *(source / "tests" / f"{name}.c" for name in tests)])
     digest = hashlib.sha256()
     for path in sorted([*sources, *source.glob("core/*.h"), *source.glob("tests/*.h")]):
         digest.update(path.read_bytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Sequence
 
 from tests.firmware.native import LINK_PC, Sim
@@ -13,10 +14,13 @@ BYTES_A_MS = 5.76
 class CorePort:
     """What `Controller` wants of a port; waiting lets the robot's milliseconds go by. each_ms: called after every one of them.
 
-    unplugged: nothing goes through any more. sent: types of the frames that the host wrote whole."""
+    unplugged: nothing goes through any more. flips: share of bytes in which a bit flips, both ways. sent: types of the frames
+    that the host wrote."""
 
-    def __init__(self, sim: Sim, each_ms: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, sim: Sim, each_ms: Callable[[], None] = lambda: None, seed: int = 0) -> None:
         self.sim, self.each_ms = sim, each_ms
+        self.flips = 0.0
+        self._rng = random.Random(seed)
         self.unplugged = False
         self.ms = 0
         self.sent: list[int] = []
@@ -27,7 +31,7 @@ class CorePort:
         for _ in range(ms):
             self.sim.run(1)
             self.ms += 1
-            self._rx += self.sim.received(LINK_PC)
+            self._rx += self._line(self.sim.received(LINK_PC))
             self.each_ms()
 
     def writePort(self, packet: Sequence[int]) -> int:
@@ -36,7 +40,7 @@ class CorePort:
         self.sent.append(data[2])
         for at in range(0, len(data), 5):
             if not self.unplugged:
-                self.sim.put(data[at:at + 5])
+                self.sim.put(self._line(data[at:at + 5]))
             self.run(1)
         return len(data)
 
@@ -46,6 +50,11 @@ class CorePort:
             self.run(1)
         got, self._rx = (b"", b"") if self.unplugged else (self._rx[:length], self._rx[length:])
         return got
+
+    def _line(self, data: bytes) -> bytes:
+        if not self.flips:
+            return data
+        return bytes(b ^ (1 << self._rng.randrange(8) if self._rng.random() < self.flips else 0) for b in data)
 
     def pause(self, seconds: float) -> None:
         """Lets time go by [s]."""

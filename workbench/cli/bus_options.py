@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from workbench.cli.options import load_model
@@ -99,6 +100,8 @@ def open_pc_link(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iter
         return
     if args.image is None:
         raise InputError(None, "--upload on the emulated robot needs --image, the program of its CM-530 (`make firmware`)")
+    if find_spec("unicorn") is None:
+        raise InputError("--image", "the emulated CM-530 needs the package unicorn: pip install 'drake-workbench[emulator]'")
     try:
         image = Path(args.image).read_bytes()
     except OSError as e:

@@ -43,6 +43,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.compare.compare_session import compare_session
     from workbench.compare.session import load_session
     from workbench.device.capture import Recorder, UdpLink
+    from workbench.device.controller.play import NothingPlayedError
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.motion import load_motion
@@ -62,7 +63,11 @@ def run(args: argparse.Namespace) -> int:
         with stop_on_signals() as stop:
             if args.upload:
                 with open_pc_link(args, virtual) as port:
-                    done = run_by_controller(port, model, motion, cycles, args.out, lambda: stop.reason, **options)
+                    try:
+                        done = run_by_controller(port, model, motion, cycles, args.out, lambda: stop.reason, **options)
+                    except NothingPlayedError as e:
+                        print(f"workbench run: {e}", file=sys.stderr)
+                        return 130 if stop.interrupted else 2
             else:
                 with open_bus(args, model, virtual) as bus:
                     done = run_on_robot(bus, model, motion, cycles, args.out, lambda: stop.reason, **options)

@@ -67,6 +67,14 @@ class StopAskedError(Exception):
         super().__init__(reason)
 
 
+class NothingPlayedError(BusError):
+    """It was stopped before it played, and released; `reason` as `stop` said it."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"stopped: {reason}; nothing was played")
+
+
 class Controller:
     """One conversation. port: dynamixel-sdk's, with `pause` (`SerialPort` at 57,600 bit/s, or a virtual one).
 
@@ -224,7 +232,7 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
     if not _let_go(controller):
         raise BusError((stopped or "played") + UNCONFIRMED)
     if began is None:
-        raise BusError(f"stopped: {stopped}; nothing was played")
+        raise NothingPlayedError(stopped)
     first = began + FIRST_POSE + (8 + 5 * len(table.table.joints)) * BUS_BYTE
     rounds = [m for _, m in controller.heard if isinstance(m, LogMessage) and first - KEPT <= m.time <= first + seconds]
     write_telemetry(log, rounds, table.table.joints, profile)

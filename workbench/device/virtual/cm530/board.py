@@ -6,6 +6,7 @@ import random
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from workbench.device.virtual.bus import ServoBus
 from workbench.device.virtual.clock import SECOND, Clock
@@ -207,8 +208,15 @@ class Board:
         channel = self.dma.channels[5]
         early = bisect_right(times, channel.armed)
         taken = early + channel.take(data[early:]) if usart.takes_dma else early
-        for late, value in enumerate(data[:early] + data[taken:]):  # nobody asked: spaced, so that none overruns the next
-            self.clock.after(late * usart.byte, lambda v=value: usart.receive(v))  # type: ignore[misc]
+        for late, value in enumerate(data[:early]):  # nobody asked: spaced, so that none overruns the next
+            self.clock.after(late * usart.byte, partial(usart.receive, value))
+        for late, value in enumerate(data[taken:], start=1):
+            self.clock.after(late * usart.byte, partial(self._heard_late, value))
+
+    def _heard_late(self, value: int) -> None:
+        """A byte beyond what the DMA wanted at first: it may want more by now; else nobody asked."""
+        if not (self.servo_usart.takes_dma and self.dma.channels[5].take(bytes([value]))):
+            self.servo_usart.receive(value)
 
     def _to_wire(self, wire: Wire, data: bytes, rate: int, start: int) -> None:
         byte = 10 * SECOND // rate

@@ -1,0 +1,184 @@
+"""The campaign against the controller: every fault, at transactions all over each session, judged by a monitor from outside."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.firmware.native import Sim, walk
+from tests.firmware.test_core_sections import sections
+from tests.rude.controller import FAULTS, RULES, SESSIONS, Injection, complaint, core_monitor, injections
+from tests.rude.core_port import CorePort
+from workbench.device.bus import BusError
+from workbench.device.controller.play import play_by_controller
+from workbench.device.tables.table_file import TableFile, bounds_of
+from workbench.motion import load_motion
+from workbench.robot import data_file, puppy_model
+from workbench.robot.servo_profile_file import servo_profile
+
+TABLES = (walk(cycles=3, stops=True), sections(2, 4, 2, cycles=3))
+WALK = load_motion(data_file("robotis_walk.csv")).as_table()
+BOUNDS = bounds_of(WALK, puppy_model())
+
+
+def whole_sessions() -> dict[int, int]:
+    """Transactions of each session in which nothing goes wrong; nothing is to be complained of."""
+    runs = {session: Injection(session, 0, 0).run(TABLES) for session in range(len(SESSIONS))}
+    assert {s: complaint(r) for s, r in runs.items() if complaint(r)} == {}
+    return {session: run.transactions for session, run in runs.items()}
+
+
+def campaign(count: int, skip: int = 0, step: int = 1) -> list[str]:
+    """Every `step`-th of so many injections, from `skip` on; what the monitor says of each that it complains of."""
+    lengths = whole_sessions()
+    chosen = list(injections(count, lengths))[skip::step]
+    return [f"{i}: {c}" for i in chosen if (c := complaint(i.run(TABLES)))]
+
+
+def test_five_hundred_faults_break_nothing() -> None:
+    assert campaign(500) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(10))
+def test_a_hundred_thousand_faults_break_nothing(part: int) -> None:
+    assert campaign(100_000, part, 10) == []
+
+
+def test_every_fault_and_session_is_among_them() -> None:
+    lengths = whole_sessions()
+    chosen = list(injections(500, lengths))
+    assert {(i.session, FAULTS[i.fault]) for i in chosen} == {(s, f) for s in lengths for f in FAULTS[1:]}
+    assert all(1 <= i.k <= lengths[i.session] for i in injections(20_000, lengths))
+
+
+@pytest.mark.parametrize(("injection", "once_said"), [
+    (Injection(1, FAULTS.index("packet lost"), 3040, 3434, 2), "torque off was told too seldom on a bad line"),
+    (Injection(4, FAULTS.index("late boot"), 743, 2064), "the bridge began while a servo had not heard that torque is off"),
+    (Injection(1, FAULTS.index("late boot"), 814, 489), "a servo that started later kept its torque after a release"),
+    (Injection(3, FAULTS.index("late boot"), 1623, 979), "rounds of many silent servos took too long"),
+    (Injection(0, FAULTS.index("supply dip"), 1150, 642), "restarted servos got torque from the next pose"),
+])
+def test_what_the_campaign_once_found(injection: Injection, once_said: str) -> None:
+    assert complaint(injection.run(TABLES)) == "", once_said
+
+
+@pytest.mark.parametrize("rule", range(1, len(RULES)))
+def test_the_monitor_sees_what_breaks_each_rule(rule: int) -> None:
+    """A healthy robot in its hands, and one thing that is not."""
+    monitor = core_monitor(joints=2)
+    for ms in range(300):
+        monitor.joints(torque=False)
+        monitor.look(ms)
+    monitor.joints(torque=True, speed=40, limit=1023 if rule == 6 else 512, goal=512)
+    monitor.look(300, go=True)
+    if rule in (1, 2):
+        for ms in range(301, 400):
+            if rule == 1:
+                monitor.joints(torque=ms < 310 or ms > 380)
+            monitor.look(ms, release=ms == 301)
+    elif rule == 3:
+        for ms in range(301, 400):
+            monitor.joints(goal=512 if ms < 360 else 600)
+            monitor.look(ms, stop=ms == 301)
+    elif rule in (4, 5):
+        monitor.joints(**({"goal": 950} if rule == 4 else {"speed": 0}))
+        monitor.look(301)
+    elif rule == 7:
+        for ms in range(301, 3300):
+            monitor.joints(goal=600, hot=ms > 2600)
+            monitor.look(ms)
+    assert monitor.rule == rule
+
+
+@dataclass
+class Trouble:
+    """What goes wrong in a session of the host at `at` ms: see `make`."""
+
+    kind: str
+    at: int
+    servo: int
+
+
+KINDS = ("nothing", "mute", "hot", "overload", "twin", "babble", "START held", "remote 1", "remote 6", "link cut", "watchdog",
+         "flips", "Ctrl-C", "Ctrl-C, twice", "supply")
+
+
+def make(trouble: Trouble, sim: Sim, port: CorePort) -> None:
+    """It happens."""
+    if trouble.kind in ("mute", "overload", "twin"):
+        sim.set(trouble.kind, 1, trouble.servo)
+    elif trouble.kind == "hot":
+        sim.set("heat", 70, trouble.servo)
+    elif trouble.kind == "babble":
+        sim.set("babble", 1)
+    elif trouble.kind == "START held":
+        sim.set("start", 1)
+    elif trouble.kind in ("remote 1", "remote 6"):
+        low, high = (16, 0) if trouble.kind == "remote 1" else (0, 2)
+        sim.put(bytes([0xFF, 0x55, low, low ^ 255, high, high ^ 255]) * 2, 1)
+    elif trouble.kind == "link cut":
+        port.unplugged = True
+    elif trouble.kind == "watchdog":
+        sim.lib.sim_reset(sim.p, sim.table, len(sim.table), 3)
+    elif trouble.kind == "flips":
+        port.flips = 0.002
+    elif trouble.kind == "supply":
+        sim.set("volts", 60)
+
+
+def host_session(trouble: Trouble, folder: Path) -> str:
+    """The host's verb against the core with trouble; "" or what is wrong with how that ended."""
+    sim = Sim(walk(), seed=trouble.at)
+    done: list[int] = []
+    plays: list[int] = []
+
+    def each_ms() -> None:
+        if not done and port.ms >= trouble.at:
+            done.append(port.ms)
+            make(trouble, sim, port)
+        if sim.get("state") == 5:
+            plays.append(port.ms)
+
+    port = CorePort(sim, each_ms, seed=trouble.at)
+
+    def stop() -> str:
+        if not trouble.kind.startswith("Ctrl-C") or port.ms < trouble.at:
+            return ""
+        return trouble.kind if port.ms > trouble.at + 150 else "Ctrl-C"
+
+    port.run(200)
+    try:
+        run = play_by_controller(port, TableFile(WALK, BOUNDS, 2, True), 0.936, folder / "log.csv", servo_profile("AX-12A"), stop)
+        said, well = run.stopped, not run.stopped
+    except BusError as e:
+        said, well = str(e), False
+    if well and len(plays) < 900:
+        return f"said well, but played {len(plays)} ms"
+    before = len(plays)
+    sim.set("babble", 0)
+    sim.set("start", 0)
+    port.run(400)
+    torque = sum(sim.get("torque", j) for j in range(15))
+    if torque and "not confirmed" not in said:
+        return f"said {said!r}, and {torque} servos have torque"
+    if len(plays) > before and "not confirmed" not in said:
+        return f"said {said!r}, and it plays on"
+    return "" if said or well else "ended without a word"
+
+
+def test_the_host_says_well_only_where_all_was_done_and_leaves_no_torque(tmp_path: Path) -> None:
+    rng = random.Random(5)
+    troubles = [Trouble(kind, rng.randrange(150, 5200), rng.randrange(15)) for kind in KINDS for _ in range(3)]
+    assert {str(t): c for t in troubles if (c := host_session(t, tmp_path))} == {}
+
+
+@pytest.mark.slow
+def test_a_thousand_sessions_of_the_host(tmp_path: Path) -> None:
+    rng = random.Random(6)
+    each = 1000 // len(KINDS) + 1
+    troubles = [Trouble(kind, rng.randrange(150, 5200), rng.randrange(15)) for kind in KINDS for _ in range(each)]
+    assert {str(t): c for t in troubles if (c := host_session(t, tmp_path))} == {}
