@@ -20,6 +20,7 @@ from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
 from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import EffectSpec, puppy_model
+from workbench.view.figures.gait import draw_ranges
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3, compared_seconds=0.3,
@@ -132,6 +133,15 @@ def test_a_broken_limit_is_named(made, tmp_path):
     (tmp_path / "gait.csv").write_text((folder / "gait.csv").read_text())
     with pytest.raises(InputError, match="a limit is broken: RMS torque, flm"):
         check_certificate(tmp_path / "gait.csv", load_motion(tmp_path / "gait.csv"), machine.model)
+
+
+def test_the_page_shows_few_draws_and_what_happened_to_them(made):
+    certificate = made[3].certificate  # of two draws there are no percentiles
+    figure = draw_ranges(certificate)
+    assert [a.get_yticklabels()[0].get_text() for a in figure.axes] == [
+        k for k, v in certificate.draws.items() if isinstance(v, list) and k not in ("quantiles", "incidents")]
+    fell = {**certificate.draws, "incidents": [{"draw": 1, "robot": "friction 0.30", "what": "fell"}]}
+    assert len(draw_ranges(replace(certificate, draws=fell)).axes) == len(figure.axes)
 
 
 def test_the_robotis_walk_needs_none(capsys, tmp_path):

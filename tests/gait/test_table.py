@@ -68,12 +68,12 @@ def test_the_inverse_servo_law_brings_joints_nearer_to_their_path(machine):
 
 def test_the_table_goes_through_file_and_firmware_bytes_and_gives_the_same_rollout_to_the_bit(machine, tmp_path):
     table = gait_table(machine, TROT)
-    (tmp_path / "gait.csv").write_text(motion_text(Motion.from_table(table.cycle), "made here"))
+    (tmp_path / "gait.csv").write_text(motion_text(Motion.from_table(table.whole), "made here"))
     written = load_motion(tmp_path / "gait.csv", machine.model).as_table()
     write_tables(written, tmp_path / "firmware")
     decoded = read_tables(tmp_path / "firmware")
-    assert table_sha256(decoded) == table_sha256(table.cycle)
-    takes = simulate_batch([Job(machine.model, SimulationConfig(time_step=2e-3), t.commands(2)) for t in (table.cycle, decoded)])
+    assert table_sha256(decoded) == table_sha256(table.whole)
+    takes = simulate_batch([Job(machine.model, SimulationConfig(time_step=2e-3), t.commands(2)) for t in (table.whole, decoded)])
     for field in ("q", "v", "p_WB", "quat_WB", "torque"):
         np.testing.assert_array_equal(*(getattr(t, field) for t in takes))
 
@@ -92,21 +92,23 @@ def test_each_limit_of_the_table_is_told_by_name(machine):
 
 
 def test_the_controllers_memory_is_a_limit_where_its_program_plays_the_servos(machine):
-    """A table of 4096 bytes: 60 poses of the puppy's 15 joints. The fox has another family's servos, which it cannot play."""
-    table = gait_table(machine, replace(TROT, poses=59, frequency=0.5, lead=0.0))
+    """A table of 4096 bytes: 60 poses of the puppy's 15 joints, those of start and stop too. The fox has another family's servos,
+    which it cannot play."""
+    table = gait_table(machine, replace(TROT, poses=19, frequency=0.5, lead=0.0))
     (poses,) = [m for m in table_margins(machine, table, GaitLimits()) if m.name == "poses"]
-    assert len(table.start) == 61
+    assert (len(table.start), len(table.cycle), len(table.stop)) == (21, 19, 21)
     assert (poses.value, poses.limit, poses.use > 1) == (61, 60, True)
-    short = gait_table(machine, replace(TROT, poses=58, frequency=0.5, lead=0.0))
-    assert [m.use for m in table_margins(machine, short, GaitLimits()) if m.name == "poses"] == [1.0]
+    short = gait_table(machine, replace(TROT, poses=18, frequency=0.5, lead=0.0))
+    assert [m.value for m in table_margins(machine, short, GaitLimits()) if m.name == "poses"] == [58]
     fox = GaitMachine(load_model("fox"))
     assert "poses" not in [m.name for m in table_margins(fox, gait_table(fox, replace(TROT, poses=59, lead=0.0)), GaitLimits())]
 
 
 def test_links_that_come_near_each_other_are_named(machine):
-    apart = contact_margin(machine, gait_table(machine, TROT), GaitLimits())
-    inward = contact_margin(machine, gait_table(machine, replace(TROT, spread=-0.0575, lead=0.0)), GaitLimits())
+    tables = [gait_table(machine, TROT), gait_table(machine, replace(TROT, spread=-0.0575, lead=0.0))]
+    apart, inward = (contact_margin(machine.self_contact.nearest(t.asked), GaitLimits()) for t in tables)
     assert apart.use < 1 < inward.use
+    assert inward.value < 2 == inward.limit  # mm, at least
     assert "link" in inward.where
 
 

@@ -50,26 +50,29 @@ class Certificate:
     shape: Mapping[str, Any]
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
-    def as_text(self) -> str:
-        """The file: JSON with the sha256 of all that stands before it."""
+    def to_json(self) -> dict[str, Any]:
+        """What the file holds, in plain types, with the sha256 of all the rest."""
         content = plain({"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"},
                          "margins": [vars(m) for m in self.margins]})
-        content["sha256"] = _digest(content)
-        return json.dumps(content, indent=1, allow_nan=False) + "\n"
+        return {**content, "sha256": _digest(content)}
 
+    def as_text(self) -> str:
+        """The file."""
+        return json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n"
 
     def summary(self) -> str:
         """In a few lines, for a person."""
         n, d = self.nominal, self.draws
         turns = n["unit"] == "rad/s"
         unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)
-        lines = [f"{self.request}: {factor * n['speed']:.3g} {unit} on the nominal robot of the model"]
+        nominal = f"{factor * n['speed']:.3g} {unit} on the nominal robot of the model"
+        lines = [f"{self.request}: {nominal}"]
         if d.get("count"):
             lowest, five = d[f"speed {n['unit']}"][:2]
             low = f"lowest {factor * lowest:.3g}" if five is None else f"5th percentile {factor * five:.3g}"
             falls = f"{d['falls']} fell (below {100 * d['falls at most']:.2g} % at 95 %)"
-            lines.append(f"{d['count']} random variants of the robot: {falls}, {low} {unit}, "
-                         f"heading {d['heading deg/m RMS']:.2g} deg/m RMS")
+            lines = [f"{self.request}: {low} {unit} of {d['count']} random variants of the robot, {nominal}",
+                     f"{falls}; heading {d['heading deg/m RMS']:.2g} deg/m RMS over them"]
             lines += [f"draw {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
         lines.append(f"binds: {worst}")

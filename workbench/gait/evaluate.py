@@ -179,7 +179,7 @@ class Evaluator:
 
 
 def _of_table(margin: Margin) -> bool:
-    return margin.name in ("range", "moving speed", "reach", "poses", "bus time", "self-contact")
+    return margin.kind == "table"
 
 
 def _read(path: Path | None) -> dict[str, GaitMeasure]:

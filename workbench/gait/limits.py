@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Literal
 
 import numpy as np
 
@@ -57,10 +58,16 @@ class GaitLimits:
         check_positive(self, *(f.name for f in fields(self) if getattr(self, f.name) is not None))
 
 
+Kind = Literal["table", "run", "speed", "straying", "slope"]
+"""What a limit hangs on: the table alone, known without a simulation; a run; the speed that is required; a turn that steering can
+take out; the slope, on which nothing stands."""
+
+
 @dataclass(frozen=True)
 class Margin:
-    """How near a limit is. name: of the limit. value, limit: in `unit`. where: a joint, a foot, two links, or the robot. use:
-    value divided by limit; above 1 the limit is broken. advice: whether it is only a recommendation."""
+    """How near a limit is. name: of the limit. value, limit: in `unit`; a limit from below says so in its unit. where: a joint, a
+    foot, two links, or the robot. use: value divided by limit; above 1 the limit is broken. advice: whether it is only a
+    recommendation. kind: what it hangs on."""
 
     name: str
     where: str
@@ -69,6 +76,7 @@ class Margin:
     unit: str
     use: float
     advice: bool = False
+    kind: Kind = "run"
 
     @property
     def margin(self) -> float:
@@ -106,13 +114,13 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
         out.append(_of("poses", "table", poses, most_poses(len(model.joints)), "poses"))
     packet = 10 * (5 * len(model.joints) + 8) / limits.bus  # a Sync Write of goal and speed: ID and four bytes a servo
     out.append(_of("bus time", "robot", 1000 * packet, float(table.cycle.dwells_ms.min()), "ms of the shortest dwell"))
-    return _worst(out)
+    return [replace(m, kind="table") for m in _worst(out)]
 
 
 def contact_margin(near: Nearness, limits: GaitLimits) -> Margin:
     """Of links against each other."""
     where = " and ".join(near.links) if near.links[0] else "robot"
-    return least("self-contact", where, 1000 * near.distance, 1000 * limits.clearance, "mm of clearance")
+    return least("self-contact", where, 1000 * near.distance, 1000 * limits.clearance, "mm of clearance", "table")
 
 
 def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) -> list[Margin]:
@@ -156,15 +164,17 @@ def violation(margins: Iterable[Margin]) -> float:
     return sum(math.log(min(m.use, 1e3)) for m in margins if m.use > 1.0 and not m.advice)
 
 
-def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False) -> Margin:
+def _of(name: str, where: str, value: float, limit: float, unit: str, use: float | None = None, advice: bool = False,
+        kind: Kind = "run") -> Margin:
     share = use if use is not None else value / limit if limit > 0 else np.inf
-    return Margin(name, where, float(value), float(limit), unit, float(share), advice)
+    return Margin(name, where, float(value), float(limit), unit, float(share), advice, kind)
 
 
-def least(name: str, where: str, value: float, limit: float, unit: str) -> Margin:
+def least(name: str, where: str, value: float, limit: float, unit: str, kind: Kind = "run") -> Margin:
     """A limit from below: use is 1 where the value is just enough, and grows by what is missing, as a share of the limit; 0 from
     twice the limit on."""
-    return Margin(name, where, float(value), float(limit), f"{unit}, at least", max(2.0 - float(value / limit), 0.0))
+    return Margin(name, where, float(value), float(limit), f"{unit}, at least", max(2.0 - float(value / limit), 0.0),
+                  kind=kind)
 
 
 def _worst(margins: Sequence[Margin]) -> list[Margin]:

@@ -188,7 +188,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     """Of a speed that no gait has: the nearest table, after a first look for the fastest. Up a slope on which nothing stands
     there is none."""
     said = f"cannot be met by any gait: {impossible}"
-    if impossible.name == "slope":
+    if impossible.kind == "slope":
         return Optimized(request, False, said, None, None, None)
     look = replace(options, budget=FIRST_LOOK, certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
@@ -213,7 +213,7 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
     if friction is not None and math.tan(request.slope) > friction:
         bound = math.degrees(math.atan(friction))
         return Margin("slope", f"friction {friction:g}", math.degrees(request.slope), bound, "deg",
-                      math.degrees(request.slope) / bound)
+                      math.degrees(request.slope) / bound, kind="slope")
     return None
 
 
@@ -264,7 +264,7 @@ def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | Non
 
 def _without_speed(margins: Sequence[Margin]) -> list[Margin]:
     """Of a gait that is too slow: what keeps it from being faster, if something else is at its limit."""
-    tight = [m for m in margins if not m.name.startswith("speed") and m.use > 0.97 and not m.advice]
+    tight = [m for m in margins if m.kind != "speed" and m.use > 0.97 and not m.advice]
     return tight or list(margins)
 
 

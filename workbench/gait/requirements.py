@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.gait.limits import Margin, allowed_rms, least
+from workbench.gait.limits import Kind, Margin, allowed_rms, least
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.request import Request
@@ -38,9 +38,9 @@ def direction_margins(request: Request, m: GaitMeasure) -> list[Margin]:
     out = [_margin("motion across the way", abs(across), request.limits.aside * max(abs(along), 0.01), "m/s")]
     if request.radius is not None:
         bend = m.turn_rate * request.radius / max(forward, 0.01)
-        return [_margin("curvature off the arc", abs(bend - 1), request.limits.aside, "of it")]
+        return [_margin("curvature off the arc", abs(bend - 1), request.limits.aside, "of it", "straying")]
     turned, allowed = np.degrees([abs(drift(request, m)), request.limits.drift])
-    return [*out, _margin("drift", float(turned), float(allowed), "deg/m")]
+    return [*out, _margin("drift", float(turned), float(allowed), "deg/m", "straying")]
 
 
 def drift(request: Request, m: GaitMeasure) -> float:
@@ -62,11 +62,11 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
     fell, count = sum(m.fell for m in (nominal, *draws)), 1 + len(draws)
     out = [Margin(FALLS, f"of {count} robots", float(fell), 0.0, "allowed", 1.0 + FALLEN * fell / count if fell else 0.0)]
     if request.speed is not None:
-        out.append(least("speed", "robot", request.progress(nominal), request.speed, request.unit))
+        out.append(least("speed", "robot", request.progress(nominal), request.speed, request.unit, "speed"))
     if draws:
         if request.speed is not None:
             out.append(least("speed of the worse half of draws", "robot", worse_half([request.progress(m) for m in draws]),
-                              ROBUST * request.speed, request.unit))
+                              ROBUST * request.speed, request.unit, "speed"))
         if request.way != "turn":
             spread = float(np.sqrt(np.mean([min(drift(request, m), 10.0) ** 2 for m in draws])))
             out.append(_margin("drift over draws", np.degrees(spread), np.degrees(request.limits.spread), "deg/m RMS"))
@@ -78,7 +78,7 @@ def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, An
     if request.speed is None:
         return []
     surely = request.progress(nominal) - float(floor["steps"])
-    return [least("speed less its numerical floor", "robot", surely, request.speed, request.unit)]
+    return [least("speed less its numerical floor", "robot", surely, request.speed, request.unit, "speed")]
 
 
 def cost(machine: GaitMachine, request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> float:
@@ -112,5 +112,5 @@ def worse_half(values: Sequence[float]) -> float:
     return float(ordered[:max(1, (len(ordered) + 1) // 2)].mean())
 
 
-def _margin(name: str, value: float, limit: float, unit: str) -> Margin:
-    return Margin(name, "robot", float(value), float(limit), unit, float(value / limit))
+def _margin(name: str, value: float, limit: float, unit: str, kind: Kind = "run") -> Margin:
+    return Margin(name, "robot", float(value), float(limit), unit, float(value / limit), kind=kind)

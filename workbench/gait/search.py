@@ -19,8 +19,6 @@ from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
 
-STRAYING = ("drift", "curvature off the arc")
-"""Limits that steering can keep."""
 STEERED = 2
 """How often a gait is steered before the next generation."""
 APART = 0.4
@@ -202,7 +200,7 @@ def _kind(c: Candidate) -> tuple[str, tuple[int, int]]:
 
 def keeps_all_but_speed(c: Candidate) -> bool:
     """Whether a gait keeps every limit, speed apart."""
-    return c.nominal is not None and all(m.use <= 1 or m.advice or m.name.startswith("speed") for m in c.margins)
+    return c.nominal is not None and all(m.use <= 1 or m.advice or m.kind == "speed" for m in c.margins)
 
 
 class _Refiner:
@@ -252,7 +250,7 @@ def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> 
     for _ in range(STEERED):
         tried = {}
         for k, c in last.items():
-            if c.nominal is not None and not c.nominal.fell and any(m.name in STRAYING and m.use > 1 for m in c.margins):
+            if c.nominal is not None and not c.nominal.fell and any(m.kind == "straying" and m.use > 1 for m in c.margins):
                 tried[k] = replace(c.shape, turn=float(np.clip(_straight(request, c, before.get(k)), low, high)))
         before = last
         last = dict(zip(tried, evaluator.judged(list(tried.values()), 0)))

@@ -159,7 +159,7 @@ def _draws_section(certificate: Certificate) -> Section:
     e = certificate.other_engine
     parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
                       f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
-                      "No second engine was at hand: what is said here is one engine's word."))
+                      "No second engine played it: what is said here is one engine's word."))
     if e:
         parts.append(Table(["condition", f"speed [{n['unit']}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
                            [[k, *(f"{c[key]:.3f}" for key in ("speed", "speed elsewhere")),
