@@ -40,14 +40,16 @@ def short(value: float) -> str:
 
 @styled
 def draw_ranges(certificate: Certificate) -> Figure:
-    """Of each quantity: lowest, 5 %, median, 95 % and highest over the ensemble, and the nominal robot's."""
-    told = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k != "quantiles"]
-    rows = [(k, v) for k, v in told if all(x is not None and math.isfinite(x) for x in v)]
+    """Of each quantity: lowest, 5 %, median, 95 % and highest over the ensemble, and the nominal robot's. Of few draws there are
+    no percentiles."""
+    told = [(k, v) for k, v in certificate.draws.items() if isinstance(v, list) and k not in ("quantiles", "incidents")]
+    rows = [(k, v) for k, v in told if all(v[i] is not None and math.isfinite(v[i]) for i in (0, 2, 4))]
     nominal = _nominal(certificate)
     figure = new_figure(10, 0.9 * len(rows) + 0.6)
     for axes, (name, (low, five, half, ninety_five, high)) in zip(figure.subplots(len(rows), 1, squeeze=False).flat, rows):
         axes.plot([low, high], [0, 0], color=COMMAND, linewidth=1.2)
-        axes.plot([five, ninety_five], [0, 0], color=SIMULATED, linewidth=8, solid_capstyle="butt")
+        if five is not None and ninety_five is not None:
+            axes.plot([five, ninety_five], [0, 0], color=SIMULATED, linewidth=8, solid_capstyle="butt")
         axes.plot([half], [0], "o", color="white", markeredgecolor=SIMULATED, markersize=8)
         if name in nominal:
             axes.plot([nominal[name]], [0], "|", color=ACCENT, markersize=22, markeredgewidth=3)
