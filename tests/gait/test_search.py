@@ -12,8 +12,10 @@ from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
 from workbench.gait.finalists import Screening, finalists
+from workbench.gait.limits import GaitLimits
 from workbench.gait.machine import GaitMachine
-from workbench.gait.optimize import OptimizeOptions, optimize, options_of, out_of_reach
+from workbench.gait.optimize import OptimizeOptions, optimize, options_of
+from workbench.gait.possible import STANDING, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.search import Budget, Found, search, steered
@@ -204,3 +206,49 @@ def test_the_bundled_file_is_the_default():
     assert load_ensemble().sha256 == load_ensemble(data_file("gait_ensemble.yaml")).sha256
     assert json.dumps(sorted(load_ensemble().ranges)) == json.dumps(
         ["backlash", "command_delay", "friction", "supply_sag", "supply_voltage"])
+
+
+@pytest.mark.parametrize(("way", "shape"), [
+    ("turn", GaitShape("trot", (1, 1), 8, 2.0, turn=0.2, lift=0.02, crouch=0.04)),
+    ("sideways", GaitShape("trot", (1, 1), 8, 2.0, side=0.03, lift=0.02, crouch=0.04))])
+def test_what_goes_to_the_right_mirrors_what_goes_to_the_left(machine, way, shape):
+    left, right = Request(way), Request(way, right=True)
+    mirrored = replace(shape, turn=-shape.turn, side=-shape.side)
+    (a,), (b,) = (Evaluator(machine, r, [], seconds=1.0).judged([s], 0) for r, s in ((left, shape), (right, mirrored)))
+    assert left.progress(a.nominal) > 0
+    assert right.progress(b.nominal) == pytest.approx(left.progress(a.nominal), rel=0.15)
+    assert right.progress(a.nominal) < 0
+    space = space_of(machine, right)
+    assert all(getattr(s, {"turn": "turn", "sideways": "side"}[way]) < 0 for s in seeds(machine, right, space, 4, 0))
+
+
+def test_an_arc_to_the_right_has_its_curvature_judged_to_the_right(machine):
+    request = Request("arc", radius=0.5, right=True)
+    (walked,) = Evaluator(machine, request, [], seconds=1.0).judged(
+        [GaitShape("trot", (1, 1), 8, 2.2, stride=0.05, turn=-0.1, lift=0.02, crouch=0.04, lead=1.0)], 0)
+    bend = {m.name: m.value for m in walked.margins}["curvature off the arc"]
+    assert bend == pytest.approx(abs(-walked.nominal.turn_rate * 0.5 / walked.nominal.speed - 1))
+    assert bend < 1.0
+
+
+@pytest.mark.parametrize(("request_", "binds"), [
+    (Request("arc", speed=0.3, radius=0.05), "speed of a joint on its foot's path"),
+    (Request(speed=0.1, limits=GaitLimits(rms=0.001)), STANDING), (Request(slope=-np.radians(30)), "slope")])
+def test_what_is_impossible_is_refused_before_any_search(machine, request_, binds):
+    assert out_of_reach(machine, request_).name == binds
+
+
+@pytest.mark.parametrize("request_", [
+    Request(speed=0.5), Request("turn", speed=1.5), Request("sideways", speed=0.4, right=True), Request("backward", speed=0.3),
+    Request("arc", speed=0.34, radius=0.5), Request(speed=0.15, limits=GaitLimits(rms=0.28))])
+def test_what_gaits_have_done_is_not_refused(machine, request_):
+    assert out_of_reach(machine, request_) is None
+
+
+def test_options_that_cannot_be_met_end_in_one_line(capsys, tmp_path):
+    out = ["--out", str(tmp_path / "out")]
+    assert "expected at most 1.39 N m" in refused(capsys, "optimize", "--rms", "99", *out)
+    assert STANDING in refused(capsys, "optimize", "--rms", "0.001", "--speed", "0.1", *out)
+    assert "neither of them max" in refused(capsys, "optimize", "--turn", "max", "--speed", "0.1", *out)
+    assert "expected sideways, turn or arc" in refused(capsys, "optimize", "--right", *out)
+    assert not (tmp_path / "out" / "gait.csv").exists()

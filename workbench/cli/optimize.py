@@ -27,10 +27,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--speed", type=_speed, metavar="V|max", help="at least V m/s, or as fast as possible (default: max)")
     way = parser.add_mutually_exclusive_group()
     way.add_argument("--backward", action="store_true", help="go backwards")
-    way.add_argument("--sideways", action="store_true", help="go to the left")
-    way.add_argument("--turn", type=_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s")
+    way.add_argument("--sideways", action="store_true", help="go to the left, or with --right to the right")
+    way.add_argument("--turn", type=_speed, metavar="RATE|max", help="turn on the spot to the left, at least RATE deg/s; "
+                     "with --speed V, on the arc that takes")
     way.add_argument("--arc", type=_positive, metavar="R", help="follow a circle of radius R m to the left")
-    parser.add_argument("--slope", type=_positive, default=0.0, metavar="DEG", help="go uphill")
+    parser.add_argument("--right", action="store_true", help="turn, arc or sideways to the right")
+    parser.add_argument("--slope", type=_angle, default=0.0, metavar="DEG", help="go uphill, or downhill where negative")
     parser.add_argument("--rms", type=_positive, metavar="NM", help="largest RMS torque of each servo (default: half of what "
                         "full duty gives; ROBOTIS advises a fifth)")
     best = parser.add_mutually_exclusive_group()
@@ -84,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _request(args: argparse.Namespace, model: RobotModel) -> Request:
+    from workbench.files import InputError
     from workbench.gait.limits import GaitLimits
     from workbench.gait.optimize import walk_speed
     from workbench.gait.request import Aim, Request, Way
@@ -93,11 +96,16 @@ def _request(args: argparse.Namespace, model: RobotModel) -> Request:
         way = name if asked else way  # type: ignore[assignment]
     aim: Aim = "energy" if args.least_energy else "smoothness" if args.smoothest else "gentleness" if args.gentlest else "speed"
     speed = None if args.speed in (None, math.inf) else args.speed
-    if way == "turn":
+    radius = args.arc
+    if way == "turn" and args.speed is not None:
+        if speed is None or args.turn == math.inf:
+            raise InputError(None, "--turn with --speed: expected a rate in deg/s and a speed in m/s, neither of them max")
+        way, radius = "arc", speed / math.radians(args.turn)
+    elif way == "turn":
         speed = None if args.turn == math.inf else math.radians(args.turn)
     elif aim != "speed" and speed is None:
         speed = walk_speed(model)
-    return Request(way=way, speed=speed, radius=args.arc, slope=math.radians(args.slope), aim=aim,
+    return Request(way=way, speed=speed, radius=radius, right=args.right, slope=math.radians(args.slope), aim=aim,
                    built_knees=args.knees == "built", limits=GaitLimits(rms=args.rms))
 
 
@@ -115,6 +123,16 @@ def _is_model_file(name: str) -> bool:
 def _speed(text: str) -> float:
     """A positive number or `max`, for argparse."""
     return math.inf if text == "max" else _positive(text)
+
+
+def _angle(text: str) -> float:
+    """A number, for argparse."""
+    from workbench.files.numerals import number_of
+
+    value = number_of(text)
+    if value is None or not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a number of degrees, got {text[:40]}")
+    return value
 
 
 def _positive(text: str) -> float:

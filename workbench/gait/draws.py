@@ -100,7 +100,7 @@ def _ninth(margins: list[Margin]) -> Margin:
     needed = _needed(len(margins))
     m = sorted(margins, key=lambda m: m.use)[needed - 1]
     where = f"{needed} of {len(margins)} robots"
-    return Margin(m.name + OVER_DRAWS, where if m.where == "robot" else f"{m.where}, {where}", m.value, m.limit, m.unit, m.use)
+    return replace(m, name=m.name + OVER_DRAWS, where=where if m.where == "robot" else f"{m.where}, {where}")
 
 
 def _margin(name: str, value: float, limit: float, unit: str, where: str = "robot") -> Margin:

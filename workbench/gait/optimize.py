@@ -11,8 +11,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from workbench.files import InputError
 from workbench.files.option_checks import check_whole
 from workbench.files.reading import write_together
@@ -26,6 +24,7 @@ from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.planned import planned_seeds
+from workbench.gait.possible import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -185,36 +184,16 @@ def sought(request: Request) -> Request:
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
              progress: Progress, other: tuple[str, OtherEngine] | None) -> Optimized:
-    """Of a speed that no gait has: the nearest table, after a first look for the fastest. Up a slope on which nothing stands
-    there is none."""
+    """Of a speed that no gait has: the nearest table, after a first look for the fastest. On a slope on which nothing stands, or
+    with servos that may not even hold it up, there is none."""
     said = f"cannot be met by any gait: {impossible}"
-    if impossible.kind == "slope":
+    if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
     look = replace(options, budget=FIRST_LOOK, certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
         said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
     return Optimized(request, False, said, nearest.table, nearest.certified, nearest.found)
-
-
-def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
-    """What no gait can do, known before any search: speed beyond what feet reach at the servos' no-load speed, a slope beyond
-    friction."""
-    law = machine.law
-    legs = {leg.foot: max(float(law.full_torque[i] / law.back_emf[i]) for i in map(machine.model.joints.index, leg.joints))
-            for leg in machine.legs}
-    if request.speed is not None:
-        fastest = min(2 * legs[leg.foot] * leg.length for leg in machine.legs)  # two joints of a leg that add up
-        if request.way == "turn":
-            fastest /= min(float(np.hypot(*leg.neutral[:2])) for leg in machine.legs)
-        if request.speed > fastest:
-            return Margin("foot speed", "servos at no load", request.speed, fastest, request.unit, request.speed / fastest)
-    friction = machine.model.ground.friction
-    if friction is not None and math.tan(request.slope) > friction:
-        bound = math.degrees(math.atan(friction))
-        return Margin("slope", f"friction {friction:g}", math.degrees(request.slope), bound, "deg",
-                      math.degrees(request.slope) / bound, kind="slope")
-    return None
 
 
 def walk_speed(model: RobotModel) -> float:

@@ -22,9 +22,10 @@ def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ..
     """Shapes of solved programmes for a request: trots at the speed asked for, or at MODEST, knees both back, and the front ones
     forward if that is allowed."""
     speed = request.speed if request.speed is not None else MODEST_TURN if request.way == "turn" else MODEST
-    ways = {"forward": (speed, 0.0), "arc": (speed, 0.0), "backward": (-speed, 0.0), "sideways": (0.0, speed), "turn": (0.0, 0.0)}
+    ways = {"forward": (speed, 0.0), "arc": (speed, 0.0), "backward": (-speed, 0.0), "sideways": (0.0, request.side * speed),
+            "turn": (0.0, 0.0)}
     velocity = ways[request.way]
-    turn = speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius
+    turn = request.side * (speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius)
     knees = KNEES[:1] if request.built_knees else (KNEES[0], KNEES[2])
     length = machine.leg_length
     trot = GaitShape("trot", poses=12, frequency=2.4, duty=0.6, lift=LIFT * length, crouch=CROUCH * length)

@@ -13,6 +13,8 @@ from workbench.gait.measure import GaitMeasure
 from workbench.robot import EffectSpec, RobotModel
 
 Way = Literal["forward", "backward", "sideways", "turn", "arc"]
+SIDED = ("sideways", "turn", "arc")
+"""Ways that can go to the right, too."""
 Aim = Literal["speed", "gentleness", "energy", "smoothness"]
 
 
@@ -20,16 +22,17 @@ Aim = Literal["speed", "gentleness", "energy", "smoothness"]
 class Request:
     """One request for a gait. InputError for a value that is not among those listed, or out of range.
 
-    way: "forward", "backward", "sideways" (to the left), "turn" (to the left, in place) or "arc" (forward, curved to the left).
-    speed: at least that much [m/s, for a turn rad/s]; None: as fast as possible. radius: of an arc [m], of nothing else. slope:
-    uphill [rad], below 60 deg. aim: what is optimised once all limits and the speed are kept: "speed", "gentleness" (largest RMS
-    torque by its limit), "energy" (electrical power) or "smoothness" (jerk of the base); all but "speed" need a speed.
-    built_knees: whether knees bend only as in the robot's neutral pose. limits: to keep.
+    way: "forward", "backward", "sideways", "turn" (in place) or "arc" (forward, curved); the last three to the left, or with
+    `right` to the right. speed: at least that much [m/s, for a turn rad/s]; None: as fast as possible. radius: of an arc [m], of
+    nothing else. slope: uphill [rad], negative downhill, within 60 deg. aim: what is optimised once all limits and the speed are
+    kept: "speed", "gentleness" (largest RMS torque by its limit), "energy" (electrical power) or "smoothness" (jerk of the base);
+    all but "speed" need a speed. built_knees: whether knees bend only as in the robot's neutral pose. limits: to keep.
     """
 
     way: Way = "forward"
     speed: float | None = None
     radius: float | None = None
+    right: bool = False
     slope: float = 0.0
     aim: Aim = "speed"
     built_knees: bool = False
@@ -44,10 +47,17 @@ class Request:
             raise InputError(None, "radius: an arc has one, nothing else")
         if self.radius is not None and not 0 < self.radius < math.inf:
             raise InputError(None, f"radius: expected a positive number of metres, got {self.radius:g}")
-        if not 0 <= self.slope < math.pi / 3:
-            raise InputError(None, f"slope: expected 0 to 60 deg, got {math.degrees(self.slope):g}")
+        if self.right and self.way not in SIDED:
+            raise InputError(None, f"right: expected {', '.join(SIDED[:-1])} or {SIDED[-1]}, got {self.way}")
+        if not -math.pi / 3 < self.slope < math.pi / 3:
+            raise InputError(None, f"slope: expected within 60 deg, got {math.degrees(self.slope):g}")
         if self.speed is None and self.aim != "speed":
             raise InputError(None, f"what is made best is {self.aim}: expected a speed to keep")
+
+    @property
+    def side(self) -> float:
+        """1 for a request to the left, -1 to the right."""
+        return -1.0 if self.right else 1.0
 
     @property
     def unit(self) -> str:
@@ -66,7 +76,8 @@ class Request:
         if m.fell:
             return 0.0
         forward, left = m.velocity
-        return {"forward": forward, "backward": -forward, "sideways": left, "turn": m.turn_rate, "arc": forward}[self.way]
+        return {"forward": forward, "backward": -forward, "sideways": self.side * left, "turn": self.side * m.turn_rate,
+                "arc": forward}[self.way]
 
     def __str__(self) -> str:
         if self.way == "turn":
@@ -74,7 +85,8 @@ class Request:
         else:
             way = self.way if self.radius is None else f"an arc of {self.radius:g} m"
             asked = f"{way}{f' at {self.speed:g} m/s' if self.speed else ' as fast as can be'}"
-        asked += f", up {math.degrees(self.slope):g} deg" if self.slope else ""
+        asked += " to the right" if self.right else ""
+        asked += f", {'up' if self.slope > 0 else 'down'} {math.degrees(abs(self.slope)):g} deg" if self.slope else ""
         asked += f", RMS torque at most {self.limits.rms:g} N m" if self.limits.rms is not None else ""
         best = {"speed": "", "gentleness": "", "energy": ", least electrical energy", "smoothness": ", smoothest"}
         return asked + best[self.aim]

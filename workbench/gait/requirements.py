@@ -37,7 +37,7 @@ def direction_margins(request: Request, m: GaitMeasure) -> list[Margin]:
     along, across = (left, forward) if request.way == "sideways" else (forward, left)
     out = [_margin("motion across the way", abs(across), request.limits.aside * max(abs(along), 0.01), "m/s")]
     if request.radius is not None:
-        bend = m.turn_rate * request.radius / max(forward, 0.01)
+        bend = request.side * m.turn_rate * request.radius / max(forward, 0.01)
         return [_margin("curvature off the arc", abs(bend - 1), request.limits.aside, "of it", "straying")]
     turned, allowed = np.degrees([abs(drift(request, m)), request.limits.drift])
     return [*out, _margin("drift", float(turned), float(allowed), "deg/m", "straying")]
@@ -54,7 +54,9 @@ def excess_turning(request: Request, m: GaitMeasure) -> float:
     """Rate of turning beyond what the request requires [rad/s], to the left; of a turn, 0."""
     if request.way == "turn":
         return 0.0
-    return m.turn_rate - (0.0 if request.radius is None else max(abs(request.progress(m)), SLOWEST) / request.radius)
+    if request.radius is None:
+        return m.turn_rate
+    return m.turn_rate - request.side * max(abs(request.progress(m)), SLOWEST) / request.radius
 
 
 def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:

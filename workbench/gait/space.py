@@ -24,6 +24,8 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "hurry": (0.8, 2.0)}
 TRIM = 0.06
 """Turn in a stance [rad] by which a straight gait steers against its own drift: robots are not quite alike left and right."""
+MOST_TURN = 1.2
+"""Of the body in one stance [rad]."""
 POSES = (2.0, 8.0)
 """Half the poses in a cycle."""
 FREQUENCY = (0.7, 4.6)
@@ -84,12 +86,17 @@ def _strides(request: Request, length: float) -> dict[str, tuple[float, float]]:
     if request.way == "backward":
         return {"stride": (-along[1], -along[0]), "turn": trim}
     if request.way == "sideways":
-        return {"stride": little, "side": (0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
+        return {"stride": little, "side": _sided(request, 0.05 * length, 0.55 * length), "turn": (-0.1, 0.1)}
     if request.way == "turn":
-        return {"stride": little, "turn": (0.1, 1.2)}
+        return {"stride": little, "turn": _sided(request, 0.1, MOST_TURN)}
     if request.radius is not None:
-        return {"stride": along, "turn": (0.0, min(1.2, 2 * along[1] / request.radius))}
+        return {"stride": along, "turn": _sided(request, 0.0, min(MOST_TURN, 2 * along[1] / request.radius))}
     return {"stride": along, "turn": trim}
+
+
+def _sided(request: Request, least: float, most: float) -> tuple[float, float]:
+    """A range to the left, or its mirror image."""
+    return (-most, -least) if request.right else (least, most)
 
 
 def seeds(machine: GaitMachine, request: Request, space: Space, count: int, seed: int) -> list[GaitShape]:
@@ -97,7 +104,7 @@ def seeds(machine: GaitMachine, request: Request, space: Space, count: int, seed
     rng = np.random.default_rng([seed, 10])
     out: list[GaitShape] = []
     for _ in range(MOST_BATCHES):
-        drawn = [_random(rng, request, space) for _ in range(max(2 * count, 20))]
+        drawn = [random_shape(rng, request, space) for _ in range(max(2 * count, 20))]
         out += [p.shape for p in paths_of(machine, drawn) if p.off.max() <= request.limits.reach and in_range(machine, p)]
         if len(out) >= count:
             break
@@ -110,7 +117,8 @@ def in_range(machine: GaitMachine, paths: Paths) -> bool:
     return all(bool((q >= lower).all() and (q <= upper).all()) for q in (paths.q, paths.small, paths.stand))
 
 
-def _random(rng: np.random.Generator, request: Request, space: Space) -> GaitShape:
+def random_shape(rng: np.random.Generator, request: Request, space: Space) -> GaitShape:
+    """Anywhere in the space, of any family."""
     families, weights = list(WEIGHTS), np.array(list(WEIGHTS.values()))
     assert set(families) == set(FAMILIES)
     knees = KNEES[:1] if request.built_knees else KNEES
