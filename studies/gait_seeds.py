@@ -36,7 +36,7 @@ from workbench.view.report.page import Picture, Provenance, Report, Section, Tab
 RANDOM = 24
 """Random seeds of each task's family and way."""
 SHOWN = "trot 0.2 m/s"
-QUICK = Budget(seeds=20, starts=1, generations=1, robust=0, draws=0)
+QUICK = Budget(seeds=20, starts=1, generations=1, draws=0)
 SEARCHES = (0, 1)
 """Seeds of the random generator of the searches with planned seeds and without."""
 

@@ -20,7 +20,7 @@ from workbench.gait.shape import GaitShape
 
 NEAR = 0.9
 """Share of the best speed that counts as near it."""
-BUDGET = Budget(seeds=60, generations=8, robust=0, draws=0)
+BUDGET = Budget(seeds=60, starts=3, generations=24, draws=0)
 REQUESTS = {"forward": Request(), "backward": Request("backward"), "sideways": Request("sideways"),
             "10 deg uphill": Request(slope=math.radians(10)),
             "forward, RMS torque 0.28 N m": Request(limits=GaitLimits(rms=0.28))}

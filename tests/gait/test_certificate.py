@@ -11,16 +11,18 @@ from workbench.files import InputError
 from workbench.gait.certificate import NAME, Certificate, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
 from workbench.gait.ensemble import load_ensemble
+from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import shape_from, write_gait
 from workbench.gait.request import Request
+from workbench.gait.second_engine import AS_IT_IS, Condition, conditions, margins
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
 from workbench.motion import Motion, load_motion, save_motion
-from workbench.robot import puppy_model
+from workbench.robot import EffectSpec, puppy_model
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
-OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3,
+OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3, compared_seconds=0.3,
                          variants=("2 ms", "1 ms"), n_jobs=1, watched=8)
 
 
@@ -30,7 +32,8 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gait")
     machine = GaitMachine(puppy_model())
     request = Request()
-    request = replace(request, limits=replace(request.limits, drift=10.0, spread=10.0, aside=5.0))  # any gait will do here
+    lax = replace(request.limits, drift=10.0, spread=10.0, aside=5.0, rms=1.3, torque=2.0, lift=1e-6, slip=5.0, slip_on_draws=9.0)
+    request = replace(request, limits=lax)  # any gait will do here
     table = gait_table(machine, SHAPE)
     draws = load_ensemble().draws(machine.model, 2, 7, folder)
     provenance = {"seed": 7, "rollouts": 0, "searched in": 0.0, "ensemble_sha256": "x"}
@@ -43,7 +46,7 @@ def made(tmp_path_factory):
 def _again(model, commands, seconds):
     from workbench.simulation import Job, SimulationConfig, simulate_batch
 
-    return simulate_batch([Job(model, SimulationConfig(time_step=2e-3, engine="drake"), commands, seconds, 0.3)])[0]
+    return simulate_batch([Job(model, SimulationConfig(time_step=2e-3), commands, seconds, 0.3)])[0]
 
 
 def test_says_what_there_is_to_say(made):
@@ -55,7 +58,11 @@ def test_says_what_there_is_to_say(made):
                                            "supply current", "tilt", "falls", "bus time", "poses",
                                            "way back to its cycle"}
     assert set(c.floor["speed"]) == {"2 ms", "1 ms"}
-    assert c.other_engine["speed kept"] == pytest.approx(1.0, abs=1e-9)  # the other engine is this one
+    assert c.other_engine["speed kept"] == pytest.approx(1.0, abs=1e-3)  # the other engine is this one
+    assert set(c.other_engine["conditions"]) == {c.name for c in conditions()}
+    assert c.other_engine["largest speed apart"] < 0.02
+    assert {m.name for m in c.margins} >= {"tilt over draws", "slip over draws", "foot clearance over draws", "engines apart"}
+    assert c.draws["speed m/s"][1] is None  # of two draws there is no 5th percentile
     back = c.cycle["cycles until it is back"]
     assert {"from neutral", "at once", "a pose got lost", "a push to the left", "from another table"} <= set(back)
     assert all(n is not None and n <= 5 for n in back.values())
@@ -137,3 +144,22 @@ def test_the_robotis_walk_needs_none(capsys, tmp_path):
 def test_nan_is_null():
     empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {}, {})
     assert json.loads(empty.as_text())["nominal"] == {"slip m/s": None, "rms": 0.5}
+
+
+def test_engines_that_disagree_anywhere_break_the_certificate(made):
+    """The other engine has its floor at another friction than it says, which one friction alone would not show."""
+    _, machine, table, _ = made
+    request = Request()
+    examiner = Examiner(machine.model, machine.legs, table, OPTIONS)
+    slick = Condition("friction 0.3", (EffectSpec("ground_friction", (), {"friction": 0.3}),))
+
+    def other(model, commands, seconds):
+        wrong = any(e.effect == "ground_friction" for e in model.effects)
+        told = model.with_effect(EffectSpec("ground_friction", (), {"friction": 0.05})) if wrong else model
+        return _again(told, commands, seconds)
+
+    pairs = {c.name: examiner.elsewhere(other, c) for c in (Condition(AS_IT_IS), slick)}
+    good, broken = margins(request, "other", {AS_IT_IS: pairs[AS_IT_IS]}, 0.05), margins(request, "other", pairs, 0.05)
+    assert all(m.use <= 1 for m in good)
+    assert broken[0].use > 1
+    assert broken[0].where == "friction 0.3, in other"

@@ -30,9 +30,10 @@ class Certificate:
 
     kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait). margins: of
     limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the quantiles 0, 5, 50, 95, 100 % over the
-    ensemble; falls, and how many were drawn. floor: by which steps and contact models move speed and heading. other_engine: the
-    same table elsewhere; empty where there was none. ways: the way in and out. cycle: how steady the gait is from cycle to cycle,
-    and after how many cycles it walks as before where it was entered otherwise or disturbed. provenance: versions, seeds, time.
+    ensemble (null where there are fewer than 20); falls, how many robots were drawn, and what happened to which. floor: by which
+    steps and contact models move speed and heading. other_engine: the same table elsewhere; empty where there was none. ways: the
+    way in and out. cycle: how steady the gait is from cycle to cycle, and after how many cycles it walks as before where it was
+    entered otherwise or disturbed. provenance: versions, seeds, time.
     """
 
     kept: bool
@@ -64,9 +65,12 @@ class Certificate:
         unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)
         lines = [f"{self.request}: {factor * n['speed']:.3g} {unit} on the nominal robot of the model"]
         if d.get("count"):
-            low = factor * d[f"speed {n['unit']}"][1]
-            lines.append(f"{d['count']} random variants of the robot: {d['falls']} fell, 5th percentile {low:.3g} {unit}, "
+            lowest, five = d[f"speed {n['unit']}"][:2]
+            low = f"lowest {factor * lowest:.3g}" if five is None else f"5th percentile {factor * five:.3g}"
+            falls = f"{d['falls']} fell (below {100 * d['falls at most']:.2g} % at 95 %)"
+            lines.append(f"{d['count']} random variants of the robot: {falls}, {low} {unit}, "
                          f"heading {d['heading deg/m RMS']:.2g} deg/m RMS")
+            lines += [f"draw {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
         lines.append(f"binds: {worst}")
         advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)
@@ -77,7 +81,8 @@ class Certificate:
         if self.other_engine:
             e = self.other_engine
             apart = f"heading {e['heading apart deg/m']:+.1f} deg/m apart"
-            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}")
+            lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}; over friction, supply and entry "
+                         f"speeds differ by {100 * e['largest speed apart']:.0f} % at most")
         return "\n".join(lines)
 
 

@@ -15,14 +15,19 @@ from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
-from workbench.gait.examine import CertifyOptions, Examiner, Measured, NominalRun, OtherEngine
+from workbench.gait.draws import draw_margins, slip_margin
+from workbench.gait.draws import summary as draw_summary
+from workbench.gait.examine import CertifyOptions, Examiner, NominalRun, OtherEngine
 from workbench.gait.feet import FeetMeasure
 from workbench.gait.limit_cycle import LimitCycle
 from workbench.gait.limits import contact_margin, return_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
-from workbench.gait.measure import GaitMeasure, fallen
+from workbench.gait.measure import GaitMeasure
 from workbench.gait.request import Request
-from workbench.gait.requirements import direction_margins, drift, speed_margins
+from workbench.gait.requirements import direction_margins, drift, floor_margins, speed_margins
+from workbench.gait.second_engine import conditions
+from workbench.gait.second_engine import margins as engine_margins
+from workbench.gait.second_engine import summary as engines_summary
 from workbench.gait.table import GaitTable
 from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
@@ -35,7 +40,6 @@ Progress = Callable[[str, float | None], None]
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """What it is, in words, and what is called with what."""
 
-QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 TOGETHER = 4
 """Draws that go to a process at once."""
 
@@ -59,7 +63,8 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
     work: list[Work] = [("nominal robot", examiner.nominal, ())]
     work += [(f"numerics, {v}", examiner.variant, (v,)) for v in variants]
-    work += [] if other is None else [(f"the same table in {other[0]}", examiner.elsewhere, (other[1],))]
+    conditioned = () if other is None else conditions()
+    work += [] if other is None else [(f"in {other[0]}: {c.name}", examiner.elsewhere, (other[1], c)) for c in conditioned]
     work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
     work += [("back to its cycle", examiner.limit_cycle, (_vendor_table(machine),))] if options.watched else []
     work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
@@ -67,17 +72,20 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     run: NominalRun = next(results)
     nominal = run.measure
     floor = _floor(request, dict(zip(variants, _taken(results, len(variants)))))
-    elsewhere = {} if other is None else _elsewhere(request, other[0], nominal, next(results))
+    pairs = {c.name: next(results) for c in conditioned}
     checks = _taken(results, len(robots[:options.checked]))
     cycle: LimitCycle | None = next(results) if options.watched else None
-    measured = [m for group in results for m in group]
-    told, on_draws = _on_draws(request, machine, measured)
+    robots_drawn = [d for group in results for d in group]
+    told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
-               *run_margins(machine, nominal, request.limits), *direction_margins(request, nominal),
-               *speed_margins(request, nominal, on_draws),
+               *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
+               *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
+               *draw_margins(machine, request, on_draws), *floor_margins(request, nominal, floor),
                *([] if cycle is None else [return_margin(cycle, request.limits)])]
+    elsewhere = {} if other is None else engines_summary(request, other[0], pairs)
+    margins += [] if other is None else engine_margins(request, other[0], pairs, options.compared)
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
         tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
@@ -100,25 +108,6 @@ def _all(work: Sequence[Work], n_jobs: int, progress: Progress) -> Iterator[Any]
         for k, (what, _, _) in enumerate(work):
             progress(f"certifying: {what}", k / len(work))
             yield next(results)
-
-
-def _on_draws(request: Request, machine: GaitMachine, measured: Sequence[Measured | None],
-              ) -> tuple[dict[str, Any], list[GaitMeasure]]:
-    """Quantiles over the robots of the ensemble, and the measures; None: a robot that fell."""
-    if not measured:
-        return {"count": 0}, []
-    measures = [fallen(len(machine.model.joints)) if m is None else m[0] for m in measured]
-    feet = [m[1] for m in measured if m is not None]
-    values = {
-        f"speed {request.unit}": [request.progress(m) for m in measures],
-        "heading deg/m": [math.degrees(drift(request, m)) for m in measures],
-        "slip m/s": [f.slip for f in feet], "foot clearance mm": [1000 * f.clearance for f in feet],
-        "tipping margin deg": [math.degrees(f.tipping) for f in feet],
-        "electrical power W": [m.power for m in measures], "largest RMS torque N m": [max(m.rms) for m in measures]}
-    told: dict[str, Any] = {k: _quantiles(np.array(v)) for k, v in values.items() if v}
-    told["heading deg/m RMS"] = float(np.sqrt(np.mean(np.square(values["heading deg/m"]))))
-    told |= {"count": len(measures), "falls": sum(m.fell for m in measures), "quantiles": list(QUANTILES)}
-    return told, measures
 
 
 def _checked(request: Request, checks: Sequence[tuple[GaitMeasure, GaitMeasure]], options: CertifyOptions) -> dict[str, Any]:
@@ -158,14 +147,6 @@ def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]
             "all": float(np.std(list(speeds.values()))), "heading deg/m, all": float(np.std(list(drifts.values())))}
 
 
-def _elsewhere(request: Request, name: str, nominal: GaitMeasure, measured: Measured) -> dict[str, Any]:
-    """The same table in another engine."""
-    (m, feet), r = measured, request
-    return {"name": name, "speed": r.progress(m), "speed kept": r.progress(m) / max(r.progress(nominal), 1e-9),
-            "heading deg/m": math.degrees(drift(r, m)), "heading apart deg/m": math.degrees(drift(r, m) - drift(r, nominal)),
-            "fell": m.fell, "slip m/s": feet.slip}
-
-
 def _numbers(machine: GaitMachine, request: Request, m: GaitMeasure, feet: FeetMeasure) -> dict[str, Any]:
     weight, speed = machine.model.kinematics.mass * GRAVITY, max(float(np.hypot(*m.velocity)), 1e-6)
     return {
@@ -179,6 +160,3 @@ def _numbers(machine: GaitMachine, request: Request, m: GaitMeasure, feet: FeetM
         "tipping margin deg": math.degrees(feet.tipping),
         "RMS torque N m": dict(zip(machine.model.joints, m.rms))}
 
-
-def _quantiles(values: Array) -> list[float]:
-    return [float(x) for x in np.quantile(values, QUANTILES)]

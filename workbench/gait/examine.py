@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from workbench.files.option_checks import check_choice, check_positive, check_whole
+from workbench.gait.draws import Drawn, drawn
 from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.limit_cycle import LimitCycle, limit_cycle
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
 from workbench.gait.rollouts import Rollouts
+from workbench.gait.second_engine import Condition, Pair
 from workbench.gait.self_contact import Nearness, SelfContact
 from workbench.gait.table import GaitTable
 from workbench.motion import Commands, PoseTable
@@ -48,11 +50,13 @@ each other no faster."""
 class CertifyOptions:
     """How a gait is examined for its certificate. InputError for a number out of range or a variant that is not known.
 
-    seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots of
-    the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too, beside
-    the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the same discrete
-    step is compared. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s].
-    watched: cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
+    seconds: of walking on the nominal robot [s], six as in the thesis; draw_seconds: on each draw [s]. draws: how many robots
+    of the ensemble, not those of the search. step: of the simulation [s]. checked: how many of the draws Drake simulates too,
+    beside the nominal robot, which is always Drake's: for checked_seconds of walking [s] at checked_step [s], so that the
+    same discrete step is compared. compared_seconds: of walking in each condition in which another engine plays the table too
+    [s]; compared: by which share of the nominal speed the two may differ there: contact models differ by a tenth where feet
+    slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. watched:
+    cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -61,6 +65,8 @@ class CertifyOptions:
     checked: int = 8
     checked_seconds: float = 1.0
     checked_step: float = 2e-3
+    compared_seconds: float = 2.0
+    compared: float = 0.15
     floor_seconds: float = 2.0
     watched: int = 12
     variants: tuple[str, ...] = tuple(VARIANTS)
@@ -68,7 +74,8 @@ class CertifyOptions:
 
     def __post_init__(self) -> None:
         check_whole(self, draws=0, checked=0, watched=0, n_jobs=1)
-        check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds")
+        check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds",
+                       "compared_seconds", "compared")
         for name in self.variants:
             check_choice("variants", name, VARIANTS)
 
@@ -133,12 +140,16 @@ class Examiner:
                                       <= 1.5 * told["gait"]["jerk of the base m/s^3"])
         return told
 
-    def robots(self, robots: Sequence[RobotModel]) -> list[Measured | None]:
-        """Robots of the ensemble, by the compiled station; None for one that lay on the floor or tripped over itself."""
+    def robots(self, robots: Sequence[RobotModel]) -> list[Drawn]:
+        """Robots of the ensemble, by the compiled station; where that gives up, because something other than a foot touched the
+        floor or two links each other, Drake says what came of it."""
         config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
         seconds = self.options.draw_seconds
-        takes = Rollouts(1).takes([self._job(r, config, seconds, SHORT_REST) for r in robots])
-        return [None if take is None else self._measured(take, robot, seconds) for take, robot in zip(takes, robots)]
+        jobs, out = [self._job(r, config, seconds, SHORT_REST) for r in robots], []
+        for robot, job, take in zip(robots, jobs, Rollouts(1).takes(jobs)):
+            played = simulate_batch([replace(job, config=replace(config, engine="drake"))])[0] if take is None else take
+            out.append(drawn(robot, *self._measured(played, robot, seconds), gave_up=take is None))
+        return out
 
     def checked(self, robot: RobotModel) -> tuple[GaitMeasure, GaitMeasure]:
         """One of them by the compiled station and by Drake, at the same step."""
@@ -155,18 +166,24 @@ class Examiner:
         (take,) = simulate_batch([self._job(self.model, config, self.options.floor_seconds)])
         return self._measured(take, self.model, self.options.floor_seconds)[0]
 
-    def elsewhere(self, engine: OtherEngine) -> Measured:
-        """The nominal robot in another engine."""
-        seconds = self.options.seconds
-        commands = self.table.commands(self.cycles(seconds), whole=True)
-        return self._measured(engine(self.model, commands, commands.end + SHORT_REST), self.model, seconds)
+    def elsewhere(self, engine: OtherEngine, condition: Condition) -> Pair:
+        """The robot under a condition, by this engine and by another. A gait entered at once has as long as its start takes to
+        find its cycle."""
+        model, seconds = condition.of(self.model), self.options.compared_seconds
+        cycles, until = self.cycles(seconds), self._walked_until(seconds)
+        at_once = self.table.cycle.commands(math.ceil(until / self.table.period))
+        commands = at_once if condition.at_once else self.table.commands(cycles, whole=True)
+        config = SimulationConfig(base="free", time_step=self.options.step, contact_period=0.0, log_period=0.01)
+        (ours,) = simulate_batch([Job(model, config, commands, until, LEAD, name="gait")])
+        a, b = (self._measured(take, model, seconds)[0] for take in (ours, engine(model, commands, until)))
+        return a, b
 
     def _measured(self, take: Take, model: RobotModel, seconds: float) -> Measured:
         """As in the search, the heading settles in the first whole cycle; torque counts from power-on."""
         period, end = self.table.period, self._walked_until(seconds)
         begin = self.table.start_seconds + period
         feet = feet_measure(take, model, self.legs, begin, period, end)
-        return replace(measure(take, model, begin, period, end=end, since=0.0), clearance=feet.clearance), feet
+        return replace(measure(take, model, begin, period, end=end, since=0.0), clearance=feet.clearance, slip=feet.slip), feet
 
     def _walked_until(self, seconds: float) -> float:
         """When the last cycle ends [s]."""

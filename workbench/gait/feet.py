@@ -22,9 +22,9 @@ way by 0.3 mm, loaded twice as much by as much again."""
 
 @dataclass(frozen=True)
 class FeetMeasure:
-    """slip: mean speed over the ground of feet that touch it [m/s]. clearance: the least over feet and cycles of how high a foot
-    comes [m]. tipping: least angle [rad] between the base's tilt and that at which the middle between the neutral feet
-    carries the centre of mass over their edge."""
+    """slip: mean speed over the ground [m/s] of the points at which feet touch it, from row to row. clearance: the
+    least over feet and cycles of how high a foot comes [m]. tipping: least angle [rad] between the base's tilt and that at which
+    the middle between the neutral feet carries the centre of mass over their edge."""
 
     slip: float
     clearance: float
@@ -35,31 +35,36 @@ def feet_measure(take: Take, model: RobotModel, legs: tuple[Leg, ...], begin: fl
                  ) -> FeetMeasure:
     """Of a free take from `begin` [s] to `end` [s], in whole cycles of `period` [s]; tipping of all of it. Feet are
     where the model's kinematics put them; what counts of a tilted one is its lowest point."""
-    height, speed = _lowest(take, model, legs)
+    height, speed = _lowest(take, model, legs)  # speed (N-1, F), between rows
     inside = (take.time >= begin - 1e-9) & (take.time <= end + 1e-9)
     z = height - _floor(height, take.time < 0)
     down = (z < TOUCHING) & inside[:, None]
+    stays = down[1:] & down[:-1]  # a foot that lands between two rows has not slipped
     cycles = range(max(int((min(float(take.time[-1]), end) - begin) / period + 1e-6), 1))
     tops = [z[(take.time >= begin + k * period - 1e-9) & (take.time < begin + (k + 1) * period)].max(axis=0) for k in cycles]
-    return FeetMeasure(slip=float(speed[down].mean()) if down.any() else float("nan"),
+    return FeetMeasure(slip=float(speed[stays].mean()) if stays.any() else float("nan"),
                        clearance=float(np.min(tops)), tipping=_tipping_angle(model, legs) - _tilt(take))
 
 
 def _lowest(take: Take, model: RobotModel, legs: tuple[Leg, ...]) -> tuple[Array, Array]:
-    """Of each foot's lowest point: its height in W (N, F) [m] and its speed along the ground (N, F) [m/s]."""
+    """Of each foot's lowest point: its height in W (N, F) [m], and the speed along the ground (N-1, F) [m/s] at which the point
+    of the link that touches there moves until the next row; a foot that rolls does not slip."""
     assert take.p_WB is not None
     assert take.quat_WB is not None
     poses, R_WB = model.kinematics.forward(take.q, take.joints), quaternions.matrix(take.quat_WB)
-    height, speed = np.empty((len(take), len(legs))), np.empty((len(take), len(legs)))
+    height, speed = np.empty((len(take), len(legs))), np.empty((len(take) - 1, len(legs)))
     for i, leg in enumerate(legs):
         p, R = poses[leg.link]
-        p_B = p[:, None] + leg.spheres @ np.swapaxes(R, 1, 2)
-        p_W = take.p_WB[:, None] + np.einsum("nij,nsj->nsi", R_WB, p_B)
+        R_WL = R_WB @ R
+        p_W = (take.p_WB + np.einsum("nij,nj->ni", R_WB, p))[:, None] + leg.spheres @ np.swapaxes(R_WL, 1, 2)
         z = p_W[..., 2] - leg.radii
-        low = np.argmin(z, axis=1)[:, None]
-        along = np.linalg.norm(np.gradient(p_W[..., :2], take.time, axis=0), axis=2)
-        height[:, i] = np.take_along_axis(z, low, axis=1)[:, 0]
-        speed[:, i] = np.take_along_axis(along, low, axis=1)[:, 0]
+        rows, low = np.arange(len(take)), np.argmin(z, axis=1)
+        height[:, i] = z[rows, low]
+        moved = p_W[1:][rows[:-1], low[:-1]] - p_W[:-1][rows[:-1], low[:-1]]  # of the sphere's middle
+        down = np.swapaxes(R_WL[:-1], 1, 2)[..., 2]  # vertical in the link's frame
+        turned = np.einsum("nij,nj->ni", R_WL[1:], down)[:, :2]  # where that vertical points next
+        moved = moved[:, :2] - np.broadcast_to(leg.radii, z.shape)[rows[:-1], low[:-1], None] * turned
+        speed[:, i] = np.linalg.norm(moved, axis=1) / np.diff(take.time)
     return height, speed
 
 

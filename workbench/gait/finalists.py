@@ -1,31 +1,53 @@
-"""Of the best gaits of a search, the one that keeps its limits in the certificate's longer and finer run, too."""
+"""The best gaits of a search, one after the other, on robots that the search did not see: the first that holds is certified."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from workbench.gait.evaluate import SEARCH, Candidate, Evaluator
 from workbench.gait.examine import CertifyOptions
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
-from workbench.gait.search import Found, steered
+from workbench.gait.requirements import FALLS
+from workbench.gait.search import Found, Progress, steered
 from workbench.gait.space import space_of
+from workbench.robot import RobotModel
 
 
-def finely(machine: GaitMachine, request: Request, found: Found, options: CertifyOptions, memory: Path | None, n_jobs: int
-           ) -> Found:
-    """A search sees two seconds at 2 ms, in which a gait may not yet have found its rhythm. The best gaits are walked as long and
-    at the step that the certificate has, on the nominal robot, and steered by that; the first that keeps every limit is the best
-    then. Where none does, the search's best stays."""
-    evaluator = Evaluator(machine, request, (), memory, n_jobs, replace(SEARCH, time_step=options.step), options.seconds)
-    best = [found.best, *found.others]
-    walked = steered(evaluator, space_of(machine, request), evaluator.judged([c.shape for c in best], 0))
-    kept = [_with_draws(fine, c) for fine, c in zip(walked, best) if fine.good]
-    return replace(found, best=kept[0]) if kept else found
+@dataclass(frozen=True)
+class Screening:
+    """How finalists are tried before one is certified. rounds: on so many fresh robots in all, one round after the other; a
+    gait that breaks a limit in one meets no more. certified: how many gaits may be certified at most, which takes as long as a
+    small search. Fresh robots are neither the search's nor the certificate's."""
+
+    rounds: tuple[int, ...] = (8, 24)
+    certified: int = 3
 
 
-def _with_draws(fine: Candidate, c: Candidate) -> Candidate:
-    """What is known of a gait on the nominal robot, with what the search knows of it on others."""
-    told = {m.name for m in fine.margins}
-    return replace(fine, margins=(*fine.margins, *(m for m in c.margins if m.name not in told)), draws=c.draws, cost=c.cost)
+def finalists(machine: GaitMachine, request: Request, found: Found, fresh: Sequence[RobotModel], screening: Screening,
+              options: CertifyOptions, memory: Path | None, n_jobs: int, progress: Progress) -> Iterator[Candidate]:
+    """Gaits of a search that keep every limit as long and as finely as the certificate walks: trimmed on the nominal robot, then
+    in rounds on fresh ones. What breaks a limit comes, too, so that it can be said which; its `good` is false."""
+    config, space = replace(SEARCH, time_step=options.step), space_of(machine, request)
+    nominal = Evaluator(machine, request, (), memory, n_jobs, config, options.seconds)
+    others = Evaluator(machine, request, fresh, memory, n_jobs, config, options.draw_seconds)
+    candidates = [c for c in (found.best, *found.others) if c.nominal is not None]
+    for k, candidate in enumerate(candidates):
+        progress(f"finalist {k + 1} of {len(candidates)}: trimmed on the nominal robot", None)
+        (walked,) = steered(nominal, space, nominal.judged([candidate.shape], 0))
+        for count in screening.rounds:
+            if not walked.good or not fresh:
+                break
+            progress(f"finalist {k + 1} of {len(candidates)}: on {count} fresh robots", None)
+            (drawn,) = others.judged([walked.shape], count, list)
+            walked = _with_draws(walked, drawn)
+        yield walked
+
+
+def _with_draws(nominal: Candidate, drawn: Candidate) -> Candidate:
+    """What is known of a gait from the longer walk of the nominal robot, with what is known from others."""
+    own = {m.name for m in nominal.margins} - {FALLS}
+    margins = [m for m in nominal.margins if m.name in own] + [m for m in drawn.margins if m.name not in own]
+    return replace(nominal, margins=tuple(margins), draws=drawn.draws, cost=drawn.cost)

@@ -166,5 +166,7 @@ def _without(c: Commands, lost: int) -> Commands:
 def _after(before: Commands, c: Commands) -> Commands:
     """One schedule, then another."""
     c = c.reordered(before.joints)
-    rows = {f: np.concatenate([getattr(before, f), getattr(c, f)]) for f in ("goals", "speeds", "enabled", "poses")}
-    return Commands(times=np.concatenate([before.times, c.times + before.end]), joints=c.joints, end=before.end + c.end, **rows)
+    goals, speeds, enabled, poses = (np.concatenate([getattr(before, f), getattr(c, f)])
+                                     for f in ("goals", "speeds", "enabled", "poses"))
+    return Commands(np.concatenate([before.times, c.times + before.end]), c.joints, goals, speeds, enabled, before.end + c.end,
+                    poses, before.begun)

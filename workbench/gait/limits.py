@@ -27,12 +27,15 @@ class GaitLimits:
     torque-speed line that may be used for 10 ms or longer; the rest of it is where a servo stops following. fuse: supply current
     [A] (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
     links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
-    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. bus: bit rate of the
-    servo bus [1/s]. tilt: of the base [rad], 30 deg, where the feet's track no longer holds the centre of mass over them. drift:
-    change of heading by distance on the nominal robot [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn
-    that comes from a robot's own zero offsets and latency is seen on its first metre, and a table of another `turn` corrects it:
-    0.06 rad a stance took 25 and 40 deg/m out of two gaits, one forward and one backward. aside: sideways speed by forward speed.
-    back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
+    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
+    ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides hangs on friction, which is known
+    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.3 to
+    0.45 of the speed in every gait that was found. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where
+    the feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot
+    [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and
+    latency is seen on its first metre, and another `turn` corrects it: 0.06 rad a stance took 25 and 40 deg/m out of two gaits,
+    one forward and one backward. aside: sideways speed by forward speed. back: cycles within which the gait walks as before
+    when it was entered or disturbed otherwise: 8, two to four seconds.
     """
 
     rms: float | None = None
@@ -41,6 +44,8 @@ class GaitLimits:
     reach: float = 1e-3
     clearance: float = 2e-3
     lift: float = 3e-3
+    slip: float = 0.3
+    slip_on_draws: float = 0.6
     bus: float = 1e6
     tilt: float = float(np.radians(30))
     drift: float = float(np.radians(3))
@@ -119,10 +124,15 @@ def run_margins(machine: GaitMachine, measure: GaitMeasure, limits: GaitLimits) 
         out.append(_of("torque-speed line", joint, 100 * measure.torque_use[i], 100 * limits.torque, "% of what it has"))
         out.append(_of("RMS torque, ROBOTIS's fifth", joint, measure.rms[i], float(law.full_torque[i]) / 5, "N m", advice=True))
     if np.isfinite(measure.clearance):
-        out.append(least("foot clearance", "robot", 1000 * measure.clearance, 1000 * limits.lift, "mm"))
+        out.append(clearance_margin(limits, measure))
     out.append(_of("supply current", "robot", measure.peak_current, limits.fuse, "A"))
     out.append(_of("tilt", "robot", float(np.degrees(measure.tilt)), float(np.degrees(limits.tilt)), "deg"))
     return out
+
+
+def clearance_margin(limits: GaitLimits, m: GaitMeasure) -> Margin:
+    """How high the foot that is lifted least comes, at least once in each cycle."""
+    return least("foot clearance", "robot", 1000 * m.clearance, 1000 * limits.lift, "mm")
 
 
 def return_margin(cycle: LimitCycle, limits: GaitLimits) -> Margin:

@@ -15,7 +15,7 @@ from workbench.files import InputError
 from workbench.gait.legs import Leg, legs_of
 from workbench.gait.self_contact import SelfContact
 from workbench.gait.shape import GaitShape, foot_path
-from workbench.robot import RobotModel
+from workbench.robot import GRAVITY, RobotModel
 from workbench.robot.ranges import JointRange, joint_ranges
 from workbench.robot.servo_units import ServoUnits, units_of
 from workbench.servo import ServoLaw
@@ -74,6 +74,17 @@ class GaitMachine:
     def leg_length(self) -> float:
         """Of the shortest leg in neutral [m]."""
         return min(leg.length for leg in self.legs)
+
+    @cached_property
+    def arm(self) -> float:
+        """Mean distance of the neutral feet from the middle between them, along the floor [m]."""
+        feet = np.array([leg.neutral[:2] for leg in self.legs])
+        return float(np.linalg.norm(feet - feet.mean(axis=0), axis=1).mean())
+
+    @property
+    def natural_speed(self) -> float:
+        """Root of gravity times leg length [m/s], by which speeds of robots of different sizes compare."""
+        return float(np.sqrt(GRAVITY * self.leg_length))
 
     @cached_property
     def units(self) -> tuple[ServoUnits, ...]:

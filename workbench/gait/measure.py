@@ -40,8 +40,10 @@ class GaitMeasure:
     rms: of each joint's torque, by the model's joints; torque_use: largest lasting share of the torque-speed line; speed_use:
     largest share of the no-load speed. current: mean of the supply; peak_current: largest over FUSE_WINDOW. power: mean,
     electrical; mechanical: mean of what the joints give out. jerk: RMS of the base's [m/s^3]. clearance: the least over feet and
-    cycles of how high a foot comes [m]; NaN where nobody looked. peak: of each joint, the largest torque that lasts LASTING, over
-    the same time as torque_use. scatter: from one of the cycles to the next, as `Scatter`.
+    cycles of how high a foot comes [m]; slip: mean speed over the ground of feet that touch it [m/s]; both NaN where nobody
+    looked. peak: of each joint, the largest torque that lasts LASTING, over the same time as torque_use. scatter: from one of the
+    cycles to the next, as `Scatter`. touched: whether something other than a foot touched the floor, or links each other, in a
+    run that was not a fall.
     """
 
     fell: bool
@@ -60,8 +62,10 @@ class GaitMeasure:
     mechanical: float
     jerk: float
     clearance: float = math.nan
+    slip: float = math.nan
     peak: tuple[float, ...] = ()
     scatter: tuple[float, float] = (math.nan, math.nan)
+    touched: bool = False
 
     @property
     def speed(self) -> float:
@@ -108,7 +112,8 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
     left = float((step[:, 1] * np.cos(middle) - step[:, 0] * np.sin(middle)).sum() / seconds)
     whole = p[-1, :2] - p[0, :2]
     law = law_of(model)
-    torque, v = take.torque[inside], take.v[inside]
+    rates = servo_rates(take)
+    torque, v = take.torque[inside], rates[inside]
     unknown = np.full(len(take), np.nan)
     scatter = scatter_of(cycles_of(take, begin, period, end))
     current, power = supply(take, model, law) if electrical else (unknown, unknown)
@@ -119,12 +124,18 @@ def measure(take: Take, model: RobotModel, begin: float, period: float, electric
         fell=fell, velocity=(forward, left), turn_rate=float((h[-1] - h[0]) / seconds), gone=float(np.hypot(*whole)),
         drift=float(h[-1] - h[0]), lateral=float(whole[1] * np.cos(heading[0]) - whole[0] * np.sin(heading[0])),
         tilt=float(np.arccos(np.clip(up.min(), -1, 1))), rms=_floats(np.sqrt((torque**2).mean(axis=0))),
-        torque_use=_floats(_torque_use(law, take.torque[counted], take.v[counted], every)),
+        torque_use=_floats(_torque_use(law, take.torque[counted], rates[counted], every)),
         speed_use=_floats(np.quantile(np.abs(v), 0.995, axis=0) * law.back_emf / law.full_torque),
         current=float(current[inside].mean()), peak_current=float(smooth[take.time >= 0].max()),
         power=float(power[inside].mean()), mechanical=float(np.maximum(torque * v, 0).sum(axis=1).mean()),
         jerk=base_jerk(time, p), peak=_floats(_lasting(np.abs(take.torque[counted]), every)),
         scatter=(scatter.speed, scatter.heading))
+
+
+def servo_rates(take: Take) -> Array:
+    """Speeds (N, n) [rad/s] of the servos themselves; links behind play are seen to go faster for moments."""
+    assert take.v is not None
+    return take.v if take.servo_q is None else np.asarray(np.gradient(take.servo_q, take.time, axis=0))
 
 
 def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
@@ -140,7 +151,7 @@ def supply(take: Take, model: RobotModel, law: ServoLaw) -> tuple[Array, Array]:
         duty = law.duty(-q)
     else:
         duty = law.duty(played(take.commands.reordered(take.joints), model).reference(take.time) - q)
-    motor = duty * law.full_torque - law.back_emf * take.v
+    motor = duty * law.full_torque - law.back_emf * servo_rates(take)
     ampere = np.array([model.servo(j).stall_torque for j in model.joints]) / STALL_CURRENT
     voltage = law.full_torque / law.torque_per_volt
     drawn = np.maximum(duty * motor / ampere, 0.0)

@@ -18,15 +18,16 @@ from workbench.files.option_checks import check_whole
 from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
 from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
-from workbench.gait.finalists import finely
-from workbench.gait.limits import Margin, binding
+from workbench.gait.finalists import Screening, finalists
+from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.planned import planned_seeds
 from workbench.gait.request import Request
-from workbench.gait.search import Budget, Found, search
+from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import GaitTable, gait_table
 from workbench.motion import Motion, load_motion
@@ -40,13 +41,13 @@ MEMORY = ".rollouts.jsonl"
 """Where a folder remembers what its searches have simulated."""
 
 
-IN_HAND = 0.02
-"""By which a search goes beyond the required speed: twice what 2 ms and 1 ms differ by."""
-DRIFT_SHARE = 0.6
-"""Of the drift allowed that a search allows itself: over two seconds instead of six heading is less well known."""
-SPREAD_SHARE = 0.7
-"""Of the drift over draws allowed, likewise: other robots are drawn for the certificate."""
-FIRST_LOOK = Budget(seeds=60, starts=2, generations=4, robust=0, draws=0)
+IN_HAND = 0.05
+"""By which a search goes beyond the required speed, which the certificate asks for after its numerical floor."""
+DRIFT_SOUGHT = 10.0
+"""Times the drift allowed on the nominal robot that a search allows itself: what a gait turns evenly is trimmed afterwards."""
+SCREENED = 1_000_000
+"""Seed of the finalists' robots, beyond those of searches and certificates."""
+FIRST_LOOK = Budget(seeds=60, screened=6, starts=2, generations=4, draws=4)
 """Beside a refusal: what works instead, in half a minute."""
 BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, variants=("2 ms", "1 ms", "0.5 ms"))
 """How the nearest table beside a refusal is examined at most, so that a refusal comes within a minute."""
@@ -57,6 +58,7 @@ class OptimizeOptions:
     """How long and from where a gait is searched for. budget: size of the search. certify: the examination at the end. seed: of
     the search; the draws of the search and those of the certificate come from it and differ. n_jobs: threads and processes that
     simulate. given: gaits to start from; planned: whether the search also starts from solved kino-centroidal programmes.
+    screening: how the search's best are tried on fresh robots before the certificate.
     InputError for a number out of range."""
 
     budget: Budget = field(default_factory=Budget)
@@ -65,6 +67,7 @@ class OptimizeOptions:
     n_jobs: int = 2
     given: tuple[GaitShape, ...] = ()
     planned: bool = True
+    screening: Screening = field(default_factory=Screening)
 
     def __post_init__(self) -> None:
         check_whole(self, seed=0, n_jobs=1)
@@ -95,34 +98,76 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
     impossible = out_of_reach(machine, request)
     if impossible is not None:
         return _instead(machine, request, impossible, ensemble, options, progress, other)
-    began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
-        draws = ensemble.draws(machine.model, options.budget.draws, 2 * options.seed, Path(folder))
-        evaluator = Evaluator(machine, sought(request), draws, memory, options.n_jobs)
+        draws = _Draws(ensemble, machine.model, options, Path(folder))
+        began = time.monotonic()
+        evaluator = Evaluator(machine, sought(request), draws.searched(), memory, options.n_jobs)
         if options.planned:
             progress("planning seeds", 0.0)
         planned = planned_seeds(machine, request) if options.planned else ()
         found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
-        if not found.best.good:  # it may keep the request all the same, with a smaller reserve than the search requires
-            again = Evaluator(machine, request, draws, memory, options.n_jobs)
-            (best,) = again.judged([found.best.shape], options.budget.draws, list)
-            found = replace(found, best=best) if best.good else found
-        if found.best.good:
-            progress("the best gaits as the certificate walks them", None)
-            found = finely(machine, request, found, options.certify, memory, options.n_jobs)
-        chosen = found.best if found.best.good else found.nearest
-        if chosen is None:
-            return Optimized(request, False, _unmet(request, found, None), None, None, found)
-        fresh = ensemble.draws(machine.model, options.certify.draws, 2 * options.seed + 1, Path(folder))
-        table = gait_table(machine, chosen.shape)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
             "ensemble_sha256": ensemble.sha256, "generations": found.generations, "rollouts": found.rollouts,
             "searched in": round(time.monotonic() - began, 1)}
-        examined = options.certify if found.best.good else _briefly(options.certify)
-        certified = certify(machine, request, table, fresh, examined, progress, provenance, other)
-    met = found.best.good and certified.certificate.kept
-    return Optimized(request, met, "" if met else _unmet(request, found, certified), table, certified, found)
+
+        def examine(shape: GaitShape, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
+            table = gait_table(machine, shape)
+            said = {**provenance, "finalist": finalist}
+            return table, certify(machine, request, table, draws.certifying(), examined, progress, said, other)
+
+        refused: list[Candidate] = []
+        certified: list[tuple[GaitTable, Certified]] = []
+        tried = finalists(machine, request, found, draws.screening(), options.screening, options.certify, memory, options.n_jobs,
+                          progress)
+        for k, walked in enumerate(tried):
+            if not walked.good:
+                refused.append(walked)
+                continue
+            certified.append(examine(walked.shape, options.certify, k + 1))
+            if certified[-1][1].certificate.kept:
+                return Optimized(request, True, "", *certified[-1], replace(found, best=walked))
+            if len(certified) == options.screening.certified:
+                break
+        if certified:
+            table, best = min(certified, key=lambda c: violation(c[1].certificate.margins))
+            return Optimized(request, False, _unmet(request, best.certificate.margins, None), table, best, found)
+        binds = min(refused, key=Candidate.rank, default=found.best)
+        nearest = _nearest(found, refused)
+        said = _unmet(request, binds.margins, nearest)
+        if nearest is None:
+            return Optimized(request, False, said, None, None, found)
+        return Optimized(request, False, said, *examine(nearest.shape, _briefly(options.certify), 0), found)
+
+
+@dataclass(frozen=True)
+class _Draws:
+    """Robots of the ensemble for each stage of a request, none of which meets another stage's."""
+
+    ensemble: Ensemble
+    model: RobotModel
+    options: OptimizeOptions
+    folder: Path
+
+    def searched(self) -> list[RobotModel]:
+        """Those of the search."""
+        return self.ensemble.draws(self.model, self.options.budget.draws, 2 * self.options.seed, self.folder)
+
+    def screening(self) -> list[RobotModel]:
+        """Those of the finalists."""
+        count = max(self.options.screening.rounds, default=0)
+        return self.ensemble.draws(self.model, count, SCREENED + self.options.seed, self.folder)
+
+    def certifying(self) -> list[RobotModel]:
+        """Those of the certificate."""
+        return self.ensemble.draws(self.model, self.options.certify.draws, 2 * self.options.seed + 1, self.folder)
+
+
+def _nearest(found: Found, refused: Sequence[Candidate]) -> Candidate | None:
+    """The fastest gait that keeps every limit but the speed, if there is one; as the certificate walks rather than as the search
+    does."""
+    slow = [c for c in refused if c.nominal is not None and keeps_all_but_speed(c)]
+    return min(slow, key=Candidate.rank, default=found.nearest)
 
 
 def _briefly(options: CertifyOptions) -> CertifyOptions:
@@ -132,11 +177,10 @@ def _briefly(options: CertifyOptions) -> CertifyOptions:
 
 
 def sought(request: Request) -> Request:
-    """The requirements of a search, stricter than the request, so that its gait keeps the request in the certificate's longer and
-    finer runs, too."""
+    """The requirements of a search: more speed than requested, so that its gait keeps the request in the certificate's longer and
+    finer runs, too, and straight enough to be trimmed."""
     speed = None if request.speed is None else request.speed * (1 + IN_HAND)
-    return replace(request, speed=speed, limits=replace(
-        request.limits, drift=DRIFT_SHARE * request.limits.drift, spread=SPREAD_SHARE * request.limits.spread))
+    return replace(request, speed=speed, limits=replace(request.limits, drift=DRIFT_SOUGHT * request.limits.drift))
 
 
 def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensemble: Ensemble, options: OptimizeOptions,
@@ -207,25 +251,21 @@ def shape_from(content: dict[str, Any]) -> GaitShape:
     return GaitShape(**{**content, "knees": tuple(content["knees"])})
 
 
-def _unmet(request: Request, found: Found, certified: Certified | None) -> str:
+def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
     """In a line: what binds, by how much, and what works."""
     said = f"{request}: not met"
-    limits: Sequence[Margin] = found.best.margins
-    if found.best.good and certified is not None:
-        limits = certified.certificate.margins
-    limit = binding(_without_speed(limits, found)) if not found.best.good else binding(limits)
+    limit = binding(_without_speed(margins))
     if limit is not None:
         said += f"; {limit} binds" + (f" ({100 * (limit.use - 1):+.0f} %)" if limit.limit else "")
-    if found.nearest is not None and not found.best.good:
-        said += f"; the nearest table that keeps every limit goes {_speed(request, found.nearest)}"
+    if nearest is not None:
+        said += f"; the nearest table that keeps every limit goes {_speed(request, nearest)}"
     return said
 
 
-def _without_speed(margins: Sequence[Margin], found: Found) -> list[Margin]:
+def _without_speed(margins: Sequence[Margin]) -> list[Margin]:
     """Of a gait that is too slow: what keeps it from being faster, if something else is at its limit."""
-    others = [m for m in margins if not m.name.startswith("speed")]
-    tight = [m for m in others if m.use > 0.97 and not m.advice]
-    return tight if tight and found.best.nominal is not None else list(margins)
+    tight = [m for m in margins if not m.name.startswith("speed") and m.use > 0.97 and not m.advice]
+    return tight or list(margins)
 
 
 def _speed(request: Request, c: Candidate) -> str:
@@ -239,7 +279,7 @@ def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
     budget, examined = Budget(), CertifyOptions(n_jobs=n_jobs)
     scale = effort / 4
     budget = replace(budget, seeds=round(budget.seeds * min(scale, 2.0)), generations=max(3, round(budget.generations * scale)),
-                     robust=max(3, round(budget.robust * scale)), draws=4 if effort == 1 else budget.draws)
+                     draws=4 if effort == 1 else budget.draws)
     if effort == 1:
-        examined = replace(examined, draws=8, checked=0, seconds=4.0)
+        examined = replace(examined, draws=FEWEST, checked=0, seconds=4.0)
     return OptimizeOptions(budget, examined, seed, n_jobs)

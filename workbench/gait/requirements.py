@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from workbench.gait.limits import Margin, least
+from workbench.gait.limits import Margin, allowed_rms, least
+from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
 from workbench.gait.request import Request
+from workbench.robot import GRAVITY
 
+SPREAD_COST = 0.085
+"""Cost of a spread of heading by its size in rad/m: 10 deg/m of it are worth 2 cm/s to the puppy."""
+MOST_SPREAD = float(np.radians(90))
+"""Of one robot [rad/m]: beyond a quarter turn in a metre more is not worse."""
+FALLS = "falls"
+"""Name of the limit on falls, which counts the nominal robot and all draws."""
 STANDING = 0.03
 """Speed [m/s] that a turn in place may have."""
 SLOWEST = 0.02
@@ -51,7 +60,7 @@ def excess_turning(request: Request, m: GaitMeasure) -> float:
 def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:
     """Whether the required speed is reached, on the nominal robot and over draws; whether draws fall or change their heading."""
     fell, count = sum(m.fell for m in (nominal, *draws)), 1 + len(draws)
-    out = [Margin("falls", f"of {count} robots", float(fell), 0.0, "allowed", 1.0 + FALLEN * fell / count if fell else 0.0)]
+    out = [Margin(FALLS, f"of {count} robots", float(fell), 0.0, "allowed", 1.0 + FALLEN * fell / count if fell else 0.0)]
     if request.speed is not None:
         out.append(least("speed", "robot", request.progress(nominal), request.speed, request.unit))
     if draws:
@@ -64,15 +73,37 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
     return out
 
 
-def cost(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure], worst_rms: float) -> float:
-    """What is made small among gaits that keep all limits. worst_rms: largest RMS torque, as a share of its limit."""
+def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, Any]) -> list[Margin]:
+    """The required speed again, less what the step moves it. floor: of a certificate."""
+    if request.speed is None:
+        return []
+    surely = request.progress(nominal) - float(floor["steps"])
+    return [least("speed less its numerical floor", "robot", surely, request.speed, request.unit)]
+
+
+def cost(machine: GaitMachine, request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> float:
+    """What is made small among gaits that keep all limits, without unit: speed by the robot's natural one, power by weight times
+    that, jerk by gravity times that by leg length, RMS torque by its limit; and how much headings differ over draws."""
+    spread = SPREAD_COST * heading_spread(request, nominal, draws)
+    natural, gravity = machine.natural_speed, GRAVITY
     if request.aim == "speed":
-        return -worse_half([request.progress(m) for m in (draws or [nominal])])
+        natural = natural / machine.arm if request.way == "turn" else natural
+        return spread - worse_half([request.progress(m) for m in (draws or [nominal])]) / natural
     if request.aim == "energy":
-        return nominal.power
+        return spread + nominal.power / (machine.model.kinematics.mass * gravity * natural)
     if request.aim == "smoothness":
-        return nominal.jerk
-    return worst_rms
+        return spread + nominal.jerk / (gravity * natural / machine.leg_length)
+    return spread + max(r / a for r, a in zip(nominal.rms, allowed_rms(machine, request.limits)))
+
+
+def heading_spread(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> float:
+    """RMS over draws [rad/m] of the heading by distance that they change more than the nominal robot, which is what `turn` cannot
+    correct for all of them; a fall counts as MOST_SPREAD."""
+    if not draws or request.way == "turn":
+        return 0.0
+    middle = drift(request, nominal)
+    apart = [MOST_SPREAD if m.fell else min(abs(drift(request, m) - middle), MOST_SPREAD) for m in draws]
+    return float(np.sqrt(np.mean(np.square(apart))))
 
 
 def worse_half(values: Sequence[float]) -> float:

@@ -1,8 +1,10 @@
-"""The search for a gait: random seeds, then CMA-ES over the ensemble, deterministic by seed."""
+"""The search for a gait: random seeds, then CMA-ES over the ensemble from the first generation, deterministic by seed."""
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,12 +24,14 @@ STRAYING = ("drift", "curvature off the arc")
 STEERED = 2
 """How often a gait is steered before the next generation."""
 APART = 0.4
-"""Distance in the unit cube from which two gaits differ, less than half of what two of a first generation are apart: how a gait
-stands other robots hangs on small things, so that it is looked for in many."""
-NARROW = 0.5
-"""Width of the search over the ensemble, by that on the nominal robot: it begins at a good gait."""
-FEW = 3 / 8
-"""Share of the ensemble's robots on which half of a generation is tried, before the better half of that is tried on all."""
+"""Distance in the unit cube from which two gaits differ, less than half of what two of a first generation are apart: finalists
+should not all fail for the same reason."""
+TRIED = 0.6
+"""Share of a generation, the better on the nominal robot, that is tried on the ensemble's robots."""
+ALIKE = 4
+"""How many seeds of one family and one way of the knees are tried on the ensemble's robots."""
+IN_TURN = 3
+"""Generations of each start before the best of them goes on alone."""
 Progress = Callable[[str, float | None], None]
 
 
@@ -36,35 +40,34 @@ class Budget:
     """Size of the search, in numbers of gaits and not in seconds, so that the same seed ends in the same table. InputError for a
     number out of range.
 
-    seeds: random gaits at first. starts: the best of them, of different families or knees, from which CMA-ES goes on.
-    population, generations: of each start, on the nominal robot; then `robust` generations, over `draws` robots of the
-    ensemble, from the one that does best on them of `pool` good gaits that differ. width: first standard deviation in the
-    unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit. hopeless: it
-    ends before the ensemble comes in if the best gait has less than this share of the speed, which no robust generations have
-    been seen to make up for. finalists: gaits that may go to the certificate.
+    seeds: random gaits at first, on the nominal robot. screened: the best of them, which are tried on `draws` robots of the
+    ensemble. starts: the best of those, of different families or knees, from which CMA-ES goes on. population: of each
+    generation, all on the nominal robot, the better on the ensemble too. generations: in all. width: first standard deviation
+    in the unit cube. enough: a search for a given speed ends after so many generations in a row that kept every limit.
+    hopeless: it ends halfway if the best gait has less than this share of the speed. finalists: gaits that may go to the
+    certificate.
     """
 
-    seeds: int = 100
-    starts: int = 3
+    seeds: int = 120
+    screened: int = 14
+    starts: int = 2
     population: int = 12
-    generations: int = 12
-    robust: int = 24
-    draws: int = 16
-    pool: int = 12
-    width: float = 0.15
+    generations: int = 24
+    draws: int = 8
+    width: float = 0.12
     enough: int = 3
     hopeless: float = 0.6
-    finalists: int = 12
+    finalists: int = 8
 
     def __post_init__(self) -> None:
-        check_whole(self, seeds=1, starts=1, population=2, generations=0, robust=0, draws=0, pool=1, enough=1, finalists=1)
+        check_whole(self, seeds=1, screened=1, starts=1, population=2, generations=0, draws=0, enough=1, finalists=1)
         check_positive(self, "width")
 
 
 @dataclass(frozen=True)
 class Found:
     """What a search ended with. best: the best gait; nearest: the best that keeps all limits but the required speed, if `best`
-    does not keep that; generations and rollouts: how many it took; others: that keep every limit, too, the best first."""
+    does not keep that; generations and rollouts: how many it took; others: that come next and differ, the best first."""
 
     best: Candidate
     nearest: Candidate | None
@@ -83,18 +86,13 @@ def search(evaluator: Evaluator, budget: Budget, seed: int, progress: Progress, 
     space = space_of(evaluator.machine, evaluator.request)
     run = _Run(evaluator, budget, space, progress)
     shapes = [*given, *seeds(evaluator.machine, evaluator.request, space, budget.seeds, seed)]
-    started = run.seeded(shapes)
-    runs = [_Refiner(run, c, seed + 1 + k, budget.width) for k, c in enumerate(started)]
-    for k in range(budget.generations * len(runs)):
-        runs[k % len(runs)].generation(0)
-        if run.enough():
+    runs = [_Refiner(run, c, seed + 1 + k) for k, c in enumerate(run.seeded(shapes))]
+    for k in range(budget.generations):
+        together = k < IN_TURN * len(runs)
+        refiner = runs[k % len(runs)] if together else min(runs, key=lambda r: r.best.rank())
+        refiner.generation()
+        if run.enough() or (2 * k >= budget.generations and run.hopeless()):
             break
-    if budget.robust and evaluator.draws and not run.hopeless():
-        refiner = _Refiner(run, run.most_robust(runs), seed + 1 + len(runs), NARROW * budget.width)
-        for _ in range(budget.robust):
-            refiner.generation(budget.draws)
-            if run.enough():
-                break
     assert run.best is not None
     return Found(run.best, run.nearest, run.generation, evaluator.rollouts, run.others())
 
@@ -107,59 +105,56 @@ class _Run:
         self.best: Candidate | None = None
         self.nearest: Candidate | None = None
         self.generation = 0
+        self.draws = min(budget.draws, len(evaluator.draws))
         self._streak = 0
-        self._robust = False
-        self._good: list[Candidate] = []
-        robust = budget.robust if evaluator.draws else 0
-        self._all = budget.starts * budget.generations + robust
+        self._seen: list[Candidate] = []
 
     def seeded(self, shapes: Sequence[GaitShape]) -> list[Candidate]:
-        """The best seeds, each of another family or another way of the knees."""
+        """Where to start: what does best on the ensemble of the best seeds, each of another family or another way of the
+        knees."""
         judged: list[Candidate] = []
         for k in range(0, len(shapes), 40):
-            self.progress(f"seeds {k} of {len(shapes)}{self._told()}", 0.0)
+            self.progress(f"seeds {k} of {len(shapes)}", 0.0)
             judged += steered(self.evaluator, self.space, self.evaluator.judged(shapes[k:k + 40], 0))
-            self._note(judged[k:])
-        out: list[Candidate] = []
+        screened: list[Candidate] = []
+        kinds = Counter[tuple[str, tuple[int, int]]]()
         for c in sorted(judged, key=Candidate.rank):
-            if all((c.shape.family, c.shape.knees) != (o.shape.family, o.shape.knees) for o in out):
+            kinds[_kind(c)] += 1
+            if kinds[_kind(c)] <= ALIKE and len(screened) < self.budget.screened:
+                screened.append(c)
+        self.progress(f"{len(screened)} gaits on {self.draws} robots of the ensemble", None)
+        tried = self.tried(screened)
+        self._note(tried)
+        out: list[Candidate] = []
+        for c in sorted(tried, key=Candidate.rank):
+            if all(_kind(c) != _kind(o) for o in out):
                 out.append(c)
         return out[:self.budget.starts]
 
-    def note_generation(self, candidates: list[Candidate]) -> None:
+    def tried(self, candidates: Sequence[Candidate]) -> list[Candidate]:
+        """Each on the robots of the ensemble, those apart that do not even walk on the nominal one."""
+        return self.evaluator.judged([c.shape for c in candidates], self.draws, list) if self.draws else list(candidates)
+
+    def note_generation(self, candidates: Sequence[Candidate]) -> None:
         """After a generation: keeps the best, reports it."""
         self._note(candidates)
         self.generation += 1
         assert self.best is not None
         self._streak = self._streak + 1 if self.best.good else 0
-        self.progress(f"generation {self.generation} of {self._all}{self._told()}", self.generation / self._all)
-
-    def most_robust(self, runs: Sequence[_Refiner]) -> Candidate:
-        """Of the best of each run, and of good gaits that differ, the one that does best on the ensemble; from here on only what
-        was tried on it counts."""
-        pool = self._different([r.best for r in runs])
-        self.progress(f"ensemble: {len(pool)} gaits on {self.budget.draws} robots{self._told()}", None)
-        self._streak, self._robust, self._good, self.best, self.nearest = 0, True, [], None, None
-        tried = raced(self.evaluator, pool, self.budget.draws, all_of_them=True)
-        self._note(tried)
-        first = tried[_ordered(tried)[0]]
-        self.best = self.best or first
-        return first
-
-    def _different(self, pool: list[Candidate]) -> list[Candidate]:
-        """These, and the best of what kept all limits so far, as long as they are apart from those before them."""
-        for c in sorted(self._good, key=Candidate.rank):
-            if len(pool) >= self.budget.pool:
-                break
-            alike = [o for o in pool if (o.shape.family, o.shape.knees) == (c.shape.family, c.shape.knees)]
-            point = self.space.point(c.shape)
-            if all(np.linalg.norm(point - self.space.point(o.shape)) > APART for o in alike):
-                pool.append(c)
-        return pool
+        done = self.generation / self.budget.generations
+        self.progress(f"generation {self.generation} of {self.budget.generations}{self._told()}", done)
 
     def others(self) -> tuple[Candidate, ...]:
-        """What keeps every limit beside the best."""
-        return tuple(c for c in sorted(self._good, key=Candidate.rank) if c is not self.best)[:self.budget.finalists - 1]
+        """What comes next and differs from what comes before it."""
+        out = [] if self.best is None else [self.best]
+        for c in sorted(self._seen, key=Candidate.rank):
+            if len(out) >= self.budget.finalists:
+                break
+            alike = [o for o in out if _kind(c) == _kind(o)]
+            point = self.space.point(c.shape)
+            if c.nominal is not None and all(np.linalg.norm(point - self.space.point(o.shape)) > APART for o in alike):
+                out.append(c)
+        return tuple(out[1:])
 
     def hopeless(self) -> bool:
         """Whether the required speed is far from what was found."""
@@ -173,14 +168,18 @@ class _Run:
         request = self.evaluator.request
         return request.speed is not None and request.aim == "speed" and self._streak >= self.budget.enough
 
-    def _note(self, candidates: list[Candidate]) -> None:
-        told = [c for c in candidates if len(c.draws) >= self.budget.draws or not self._robust]
-        self._good += [c for c in told if c.good]
-        for c in told:
-            if self.best is None or c.rank() < self.best.rank():
+    def _note(self, candidates: Sequence[Candidate]) -> None:
+        told = [c for c in candidates if len(c.draws) >= self.draws]
+        self._seen += told
+        for c in told or candidates:
+            if self.best is None or (self._known(c), *c.rank()) < (self._known(self.best), *self.best.rank()):
                 self.best = c
-            if _slow_only(c) and (self.nearest is None or self._speed(c) > self._speed(self.nearest)):
+            if keeps_all_but_speed(c) and (self.nearest is None or self._speed(c) > self._speed(self.nearest)):
                 self.nearest = c
+
+    def _known(self, c: Candidate) -> bool:
+        """Sorts what was tried on the ensemble first."""
+        return len(c.draws) < self.draws
 
     def _speed(self, c: Candidate) -> float:
         assert c.nominal is not None
@@ -197,39 +196,48 @@ class _Run:
         return f": {said}{broken}; binds: {limit}" if limit else f": {said}"
 
 
-def _slow_only(c: Candidate) -> bool:
+def _kind(c: Candidate) -> tuple[str, tuple[int, int]]:
+    return c.shape.family, c.shape.knees
+
+
+def keeps_all_but_speed(c: Candidate) -> bool:
     """Whether a gait keeps every limit, speed apart."""
     return c.nominal is not None and all(m.use <= 1 or m.advice or m.name.startswith("speed") for m in c.margins)
 
 
 class _Refiner:
-    """One CMA-ES, whose constraints are kept by rank: a gait that breaks a limit comes after all that break none."""
+    """One CMA-ES over the ensemble: what was tried on it comes first, by cost and what it breaks."""
 
-    def __init__(self, run: _Run, start: Candidate, seed: int, width: float) -> None:
+    def __init__(self, run: _Run, start: Candidate, seed: int) -> None:
         self._run, self._family, self._knees = run, start.shape.family, start.shape.knees
         self.best = start
         options = {"popsize": run.budget.population, "seed": seed, "bounds": [0.0, 1.0], "verbose": -9, "verb_log": 0,
                    "integer_variables": [], "maxiter": 10**6, "tolstagnation": 10**6, "tolfun": 0, "tolx": 0, "tolfunhist": 0}
         x0 = np.clip(run.space.point(start.shape), 0.02, 0.98)
-        self._strategy = cma.CMAEvolutionStrategy(x0, width, options)
+        self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
 
-    def generation(self, draws: int) -> None:
-        """One generation, on the nominal robot, and what is best of it on `draws` more."""
+    def generation(self) -> None:
+        """One generation on the nominal robot, and its better part on the ensemble."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
         judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
         judged = steered(run.evaluator, run.space, judged)
-        if draws:
-            judged = raced(run.evaluator, judged, draws)
-        order = _ordered(judged)
+        better = sorted(range(len(judged)), key=lambda k: judged[k].merit)[:math.ceil(TRIED * len(judged))]
+        better = [k for k in better if judged[k].nominal is not None]
+        for k, c in zip(better, run.tried([judged[k] for k in better])):
+            judged[k] = c
+        order = sorted(range(len(judged)), key=lambda k: (k not in better, judged[k].merit))
         cost = np.empty(len(judged))
         cost[order] = np.arange(len(judged))
         if "turn" in run.space.names:
+            at = run.space.names.index("turn")
             for x, c in zip(points, judged):
-                x[run.space.names.index("turn")] = run.space.point(c.shape)[run.space.names.index("turn")]
-        self._strategy.tell(points, cost.tolist())
-        run.note_generation(judged)
-        self.best = min(self.best, *judged, key=Candidate.rank)
+                x[at] = run.space.point(c.shape)[at]
+        with warnings.catch_warnings():  # steering moves points on purpose
+            warnings.simplefilter("ignore", cma.evolution_strategy.InjectionWarning)
+            self._strategy.tell(points, cost.tolist())
+        run.note_generation([judged[k] for k in better] or judged)
+        self.best = min(self.best, *(judged[k] for k in better), key=Candidate.rank) if better else self.best
 
 
 def steered(evaluator: Evaluator, space: Space, candidates: list[Candidate]) -> list[Candidate]:
@@ -263,18 +271,3 @@ def _straight(request: Request, c: Candidate, before: Candidate | None) -> float
         if change * turned > 0:
             return c.shape.turn - excess * turned / change
     return c.shape.turn - excess * c.table.period * c.shape.duty
-
-
-def raced(evaluator: Evaluator, candidates: list[Candidate], draws: int, all_of_them: bool = False) -> list[Candidate]:
-    """The candidates with their better half, or all, tried on some robots of the ensemble, and the best quarter on `draws`."""
-    out = list(candidates)
-    for count, share in ((max(1, round(FEW * draws)), 1 if all_of_them else 2), (draws, 4)):
-        kept = _ordered(out)[:-(-len(out) // share)]
-        for k, c in zip(kept, evaluator.judged([out[k].shape for k in kept], count)):
-            out[k] = c
-    return out
-
-
-def _ordered(candidates: list[Candidate]) -> list[int]:
-    """Indices, the best first; one that was tried on more robots comes before others."""
-    return sorted(range(len(candidates)), key=lambda k: (-len(candidates[k].draws), *candidates[k].rank()))

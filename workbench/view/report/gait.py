@@ -78,8 +78,13 @@ def _headline(result: Optimized) -> str:
     n, d = result.certified.certificate.nominal, result.certified.certificate.draws
     turns = n["unit"] == "rad/s"
     speed = f"{math.degrees(n['speed']):.0f} deg/s" if turns else f"{100 * n['speed']:.0f} cm/s"
-    said = f"{str(result.request)[0].upper()}{str(result.request)[1:]}: {speed} on the model"
+    request = str(result.request)
+    said = f"{request[0].upper()}{request[1:]}: {speed} on the model"
     if d.get("count"):
+        low = d["speed " + n["unit"]][1]
+        if low is not None:
+            five = f"{math.degrees(low):.0f} deg/s" if turns else f"{100 * low:.0f} cm/s"
+            said = f"{request[0].upper()}{request[1:]}: {five} or more on 95 % of the robots drawn, {speed} on the nominal one"
         said += f"; of {d['count']} random variants {d['falls'] or 'none'} fell"
     return said + ("." if result.met else "; the request is not met.")
 
@@ -96,9 +101,9 @@ def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
                ("electrical power", f"{n['electrical power W']:.0f} W",
                 f"cost of transport {n['electrical cost of transport']:.1f}")]
     if d.get("count"):
-        low = d["speed " + n["unit"]][1]
-        numbers.insert(1, ("5th percentile of draws", f"{factor * low:.1f} {unit}",
-                           f"heading {d['heading deg/m RMS']:.1f} deg/m RMS"))
+        lowest, five = d["speed " + n["unit"]][:2]
+        name, low = ("slowest draw", lowest) if five is None else ("5th percentile of draws", five)
+        numbers.insert(0, (name, f"{factor * low:.1f} {unit}", f"heading {d['heading deg/m RMS']:.1f} deg/m RMS"))
     if e:
         numbers.append((f"speed kept in {e['name']}", f"{100 * e['speed kept']:.0f} %",
                         f"heading {e['heading apart deg/m']:+.1f} deg/m apart"))
@@ -137,11 +142,14 @@ def _limits_section(certificate: Certificate) -> Section:
 
 
 def _draws_section(certificate: Certificate) -> Section:
-    d, floor = certificate.draws, certificate.floor
+    d, n, floor = certificate.draws, certificate.nominal, certificate.floor
     parts: list[Part] = []
     if d.get("count"):
+        incidents = [[str(i["draw"]), i["robot"], i["what"]] for i in d["incidents"]]
         parts += [Text(f"{d['count']} robots drawn anew, none of which the search saw: friction, supply and its sag, masses, a "
-                       f"load, zero offsets, play and latency all at once. {d['falls'] or 'None'} fell."),
+                       f"load, zero offsets, play and latency all at once. {d['falls'] or 'None'} fell; the true share is below "
+                       f"{100 * d['falls at most']:.1f} % (at 95 %)."),
+                  *([Table(["draw", "robot", "what happened"], incidents)] if incidents else []),
                   Picture(draw_ranges(certificate), "Thick: 5 to 95 % of the robots; thin: all; circle: the median; green: the "
                           "nominal robot.")]
     steps = ", ".join(f"{k} {100 * v:.1f}" for k, v in floor["speed"].items())
@@ -152,6 +160,11 @@ def _draws_section(certificate: Certificate) -> Section:
     parts.append(Text(f"The same table in {e['name']}: {100 * e['speed kept']:.0f} % of the speed, heading "
                       f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
                       "No second engine was at hand: what is said here is one engine's word."))
+    if e:
+        parts.append(Table(["condition", f"speed [{n['unit']}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
+                           [[k, *(f"{c[key]:.3f}" for key in ("speed", "speed elsewhere")),
+                             *(f"{c[key]:+.1f}" for key in ("heading deg/m", "heading elsewhere deg/m"))]
+                            for k, c in e["conditions"].items()]))
     return Section("Random variants of the robot", parts)
 
 

@@ -1,0 +1,95 @@
+"""Limits over the robots of an ensemble: nine in ten keep each, none falls, and counts come with the bound they leave."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workbench.gait.draws import FEWEST, Drawn, bound, described, draw_margins, drawn, summary
+from workbench.gait.feet import FeetMeasure
+from workbench.gait.machine import GaitMachine
+from workbench.gait.measure import GaitMeasure, fallen
+from workbench.gait.request import Request
+from workbench.gait.requirements import floor_margins, heading_spread
+from workbench.robot import EffectSpec, puppy_model
+
+WALKED = GaitMeasure(False, (0.3, 0.0), 0.0, 1.0, 0.0, 0.0, np.radians(10), (0.3,) * 15, (0.5,) * 15, (0.5,) * 15, 1.0, 2.0, 20.0,
+                     5.0, 100.0, clearance=0.006, slip=0.03)
+FEET = FeetMeasure(slip=0.03, clearance=0.006, tipping=0.3)
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return GaitMachine(puppy_model())
+
+
+def margins(machine, draws):
+    return {m.name: m for m in draw_margins(machine, Request(), draws)}
+
+
+def test_one_robot_in_ten_may_break_a_limit_and_no_more(machine):
+    steep = replace(WALKED, tilt=np.radians(40))
+    assert margins(machine, [WALKED] * 9 + [steep])["tilt over draws"].use == pytest.approx(1 / 3)
+    broken = margins(machine, [WALKED] * 8 + [steep] * 2)["tilt over draws"]
+    assert broken.use == pytest.approx(4 / 3)
+    assert str(broken) == "tilt over draws, 9 of 10 robots: 40 of 30 deg"
+    assert margins(machine, [WALKED] * 7 + [steep])["tilt over draws"].use > 1  # of eight, none
+
+
+@pytest.mark.parametrize(("change", "name", "use"), [
+    ({"slip": 0.24}, "slip over draws", 0.8 / 0.6), ({"clearance": 0.0015}, "foot clearance over draws", 1.5),
+    ({"torque_use": (0.5,) * 14 + (1.2,)}, "torque-speed line over draws", 1.2),
+    ({"rms": (0.3,) * 14 + (1.388,)}, "RMS torque over draws", 2.0), ({"touched": True}, "other contact over draws", 2.0)])
+def test_each_limit_of_a_run_is_judged_on_draws(machine, change, name, use):
+    assert margins(machine, [replace(WALKED, **change)] * 4)[name].use == pytest.approx(use, rel=1e-3)
+    assert margins(machine, [WALKED] * 4)[name].use <= 1
+
+
+def test_robots_that_fell_do_not_hide_behind_a_share(machine):
+    assert draw_margins(machine, Request(), [fallen(15)] * 3) == []
+    assert set(margins(machine, [WALKED, fallen(15)])) == set(margins(machine, [WALKED]))
+
+
+def test_a_count_leaves_a_bound():
+    assert bound(0, 64) == pytest.approx(0.0457, abs=1e-4)
+    assert bound(0, 64) == pytest.approx(1 - 0.05 ** (1 / 64))
+    assert bound(1, 64) > bound(0, 64)
+    assert bound(3, 3) == 1.0
+
+
+def test_no_quantile_comes_from_fewer_than_twenty_draws():
+    few = summary(Request(), [Drawn("r", WALKED, FEET)] * (FEWEST - 1))
+    many = summary(Request(), [Drawn("r", WALKED, FEET)] * FEWEST)
+    assert few["speed m/s"] == [0.3, None, 0.3, None, 0.3]
+    assert many["speed m/s"] == pytest.approx([0.3] * 5)
+    assert (few["count"], few["falls"]) == (FEWEST - 1, 0)
+    assert few["falls at most"] == pytest.approx(1 - 0.05 ** (1 / (FEWEST - 1)))
+
+
+def test_a_draw_is_named_with_what_happened():
+    model = puppy_model().with_effects((EffectSpec("ground_friction", (), {"friction": 0.8}),
+                                        EffectSpec("supply_voltage", (), {"voltage": 10.6})))
+    assert described(model) == "friction 0.80, 10.6 V"
+    fell = drawn(model, replace(WALKED, fell=True, tilt=np.radians(141)), FEET, gave_up=True)
+    touched = drawn(model, WALKED, FEET, gave_up=True)
+    told = summary(Request(), [drawn(model, WALKED, FEET, gave_up=False), fell, touched])
+    assert told["incidents"] == [
+        {"draw": 2, "robot": "friction 0.80, 10.6 V", "what": "fell: tilt 141 deg"},
+        {"draw": 3, "robot": "friction 0.80, 10.6 V",
+         "what": "something other than a foot touched; it went on at 0.30 m/s, tilt 10 deg"}]
+    assert touched.measure.touched
+    assert not fell.measure.touched
+    assert told["falls"] == 1
+
+
+def test_a_speed_has_to_be_kept_less_its_numerical_floor():
+    asked = Request(speed=0.29)
+    assert floor_margins(asked, WALKED, {"steps": 0.005})[0].use < 1
+    assert floor_margins(asked, WALKED, {"steps": 0.02})[0].use > 1
+    assert floor_margins(Request(), WALKED, {"steps": 0.02}) == []
+
+
+def test_headings_are_compared_with_the_nominal_robots_which_is_trimmed():
+    turns = replace(WALKED, turn_rate=0.3 * 0.5)
+    assert heading_spread(Request(), turns, [turns, turns]) == pytest.approx(0.0)
+    assert heading_spread(Request(), WALKED, [turns, turns]) == pytest.approx(0.5)
