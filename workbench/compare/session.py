@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from workbench.compare.options import FILES
+from workbench.effects.known_load import FURTHEST, MOST_MASS, KnownLoad
 from workbench.files import InputError
 from workbench.files.yaml_file import Fields, top_of
 from workbench.motion import load_motion
@@ -28,7 +29,7 @@ class TakeSpec:
 
     motion: pose table, played `cycles` times (None: as often as it says itself, else once); None where the recording carries its
     own commands. starts_at: recording time of the first command [s]; None: estimate it. servos: constants that differ in this
-    take. use: "fit", "validate" or None.
+    take. load: a known weight that hangs on the robot in it. use: "fit", "validate" or None.
     """
 
     name: str
@@ -39,6 +40,16 @@ class TakeSpec:
     starts_at: float | None = None
     servos: Mapping[str, float] = field(default_factory=dict)
     use: Literal["fit", "validate"] | None = None
+    load: KnownLoad | None = None
+
+    def robot(self, model: RobotModel) -> RobotModel:
+        """A model as it was in this take."""
+        return _as_it_was(model, self)
+
+    @property
+    def conditions(self) -> str:
+        """The same for takes in which the robot was the same."""
+        return repr((sorted(self.servos.items()), self.load))
 
     def commands(self, model: RobotModel) -> Commands | None:
         """What went out on the bus; None where only the recording knows."""
@@ -58,6 +69,12 @@ class PredictSpec:
     frames: int | None = None
     base: Base = "free"
     servos: Mapping[str, float] = field(default_factory=dict)
+    load: KnownLoad | None = None
+
+
+def _as_it_was(model: RobotModel, entry: TakeSpec | PredictSpec) -> RobotModel:
+    changed = model.with_servos(entry.servos)
+    return changed if entry.load is None else entry.load.on(changed)
 
 
 @dataclass(frozen=True)
@@ -74,8 +91,9 @@ class Session:
     yaw: float | None = None
 
     def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
-        """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` change."""
-        return (model or self.model).with_servos(take.servos)
+        """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` and `load`
+        change."""
+        return _as_it_was(model or self.model, take)
 
     def with_model(self, model: RobotModel) -> Session:
         """The same recordings beside another model of the robot; InputError where that is another robot."""
@@ -115,14 +133,14 @@ def load_session(path: str | Path) -> Session:
 
 
 def _take(f: Fields, model: RobotModel) -> TakeSpec:
-    f.only("name", "recording", "motion", "cycles", "base", "starts_at", "servos", "use")
+    f.only("name", "recording", "motion", "cycles", "base", "starts_at", "servos", "use", "load")
     name = _entry_name(f)
     use = f.text("use", choices=("fit", "validate"))
     take = TakeSpec(
         name=name, recording=_recording(f, name), motion=f.file("motion"),
         cycles=f.whole("cycles", None, least=1, most=MOST_CYCLES), base=_base(f, model),
         starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
-        servos=_changes(f, model), use=use,  # type: ignore[arg-type]
+        servos=_changes(f, model), use=use, load=_load(f, model),  # type: ignore[arg-type]
     )
     f.done()
     take.commands(model)  # a motion that the robot cannot play is the session's error, not a damaged take
@@ -138,12 +156,12 @@ def _recording(f: Fields, take: str) -> Path:
 
 
 def _predict(f: Fields, model: RobotModel) -> PredictSpec:
-    f.only("name", "motion", "cycles", "commands", "start", "starts_at", "frames", "base", "servos")
+    f.only("name", "motion", "cycles", "commands", "start", "starts_at", "frames", "base", "servos", "load")
     spec = PredictSpec(
         name=_entry_name(f), motion=f.file("motion"), cycles=f.whole("cycles", None, least=1, most=MOST_CYCLES),
         commands=f.file("commands"), start=f.file("start"), starts_at=f.number("starts_at", least=0, most=FILES.most_seconds),
         frames=f.whole("frames", least=1, most=FILES.most_frames),
-        base=_base(f, model), servos=_changes(f, model),
+        base=_base(f, model), servos=_changes(f, model), load=_load(f, model),
     )
     f.done()
     if (spec.motion is None) == (spec.commands is None):
@@ -173,13 +191,31 @@ def _base(f: Fields, model: RobotModel) -> Base:
     return base
 
 
+def _load(f: Fields, model: RobotModel) -> KnownLoad | None:
+    given = f.mapping("load")
+    if given is None:
+        return None
+    given.only("link", "mass", "at")
+    link = given.required("link", given.text("link", choices=tuple(model.kinematics.links)))
+    mass = given.required("mass", given.number("mass", least=0, most=MOST_MASS))
+    at = given.required("at", given.raw("at"))
+    if not isinstance(at, list) or len(at) != 3 or not all(_is_number(x) and abs(x) <= FURTHEST for x in at):
+        raise given.error("at", f"expected three numbers of -{FURTHEST:g} to {FURTHEST:g} m in the link's frame, got {at!r}")
+    given.done()
+    return KnownLoad(link, mass, (float(at[0]), float(at[1]), float(at[2])))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
 def _changes(f: Fields, model: RobotModel) -> dict[str, float]:
     given = f.mapping("servos")
     if given is None:
         return {}
     changes: dict[str, float] = {}
     for key, value in given.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if not _is_number(value):
             raise given.error(key, f"expected a number, got {value!r}")
         changes[key] = float(value)
     try:

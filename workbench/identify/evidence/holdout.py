@@ -26,7 +26,7 @@ def folds_of(evidence: Sequence[TakeEvidence], takes: Sequence[int]) -> list[tup
     take by take. Empty where there is one take alone."""
     groups: dict[str, list[int]] = {}
     for i in takes:
-        groups.setdefault(repr(sorted(evidence[i].take.spec.servos.items())), []).append(i)
+        groups.setdefault(evidence[i].take.spec.conditions, []).append(i)
     if len(groups) > 1:
         return [tuple(g) for g in groups.values()]
     if len(takes) < 2:

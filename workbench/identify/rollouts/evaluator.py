@@ -162,7 +162,7 @@ class RolloutEvaluator:
         frames = e.since
         times = np.concatenate([[-PROBLEM.rest, -PROBLEM.rest / 2, -1e-3], frames[(frames >= 0) & (frames <= until)]])
         duration = float(times[-1]) + 2e-3
-        return Job(model.with_servos(spec.servos), replace(config, base=spec.base), e.take.commands, duration, PROBLEM.rest,
+        return Job(spec.robot(model), replace(config, base=spec.base), e.take.commands, duration, PROBLEM.rest,
                    name=spec.name, times=times, start=e.take.start_state(), steadied=e.steadied)
 
     def vector(self, residuals: dict[int, Array], use: str, joint: str | None = None) -> Array:

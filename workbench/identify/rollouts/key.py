@@ -59,6 +59,6 @@ def take_key(e: TakeEvidence, config: SimulationConfig) -> str:
     played, spec = e.take.commands, e.take.spec
     sent = None if played is None else (played.joints, played.times, played.goals, played.speeds, played.enabled, played.end)
     windows = None if e.steadied is None else tuple(np.asarray(x) for x in vars(e.steadied).values())
-    depends_on = (rollout_code(), repr(config), spec.base, dict(spec.servos), sent, e.take.start_state(), windows, e.since,
+    depends_on = (rollout_code(), repr(config), spec.base, spec.conditions, sent, e.take.start_state(), windows, e.since,
             e.take.recorded.time, e.channels, e.take.recorded.zeroed, vars(e.take.measurement))
     return str(joblib.hash(depends_on))

@@ -46,10 +46,10 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
     jobs = []
     for e in takes:
         spec = e.take.spec
-        servos = repr(sorted(spec.servos.items()))
-        models.setdefault(servos, model.with_servos(spec.servos))
+        as_it_was = spec.conditions
+        models.setdefault(as_it_was, spec.robot(model))
         times = e.since[frames(e)]
-        jobs.append(Job(models[servos], held, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
+        jobs.append(Job(models[as_it_was], held, e.take.commands, float(times[-1]) + 2e-3, REST, name=spec.name, times=times,
                         start=e.take.start_state(),
                         restarts=None if math.isinf(horizon) else recorded_states(e.take, horizon)))
     try:
