@@ -10,10 +10,12 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import re
 import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
@@ -34,7 +36,18 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Ends with exit code 2 and one line on stderr."""
-        self.exit(2, f"{self.prog}: error: {' '.join(message.split())} (see {self.prog} --help)\n")
+        text = " ".join(message.split())
+        self.exit(2, f"{self.prog}: error: {text}{self._meant(text)} (see {self.prog} --help)\n")
+
+    def _meant(self, message: str) -> str:
+        """A guess at what was meant by a verb or an option that is not known."""
+        options = [o for a in self._actions for o in a.option_strings if o.startswith("--")]
+        for pattern, known in ((r"invalid choice: '([^']+)'", list(VERBS)), (r"unrecognized arguments: (--[\w-]+)", options)):
+            found = re.search(pattern, message)
+            near = get_close_matches(found.group(1), known, 1) if found else []
+            if near:
+                return f"; did you mean {near[0]}?"
+        return ""
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -65,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         apply_defaults(_verbs(parser))
     except ValueError as e:
         return _refused("workbench", e)
-    args = parser.parse_args(argv)
+    args = _parsed(parser, sys.argv[1:] if argv is None else list(argv))
     log, heard = RunLog(sys.argv[1:] if argv is None else argv), speak_up(args.verbose, args.quiet)
     LOGGER.addHandler(log)
     progress_mode(args.quiet, args.verbose)
@@ -93,7 +106,8 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        print(f"\nworkbench {args.verb}: interrupted, nothing was written", file=sys.stderr)
+        again = "; call it again to go on from there" if args.verb == "diagnose" else ""
+        print(f"\nworkbench {args.verb}: interrupted, nothing was written{again}", file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -105,6 +119,17 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
         return _refused(f"workbench {args.verb}", e)
     finally:
         signal.signal(signal.SIGTERM, previous)
+
+
+def _parsed(parser: argparse.ArgumentParser, argv: list[str]) -> argparse.Namespace:
+    """Arguments of a verb; `help` and `help VERB` stand for --help. What a verb does not know it says itself, with its
+    options."""
+    if argv[:1] == ["help"]:
+        argv = [*argv[1:2], "--help"]
+    args, unknown = parser.parse_known_args(argv)
+    if unknown:
+        _verbs(parser)[args.verb].error(f"unrecognized arguments: {' '.join(unknown)}")
+    return args
 
 
 def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:

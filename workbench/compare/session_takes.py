@@ -23,6 +23,7 @@ from workbench.recording.mocap.registration import register
 from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.mocap.yaw import session_yaw
 from workbench.recording.recording import Measurement, Recording
+from workbench.recording.servo_log.started import start_in_log
 from workbench.recording.servo_log.state import first_command, state_at
 from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
@@ -103,6 +104,8 @@ def read_takes(session: Session) -> tuple[list[ReadTake], LeftOut]:
         commands = spec.commands(model) or recording.commands
         if commands is None:
             raise InputError(session.path, f"take '{spec.name}': motion: is missing, and the recording has no commands")
+        if spec.starts_at is None and spec.motion is not None and (start := start_in_log(recording, commands)) is not None:
+            spec = replace(spec, starts_at=start)
         read.append(ReadTake(spec, model, recording, commands))
     return read, remaining(session, read, tuple(left))
 

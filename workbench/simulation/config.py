@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from workbench.files import InputError
 from workbench.files.option_checks import check_choice
 from workbench.robot import RobotModel
@@ -60,8 +62,11 @@ class SimulationConfig:
             check_choice(name, getattr(self, name), allowed)
         for f in fields(self):
             value = getattr(self, f.name)
-            if isinstance(value, float) and not 0 <= value < float("inf"):
-                raise InputError(None, f"{f.name}: expected a non-negative number, got {value}")
+            if f.type not in ("float", float):
+                continue
+            number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+            if not number or not 0 <= value < float("inf"):
+                raise InputError(None, f"{f.name}: expected a non-negative number, got {value!r}")
         if self.time_step == 0 and self.drive == "fast_servo":
             raise InputError(None, "drive: fast_servo needs a discrete plant (time_step > 0)")
 

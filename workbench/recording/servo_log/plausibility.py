@@ -17,6 +17,7 @@ from workbench.recording.servo_log.faults import without_faults
 from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.logged import as_logged
+from workbench.recording.servo_log.started import ramp_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
 
 Array = NDArray[np.float64]
@@ -74,6 +75,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     problems += mended.lines
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
         problems += lead_problems(mended.recording)
+        problems += ramp_problems(mended.recording)
     return as_logged(replace(mended.recording, problems=tuple(problems)))
 
 
