@@ -30,6 +30,9 @@ ROOT = Path(__file__).resolve().parents[1]
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 """Of the body in the thesis's axes: x forward, y up, z right [cm], and the rotations about them [deg]; ry is the heading, left
 positive, rx the right side down, rz the nose up."""
+REAL = (37.01, -0.18, -0.10)
+"""Where the real robot was after six seconds of the ROBOTIS walk [cm], x, y, z (thesis, 7.2)."""
+
 _TO_THESIS = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 Study = Callable[[Path, bool, Callable[[str, float | None], None]], str]
 

@@ -89,9 +89,9 @@ def test_the_log_says_what_was_sent_and_where_the_joints_were(tmp_path):
         truth = commands.reference(log.time - sent.times[rest])[:, commands.column(joint)]
         during = (log.time > sent.times[rest]) & (log.time < sent.times[rest] + commands.end)
         error = np.abs(log.channels[f"position.{joint}"] - truth)[during]
-        assert np.nanmax(error) < math.radians(3.5), "a corner from 3 to -6.5 rad/s is cut between two readings 20 ms apart"
+        assert np.nanmax(error) < math.radians(1.5), "a corner from 3 to -6.5 rad/s, and a row 2 ms from its reading"
         assert np.nanmedian(error) < math.radians(0.3)
-        assert np.isfinite(error).all()
+        assert np.isfinite(error).mean() > 0.5
     assert np.nanmean(log.channels["voltage"]) == pytest.approx(11.1)
     assert result.started > 0
 

@@ -19,7 +19,24 @@ QUESTIONS = {
     "where are the report's sentences made": ("view/report/words.py", "def in_words"),
     "who chooses the next experiment": ("experiment/design.py", "def design_experiment"),
     "what must a plug-in effect say": ("effects/base.py", "class Effect"),
+    "where is the servo's torque-speed line": ("servo/law.py", "class ServoLaw"),
+    "where do radians become counts": ("robot/servo_units.py", "class ServoUnits"),
+    "where are InputError": ("files/errors.py", "class InputError"),
+    "where is the prior of an effect's size": ("identify/evidence/hypothesis.py", "class Prior"),
+    "where is it decided which search runs": ("identify/diagnosis.py", "is_by_logs"),
+    "what limits a gait": ("gait/limits.py", "def binding"),
+    "which random robots is a gait tested on": ("gait/ensemble.py", "class Ensemble"),
+    "who may stop a motion": ("device/play/watch.py", "class Watch"),
+    "where do plug-ins come in": ("files/plug_ins.py", "def with_plug_ins"),
 }
+
+
+ROOMS = sorted(p.name for p in ROOM.iterdir() if (p / "__init__.py").is_file())
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_every_room_is_on_the_map(room):
+    assert re.search(rf"`{room}/", PAGE), f"docs/reading-the-code.md names no file of workbench/{room}/"
 
 
 def file_of(name: str) -> list[Path]:

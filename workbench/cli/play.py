@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
     """Plays and says how it went; 2 where it was stopped, 130 by Ctrl-C."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.survey import survey
-    from workbench.device.play import PlayOptions, finish_log, perform, preflight
+    from workbench.device.play import PlayOptions, finish_log, perform, preflight, reading_plan
     from workbench.device.stop import stop_on_signals
     from workbench.device.tables.limits import refuse_broken_limits
     from workbench.files import InputError
@@ -59,14 +59,17 @@ def run(args: argparse.Namespace) -> int:
     known_units(model, motion.joints)
     check_certificate_of("play", args.motion, motion, model, args.force)
     refuse_broken_limits(motion.as_table(), model, args.force)
+    commands = motion.commands(motion.often(args.cycles, 3))
     log = args.out / f"{motion.name}.csv"
     virtual = make_virtual(args, model)
     with Progress("play") as progress, open_bus(args, model, virtual) as bus, stop_on_signals() as stop:
         found = survey(bus, model, ids=(), progress=progress)
         preflight(found)
+        plan = reading_plan(bus, len(found.found), commands)
+        if plan.warning:
+            print(f"workbench play: warning: {plan.warning}", file=sys.stderr)
         registers = found.registers()
         save_registers(registers, args.out / "registers.yaml")
-        commands = motion.commands(motion.often(args.cycles, 3))
         played = perform(bus, found, virtual.controller(commands) if virtual else commands, log, lambda: stop.reason,
                          PlayOptions(hold=args.hold), progress=progress)
     for departure in registers.departures(model):
@@ -83,10 +86,16 @@ def _tell(log: Path, played: Played) -> int:
     if played.log_problem:
         print(f"workbench play: warning: no joint log: {played.log_problem}", file=sys.stderr)
     else:
-        print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late")
+        read = f"; each joint read {min(played.rates.values()):.0f} times a second or more" if played.rates else ""
+        print(f"wrote {log}: {played.poses} poses, the worst {1000 * played.worst_late:.1f} ms late{read}")
+    if played.repaired:
+        print(f"workbench play: warning: {played.repaired} goals did not arrive and were sent again", file=sys.stderr)
+    if played.missed:
+        print(f"workbench play: problem: {played.missed} goals did not reach their servos in time; this was not the motion "
+              "asked for", file=sys.stderr)
     print(f"torque is {'off' if played.released else 'on'}" if not played.unknown else
           f"workbench play: torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off",
           file=sys.stderr if played.unknown else sys.stdout)
     if played.stopped.startswith(CTRL_C):
         return 130
-    return 2 if played.stopped or played.unknown else 0
+    return 2 if played.stopped or played.unknown or played.missed else 0

@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey
+    from workbench.device.bus.wire import slow_adapter
     from workbench.robot.servo_registers import save_registers
 
     model = load_model(args.model, args.packages)
@@ -55,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         path = save_registers(registers, args.out / "registers.yaml")
         print(f"wrote {path}; beside a session.yaml that says `registers: {path.name}`, `diagnose` begins with what differs")
+    if slow_adapter(found.latency):
+        print(f"workbench servos: warning: {slow_adapter(found.latency)}", file=sys.stderr)
     for problem in found.problems():
         print(f"workbench servos: problem: {problem}", file=sys.stderr)
     return 2 if found.problems() else 0

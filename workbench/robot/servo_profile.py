@@ -94,7 +94,8 @@ class ServoProfile:
     alarms, refusals: what the bits of an answer's error byte mean, of the servo's state and of the instruction; with protocol
     2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
     control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
-    when the bus falls silent. maker: who builds it, for the rules that it gives. marker: a register that does nothing to the
+    when the bus falls silent. maker: who builds it, for the rules that it gives. group_read: how many are asked at
+    once: Sync Read of protocol 2, Feetech's, or "" for one after the other. marker: a register that does nothing to the
     joint and is forgotten when the servo restarts.
     """
 
@@ -124,6 +125,7 @@ class ServoProfile:
     watchdog: tuple[str, float] | None = None
     marker: str | None = None
     maker: str = ""
+    group_read: Literal["", "sync", "feetech"] = ""
     source: str = field(default="", compare=False)
 
     @property

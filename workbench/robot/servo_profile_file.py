@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from pathlib import Path, PurePath
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from workbench.files import InputError
 from workbench.files.plug_ins import with_plug_ins
@@ -29,7 +29,7 @@ def load_profile(path: str | PurePath) -> ServoProfile:
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
-                 "unlock", "watchdog", "marker", "maker", *TOLERANCES)
+                 "unlock", "watchdog", "marker", "maker", "group_read", *TOLERANCES)
     position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
     registers = _registers(_needed(top, "registers"))
     profile = ServoProfile(
@@ -47,7 +47,8 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         tolerances={key: v for key in TOLERANCES if (v := top.number(key, least=0)) is not None},
         alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
-        marker=_marker(top, registers), maker=top.text("maker") or "", source=str(path))
+        marker=_marker(top, registers), maker=top.text("maker") or "",
+        group_read=_group_read(top), source=str(path))
     if profile.protocol not in (1, 2):
         raise top.error("protocol", f"expected 1 or 2, got {profile.protocol}")
     for f in (position, speed, load, top):
@@ -209,6 +210,13 @@ def _marker(f: Fields, registers: Mapping[str, Register]) -> str | None:
     if name is not None and name not in registers:
         raise f.error("marker", f"no register '{name}'")
     return name
+
+
+def _group_read(f: Fields) -> Literal["", "sync", "feetech"]:
+    said = f.text("group_read") or ""
+    if said not in ("", "sync", "feetech"):
+        raise f.error("group_read", f"expected sync or feetech, got {said!r}")
+    return said  # type: ignore[return-value]  # one of them
 
 
 def _register_name(f: Fields, registers: Mapping[str, Register]) -> str:

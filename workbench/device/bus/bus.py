@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, PacketHandler
 
+from workbench.device.bus import group
 from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.ports import GONE, StripEcho, gone
+from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, ping
 from workbench.robot.servo_profile import Register, ServoProfile
 from workbench.robot.servo_profile_file import model_name
 
 T = TypeVar("T")
 LONGEST = 200
 """Bytes of parameters in one Sync Write: below the SDK's 250 and the AX-12's receive buffer with some to spare."""
-NOBODY = 0xFC
-"""ID that is asked to find out whether the adapter hears itself; who has it answers after the echo."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,9 @@ class Bus:
 
     port: dynamixel-sdk's, with `pause` and `patience` (`SerialPort`, or a virtual one). joints: by ID, for messages.
     alarms: what each servo's last answer said of its state. retries: by ID, how often it had to be asked again.
-    strip_echo: for an adapter that is known to hear itself; any other that does is refused.
+    strip_echo: for an adapter that is known to hear itself; any other that does is refused. latency: how long answers take
+    beyond their bytes [s], once it was measured. asked: when the last byte of the last question was out [s], as the servo answers
+    what it feels then.
     """
 
     def __init__(self, port: Any, profile: ServoProfile, joints: Mapping[int, str] | None = None,
@@ -47,7 +49,11 @@ class Bus:
         self.alarms: dict[int, tuple[str, ...]] = {}
         self.retries: Counter[int] = Counter()
         self._handler = PacketHandler(float(profile.protocol))
-        self._guarded(lambda: self._check_echo(strip_echo))
+        self.latency, self.asked = 0.0, 0.0
+        if strip_echo:
+            self.port = StripEcho(port)
+        elif self._guarded(lambda: hears_itself(port, profile.protocol)):
+            raise echo_error()
 
     # Time
 
@@ -79,6 +85,7 @@ class Bus:
         count = max(r.address + r.size for r in wanted) - first
 
         def call() -> tuple[bytes, int, int]:
+            self.asked = self.now() + (8 if self.profile.protocol == 1 else 14) * self.port.tx_time_per_byte / 1000
             answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
             return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
 
@@ -101,12 +108,15 @@ class Bus:
         if switch is not None and "id" not in values:
             self._write(servo, switch.register, switch.closed)
 
-    def exists(self, servo: int) -> int | None:
-        """Model number of a servo, None where none answers."""
+    def exists(self, servo: int, tries: int | None = None) -> int | None:
+        """Model number of a servo, None where none answers to so many questions (default: the options')."""
+        kept, self.options = self.options, replace(self.options, tries=tries or self.options.tries)
         try:
             return self.read(servo, "model_number")["model_number"]
         except NoAnswerError:
             return None
+        finally:
+            self.options = kept
 
     def reboot(self, servo: int) -> None:
         """Has a servo start anew, where its protocol can; clears a latched alarm."""
@@ -115,6 +125,37 @@ class Bus:
         self._asked(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
 
     # All
+
+    def read_all(self, servos: Sequence[int], *names: str) -> dict[int, dict[str, int]]:
+        """Registers of many servos by one question that they answer in turn, asked once, where the family can; by ID, without
+        those of which no whole answer came. Where one is silent, those after it may be, too."""
+        kind = self.profile.group_read
+        if not kind:
+            raise ValueError(f"{self.profile.name} cannot be asked all at once")
+        wanted = [self._register(name) for name in names]
+        first = min(r.address for r in wanted)
+        count = max(r.address + r.size for r in wanted) - first
+        packet = group.question(kind, servos, first, count)
+        self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
+        heard = self._guarded(lambda: self._collect(packet, len(servos) * group.answer_length(kind, count)))
+        out = {}
+        for servo, (error, data) in group.answers(kind, heard, count).items():
+            if servo in servos:
+                self._look(servo, error)
+                out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        return out
+
+    def _collect(self, packet: bytes, most: int) -> bytes:
+        """Sends and listens until so many bytes are there, or none came for as long as the port has patience."""
+        port = self.port
+        port.clearPort()
+        port.writePort(list(packet))
+        heard, last = bytearray(), port.getCurrentTime() + len(packet) * port.tx_time_per_byte
+        while len(heard) < most and port.getCurrentTime() < last + port.patience + 70 * port.tx_time_per_byte:
+            got = bytes(port.readPort(most - len(heard)))
+            if got:
+                heard, last = heard + got, port.getCurrentTime()
+        return bytes(heard)
 
     def sync_write(self, values: Mapping[int, Mapping[str, int]]) -> float:
         """Writes the same registers of many servos in one packet (or as few as hold them), which nobody answers. Returns when its
@@ -146,17 +187,8 @@ class Bus:
 
     def find(self, servos: Iterable[int]) -> dict[int, int]:
         """Model numbers of those that answer, by ID; asked once each, the silent ones twice."""
-        found = {}
-        once = BusOptions(2, self.options.settle)
-        kept, self.options = self.options, once
-        try:
-            for servo in servos:
-                number = self.exists(servo)
-                if number is not None:
-                    found[servo] = number
-        finally:
-            self.options = kept
-        return found
+        asked = {servo: self.exists(servo, tries=2) for servo in servos}
+        return {servo: number for servo, number in asked.items() if number is not None}
 
     def find_at_any_rate(self, servos: Iterable[int]) -> dict[int, dict[int, int]]:
         """Who answers at which of the family's bit rates; the port's own is set again."""
@@ -172,13 +204,12 @@ class Bus:
     def answers(self, servo: int) -> int:
         """How many servos seem to answer to one ID, of five pings: 2 where answers are longer than one, or broken, again and
         again."""
-        ping = self._ping(servo)
-        expected = 6 if self.profile.protocol == 1 else 14
-        heard = [self._guarded(lambda: self._raw(ping, 4 * expected)) for _ in range(5)]
+        protocol = self.profile.protocol
+        packet, most = ping(protocol, servo), 24 if protocol == 1 else 56
+        heard = [self._guarded(lambda: hear(self.port, packet, most, self.port.patience)) for _ in range(5)]
         if not any(heard):
             return 0
-        odd = sum(bool(answer) and (len(answer) != expected or not self._intact(answer)) for answer in heard)
-        return 2 if odd >= 3 else 1
+        return 2 if sum(bool(answer) and not clean(protocol, answer) for answer in heard) >= 3 else 1
 
     # Inside
 
@@ -240,13 +271,6 @@ class Bus:
         finally:
             self.port.is_using = False
 
-    def _ping(self, servo: int) -> bytes:
-        if self.profile.protocol == 1:
-            body = bytes([servo, 2, 1])
-            return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
-        head = b"\xff\xff\xfd\x00" + bytes([servo, 3, 0, 1])
-        return head + int(self._handler.updateCRC(0, head, len(head))).to_bytes(2, "little")
-
     def _read_packet(self, servo: int, address: int, count: int) -> list[int]:
         """As the SDK's packet handlers want it: header and checksum are theirs to fill in."""
         if self.profile.protocol == 1:
@@ -258,33 +282,6 @@ class Bus:
         if self.profile.protocol == 1:
             return bytes(answer[5:answer[3] + 3])
         return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
-
-    def _raw(self, data: bytes, most: int) -> bytes:
-        """What comes back within the time of `most` bytes after a packet, whatever it is."""
-        port = self.port
-        port.clearPort()
-        port.writePort(list(data))
-        deadline = port.getCurrentTime() + (len(data) + most) * port.tx_time_per_byte + port.patience
-        back = b""
-        while port.getCurrentTime() < deadline:
-            back += bytes(port.readPort(most))
-        return back
-
-    def _intact(self, answer: bytes) -> bool:
-        if self.profile.protocol == 1:
-            return answer[:2] == b"\xff\xff" and ~sum(answer[2:-1]) & 0xFF == answer[-1]
-        crc = int(self._handler.updateCRC(0, answer, len(answer) - 2))
-        return answer[:4] == b"\xff\xff\xfd\x00" and crc.to_bytes(2, "little") == answer[-2:]
-
-    def _check_echo(self, strip: bool) -> None:
-        """An adapter that hears itself makes every ID seem to exist: refused, unless it is known to."""
-        if strip:
-            self.port = StripEcho(self.port)
-            return
-        ping = self._ping(NOBODY)
-        if self._raw(ping, len(ping) + 14).startswith(ping):
-            raise BusError("the adapter hears what it sends itself, so that every ID seems to answer; use one that does not "
-                           "(U2D2, USB2Dynamixel), or say --echo")
 
     def wrong_model(self, servo: int, number: int) -> BusError:
         """The error of a servo that is of another kind than the profile's."""

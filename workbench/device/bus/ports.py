@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import serial
 from dynamixel_sdk import PortHandler
 from serial import SerialException
 from serial.tools import list_ports
 
 from workbench.device.bus.errors import BusError, PortGoneError
-
-FTDI_LATENCY = 1e-3
-"""Time after which an adapter with an FTDI chip should hand over what has come in [s]; Linux sets 16 ms."""
 
 GONE: tuple[type[Exception], ...] = (OSError, SerialException)
 """What pyserial lets through when the adapter is pulled; and on Linux termios.error, which is neither."""
@@ -26,10 +25,42 @@ except ImportError:  # Windows
     pass
 
 
+OPENING: tuple[type[Exception], ...] = (*GONE, ValueError)
+
+
+def open_serial(name: str, rate: int, write_timeout: float | None = None) -> serial.Serial:
+    """A serial port for this program alone, which returns from a read at once. BusError in one line where there is none of that
+    name, it may not be opened, or another program has it."""
+    try:
+        return serial.Serial(name, rate, timeout=0, write_timeout=write_timeout, exclusive=True)
+    except OPENING as e:
+        number = getattr(e, "errno", None) or 0
+        reason = "there is no such port" if not Path(name).exists() else WHY.get(number, " ".join(str(e).split()))
+        raise BusError(f"port {name}: {reason}; ports of this machine: {', '.join(serial_ports()) or 'none'}") from None
+
+
+WHY = {errno.EACCES: "no permission; are you in the group dialout?", errno.EBUSY: "another program has it",
+       errno.EAGAIN: "another program has it", errno.EWOULDBLOCK: "another program has it"}
+
+
 class SerialPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
-    """dynamixel-sdk's port with a clock that never jumps and time-outs of our own: the bytes' time and `patience` [ms]."""
+    """dynamixel-sdk's port, opened for one program alone, with a clock that never jumps and time-outs of our own: the bytes' time
+    and `patience` [ms]."""
 
     patience = 3.0
+    is_open: bool
+    ser: Any
+
+    def setupPort(self, cflag_baud: int) -> bool:
+        """Opens it, or sets the rate of one that is open."""
+        if self.is_open:
+            self.ser.baudrate = self.baudrate
+        else:
+            self.ser = open_serial(self.port_name, self.baudrate)
+            self.is_open = True
+        self.ser.reset_input_buffer()
+        self.tx_time_per_byte = 10_000 / self.baudrate
+        return True
 
     def getCurrentTime(self) -> float:
         """Milliseconds of the monotonic clock."""
@@ -75,33 +106,15 @@ def open_port(name: str, rate: int) -> SerialPort:
     another program's, or cannot do the rate."""
     port = SerialPort(name)
     port.baudrate = rate
-    try:
-        opened = port.setBaudRate(rate)
-    except GONE as e:
-        reason = str(e).partition(": ")[2] or str(e)
-        if not Path(name).exists():
-            reason = "there is no such port"
-        raise BusError(f"port {name}: {reason}; ports of this machine: {', '.join(serial_ports()) or 'none'}") from None
+    opened = port.setBaudRate(rate)
     if not opened:
         raise BusError(f"port {name}: dynamixel-sdk has no bit rate of {rate}")
-    waits = ftdi_latency(name)
-    if waits is not None and waits > FTDI_LATENCY:
-        port.patience += 1000 * waits
     return port
 
 
 def serial_ports(usb: bool = False) -> list[str]:
     """Serial ports of this machine, or those on USB alone."""
     return sorted(str(p.device) for p in list_ports.comports() if p.vid is not None or not usb)
-
-
-def ftdi_latency(name: str) -> float | None:
-    """After how long an FTDI adapter hands over what came in [s]; None where Linux does not say."""
-    path = Path("/sys/bus/usb-serial/devices") / Path(name).name / "latency_timer"
-    try:
-        return int(path.read_text()) / 1000
-    except (OSError, ValueError):
-        return None
 
 
 def gone(error: BaseException) -> PortGoneError:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
+from workbench.device.bus.wire import measure_latency
 from workbench.files import InputError
 from workbench.robot import RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
@@ -17,6 +18,8 @@ from workbench.robot.servo_registers import ServoReading, ServoRegisters
 
 STATE = ("present_position", "present_voltage", "present_temperature")
 ALL_IDS = range(253)
+FIRST = 25.0
+"""Patience with a servo before any has answered [ms]: what an FTDI chip as it comes keeps answers for, and half as much."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +39,15 @@ class FoundServo:
 
 @dataclass(frozen=True)
 class Survey:
-    """found: by ID. missing: joints that do not answer. doubled: IDs to which two seem to answer. rate: bit/s."""
+    """found: by ID. missing: joints that do not answer. doubled: IDs to which two seem to answer. rate: bit/s. latency: how long
+    answers take beyond their bytes [s], the adapter's doing."""
 
     profile: ServoProfile
     rate: int
     found: Mapping[int, FoundServo]
     missing: tuple[str, ...]
     doubled: tuple[int, ...]
+    latency: float = 0.0
 
     def problems(self) -> tuple[str, ...]:
         """What has to be fixed before anything moves, a line each."""
@@ -99,6 +104,7 @@ def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
     joints = {i: joint for joint, i in bus_ids(model).items()}
     bus.joints.update(joints)
     wanted = sorted({*ids, *joints})
+    _measure(bus, [*joints, *(i for i in wanted if i not in joints)])
     numbers: dict[int, int] = {}
     for k, servo in enumerate(wanted):
         if progress is not None:
@@ -114,7 +120,18 @@ def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
         if servo not in doubled:
             found[servo] = _found(bus, servo, number, joints.get(servo))
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
-    return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled)
+    return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
+
+
+def _measure(bus: Bus, servos: Iterable[int]) -> None:
+    """How patient to be, by the first servo that answers at all."""
+    kept, bus.port.patience = bus.port.patience, max(float(bus.port.patience), FIRST)
+    try:
+        first = next((servo for servo in servos if bus.exists(servo, tries=1) is not None), None)
+    finally:
+        bus.port.patience = kept
+    if first is not None:
+        measure_latency(bus, first)
 
 
 def read_registers(bus: Bus, servo: int) -> dict[str, int]:

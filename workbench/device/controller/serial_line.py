@@ -9,18 +9,15 @@ from pathlib import Path
 import serial
 from serial.tools import list_ports
 
+from workbench.device.bus.ports import open_serial
 from workbench.files import InputError
 
 
 class SerialLine:
-    """8N1 at a rate, as `Line` wants it; InputError where the port cannot be opened."""
+    """8N1 at a rate, as `Line` wants it; BusError where the port cannot be opened."""
 
     def __init__(self, port: str, rate: int) -> None:
-        try:
-            self._port = serial.Serial(port, rate, timeout=0, write_timeout=10, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as e:
-            there = [p.device for p in list_ports.comports()]
-            raise InputError(port, f"cannot be opened ({_reason(e)}); serial ports here: {' '.join(there) or 'none'}") from None
+        self._port = open_serial(port, rate, write_timeout=10)
 
     def write(self, data: bytes) -> None:
         """Sends, and waits until the operating system has taken it."""
@@ -55,17 +52,11 @@ class SerialLine:
         try:
             return call()
         except serial.SerialException as e:
-            raise OSError(5, _reason(e)) from None
+            raise OSError(5, " ".join(str(e).split())) from None
         except Exception as e:
             if type(e).__module__ != "termios":
                 raise
             raise OSError(5, "the adapter is gone") from None
-
-
-def _reason(e: Exception) -> str:
-    number = getattr(e, "errno", None)
-    return {2: "no such port", 13: "no permission: are you in the group dialout?", 16: "in use by another program"}.get(
-        number or 0, " ".join(str(e).split()))
 
 
 def default_port() -> str:

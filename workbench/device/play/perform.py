@@ -10,7 +10,9 @@ from workbench.device.bus.bus import Bus
 from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.log import NothingPlayedError, finish_log
-from workbench.device.play.player import Played, PlayOptions, play
+from workbench.device.play.options import Played, PlayOptions
+from workbench.device.play.plan import reading_plan
+from workbench.device.play.player import play
 from workbench.device.play.watch import WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -30,6 +32,7 @@ def perform(bus: Bus, found: Survey, commands: Commands, log: Path, stop: Callab
     goes when the log is on the disk. BusError, or InputError, where it could not be played to an end that is in order; where it
     was stopped before there was anything to log, `log_problem` says so."""
     preflight(found)
+    reading_plan(bus, len(found.found), commands, watching)
     joints = [servo.joint for servo in found.found.values() if servo.joint is not None]
     path = log.with_suffix(".play")
     with PlayJournal(path, {"joints": joints, "family": bus.profile.name}) as journal:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from workbench.device.bus.bus import Bus, BusOptions
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.device.play.journal import PlayJournal
+from workbench.device.play.options import Played, PlayOptions
 from workbench.device.play.rig import Rig
 from workbench.device.play.watch import Reaction, StopError, Watch, WatchOptions
 from workbench.files import InputError
@@ -19,51 +19,6 @@ from workbench.motion.commands import Commands
 
 Progress = Callable[[str, float | None], None]
 HOLDING = "the servos could not be told to let go and may hold their last goal: switch the robot's power off"
-
-
-@dataclass(frozen=True)
-class PlayOptions:
-    """How a motion is played.
-
-    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of
-    a ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within:
-    how long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there
-    itself before it is let down onto its droop [rad]; seat_seconds: how long it gets for that, and then to come to rest [s].
-    rest: how long the robot stands in neutral before the first pose and after the last [s]; a recording needs half a second of
-    it. watchdog: silence after which servos that can stop by themselves do [s]. start_torque: share of the torque limit that the
-    servos get for the first way to neutral, so that a joint that is caught somewhere is not torn off. torque: the same for the
-    motion. hold: torque stays on at the end.
-    """
-
-    ramp_speed: float = 0.6
-    step: float = 0.02
-    arrive: float = math.radians(12)
-    within: float = 1.0
-    seat: float = math.radians(4)
-    seat_seconds: float = 0.3
-    rest: float = 1.0
-    watchdog: float = 0.5
-    start_torque: float = 0.5
-    torque: float = 1.0
-    hold: bool = False
-
-
-@dataclass(frozen=True)
-class Played:
-    """How it went. started: when the first pose was sent, ended: when the last one's
-    dwell was over or the motion was stopped, on the bus's clock [s]. worst_late: by which a pose was late [s].
-    stopped: why it ended early, "" where it did not. released: whether torque is off. unknown: joints that did not say so when
-    they were asked. log_problem: why there is no joint log, "" where there is one."""
-
-    journal: Path
-    started: float
-    ended: float
-    poses: int
-    worst_late: float
-    stopped: str
-    released: bool
-    unknown: tuple[str, ...] = ()
-    log_problem: str = ""
 
 
 def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop: Callable[[], str],
@@ -92,6 +47,9 @@ class _Performance:
         self.started, self.ended, self.poses, self.worst_late = math.nan, math.nan, 0, 0.0
         self.goals: dict[str, float] = {}
         self._asked = ""
+        self.read_before: Counter[str] = Counter()
+        self.read: Counter[str] = Counter()
+        self.overtaken, self.missed_before = 0, 0
         self._energised = False
 
     def run(self, commands: Commands) -> Played:
@@ -125,7 +83,13 @@ class _Performance:
             raise
         finally:
             bus.options = kept
-        return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown)
+        return Played(rig.journal.path, self.started, self.ended, self.poses, self.worst_late, stopped, released, unknown,
+                      self._rates(), rig.repaired, self.overtaken + rig.missed - self.missed_before)
+
+    def _rates(self) -> dict[str, float]:
+        """Readings of each joint in the motion, a second."""
+        seconds = self.ended - self.started
+        return {j: self.read[j] / seconds for j in self.rig.ids} if seconds > 0 else {}
 
     def _take_hold(self, careful: BusOptions) -> None:
         """Torque on, each joint where it is: reads before it writes anything, with as many tries as it takes."""
@@ -220,9 +184,10 @@ class _Performance:
 
     def _poses(self, commands: Commands) -> None:
         """Each pose at its time after the first, however late the one before it was; its time is that of its packet's end."""
-        bus = self.rig.bus
-        self.started = bus.now()
-        packet = 0.0
+        rig, bus = self.rig, self.rig.bus
+        self.started, self.read_before = bus.now(), Counter(self.rig.readings)
+        packet, self.missed_before = 0.0, rig.missed
+        ends = [*commands.times.tolist()[1:], commands.end]
         for k, time in enumerate(commands.times.tolist()):
             self._read_until(self.started + time - packet)
             begun = bus.now()
@@ -233,9 +198,10 @@ class _Performance:
             self.poses += 1
             if not k:
                 self.started, packet = sent, sent - begun
+            self.overtaken += sent - self.started > ends[k]
             self.worst_late = max(self.worst_late, sent - self.started - time)
         self._read_until(self.started + commands.end)
-        self.ended = bus.now()
+        self.ended, self.read = bus.now(), rig.readings - self.read_before
 
     def _read_until(self, due: float) -> None:
         self.rig.read_until(due, lambda: self.stop() != self._asked)
@@ -255,7 +221,8 @@ class _Performance:
         """Does what the reaction says, and says why, and what came in between. On the way to neutral only what releases, or a
         second signal, ends it."""
         rig = self.rig
-        self.ended = rig.bus.now() if math.isnan(self.ended) else self.ended
+        if math.isnan(self.ended):
+            self.ended, self.read = rig.bus.now(), rig.readings - self.read_before
         rig.journal.write(t=rig.bus.now(), stopped=reaction.reason)
         if reaction.how == "release" or not self._energised:
             return reaction.reason

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError, PortGoneError
+from workbench.device.bus.group import answer_length
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
 from workbench.motion.lead_in import SLOW
 
 STATE = ("present_position", "present_load", "present_voltage", "present_temperature")
-ROUND = 0.02
-"""Shortest time in which all servos are read once [s]: no faster than the log's rows."""
+POSITION = ("present_position",)
+GOAL = "goal_position"
+"""Read back with every second reading of a servo: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
+ROUND, ROUND_AT_ONCE = 0.018, 0.003
+"""Shortest time in which all servos are read once [s], one after the other, and by one question: more would show nothing new of a
+joint that swings a few times a second."""
+STATE_EVERY = 6
+"""Where all are asked at once, load, voltage and heat are read with every sixth question, as they make it twice as long."""
+SPAN = 32
+"""Bytes that are worth reading in one packet rather than asking twice."""
+MARGIN = 1.3
+"""Of what a reading is thought to cost, that has to be left before a pose, so that the pose is not late."""
 DECAY = 0.8
 """Of what a reading is thought to cost, with each pose that left no time for one: so one hiccup is soon forgotten."""
 DEAREST = 0.04
@@ -28,7 +40,9 @@ LIMP_EVERY = 5
 @dataclass
 class Rig:
     """ids: by joint. Reads in turn whenever there is time, and writes down everything. torque_limits: of each joint's servo, in
-    counts, as it was found."""
+    counts, as it was found. readings: of each joint's position, so far. repaired: goals that
+    had to be sent again. missed: goals
+    that had not arrived when the next one was sent."""
 
     bus: Bus
     ids: Mapping[str, int]
@@ -39,12 +53,19 @@ class Rig:
     def __post_init__(self) -> None:
         self._joints = list(self.ids)
         self._turn = 0
-        self._cost = 0.0
+        self._costs: dict[tuple[str, ...], float] = {}
         self._round_began = -math.inf
         profile = self.bus.profile
         self._limp = ("torque_enable", *([profile.marker] if profile.marker else []),
                       *([profile.watchdog[0]] if profile.watchdog else []))
+        ends = [profile.registers[name] for name in (*STATE, *self._limp)]
+        self._together = max(r.address + r.size for r in ends) - min(r.address for r in ends) <= SPAN
         self._told: dict[str, tuple[int, int]] = {}
+        self._goals: dict[str, float] = {}
+        self._suspects: list[str] = []
+        self._open: set[str] = set()
+        self.repaired, self.missed = 0, 0
+        self.readings: Counter[str] = Counter()
         self.angles: dict[str, float] = {}
 
     def measure(self) -> dict[str, float]:
@@ -70,17 +91,35 @@ class Rig:
 
         Speed 0, at once, is never sent: a joint that was told this goal before keeps the speed at which it goes there, any other
         gets the slow one."""
+        self.missed += len(self._open & goals.keys())
+        self._open -= goals.keys()
+        return self._send(goals, speeds)
+
+    def _send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
         profile = self.bus.profile
         time = "goal_time" in profile.registers
         packet = {}
         for joint, goal in goals.items():
             count, kept = profile.position(goal), self._told.get(joint, (-1, 0))
             speed = profile.speed(speeds[joint]) if speeds[joint] else kept[1] if kept[0] == count else profile.speed(SLOW)
-            self._told[joint] = count, speed
+            self._told[joint], self._goals[joint] = (count, speed), goal
             packet[self.ids[joint]] = {"goal_position": count, "moving_speed": speed, **({"goal_time": 0} if time else {})}
         sent = self.bus.sync_write(packet)
         self.journal.write(t=sent, goal={j: [round(goals[j], 6), round(self._told[j][1] * profile.speed_unit, 6)] for j in goals})
         return sent
+
+    def _repair(self, joint: str) -> None:
+        """A goal that did not arrive is sent again, unless the servo has lost its torque, which a goal might switch on."""
+        servo = self.ids[joint]
+        try:
+            found = self.bus.read(servo, *self._limp)
+        except NoAnswerError:
+            return
+        self.watch.answered(servo, self.bus.now(), found, self.bus.alarms.get(servo, ()))
+        marker = self.bus.profile.marker
+        if found["torque_enable"] and (not marker or found[marker]):
+            self._send({joint: self._goals[joint]}, {joint: 0.0})
+            self.repaired += 1
 
     def torque(self, on: bool) -> None:
         """Of all joints at once, and it is read back."""
@@ -125,37 +164,93 @@ class Rig:
         """Reads one servo after the other until `due` [s], as long as there is time for one more; ends early on `stop()` or where
         the watch reacts."""
         bus = self.bus
+        at_once = bool(bus.profile.group_read)
+        turns, least = (1, ROUND_AT_ONCE) if at_once else (len(self._joints), ROUND)
         while not stop() and self.watch.reaction is None:
             before = bus.now()
             self.watch.check(before)
-            if self._turn % len(self._joints) == 0 and before < self._round_began + ROUND:
-                bus.wait_until(min(due, self._round_began + ROUND))
+            if self._turn % turns == 0 and before < self._round_began + least:
+                bus.wait_until(min(due, self._round_began + least))
                 before = bus.now()
-            if due - before < 1.5 * self._cost:
-                self._cost *= DECAY
+            names = self._names(at_once, turns)
+            cost = self._costs.get(names, 0.0)
+            if due - before < MARGIN * cost:
+                self._costs[names] = DECAY * cost
                 bus.wait_until(due)
                 return
-            if self._turn % len(self._joints) == 0:
+            if self._turn % turns == 0:
                 self._round_began = before
-            self._read_next()
-            self._cost = max(min(bus.now() - before, DEAREST), 0.9 * self._cost)
+            if at_once:
+                self._read_all(names)
+            else:
+                self._read_one(self._joints[self._turn % turns], names)
+            self._turn += 1
+            self._costs[names] = max(min(bus.now() - before, DEAREST), 0.9 * cost)
 
-    def _read_next(self) -> None:
-        joint = self._joints[self._turn % len(self._joints)]
-        servo, limp = self.ids[joint], self._turn // len(self._joints) % LIMP_EVERY == 0
-        self._turn += 1
-        bus, before = self.bus, self.bus.now()
+    def _names(self, at_once: bool, turns: int) -> tuple[str, ...]:
+        """What is read next."""
+        if at_once:
+            turn = self._turn % (4 * STATE_EVERY)
+            return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
+        turn = self._turn // turns
+        return (*STATE, *self._limp) if turn % LIMP_EVERY == 0 else (GOAL, *STATE) if turn % 2 else STATE
+
+    def _read_all(self, names: tuple[str, ...]) -> None:
+        """One question to all; whoever did not answer is asked alone first next time: it may keep others silent."""
+        bus = self.bus
+        if self._suspects:
+            suspect = self._suspects.pop(0)
+            self._read_one(suspect, STATE)
+            if self.watch.failed(self.ids[suspect]):
+                self._suspects.append(suspect)
+        asked = [j for j in self._joints if j not in self._suspects]
+        got = bus.read_all([self.ids[j] for j in asked], *names)
+        begun, each = bus.asked, self._answer_seconds(names)
+        for k, joint in enumerate(asked):
+            values = got.get(self.ids[joint])
+            if values is None:
+                self._suspects += [joint] * (joint not in self._suspects and not self._suspects)
+                continue
+            self._take(joint, values, begun + k * each, bus.now() - begun)
+
+    def _answer_seconds(self, names: tuple[str, ...]) -> float:
+        """How long one of many answers takes [s]."""
+        wanted = [self.bus.profile.registers[name] for name in names]
+        count = max(r.address + r.size for r in wanted) - min(r.address for r in wanted)
+        kind = self.bus.profile.group_read
+        return answer_length(kind, count) * float(self.bus.port.tx_time_per_byte) / 1000 if kind else 0.0
+
+    def _read_one(self, joint: str, names: tuple[str, ...]) -> None:
+        servo, bus = self.ids[joint], self.bus
+        apart = self._limp[0] in names and not self._together
         try:
-            values = bus.read(servo, *STATE)
-            after = bus.now()
-            if limp:
+            values = bus.read(servo, *(STATE if apart else names))
+            asked = bus.asked
+            took = bus.now() - asked
+            if apart:
                 values |= bus.read(servo, *self._limp)
         except NoAnswerError:
             self.watch.silent(servo, bus.now())
             return
-        self.watch.answered(servo, after, values, bus.alarms.get(servo, ()))
+        self._take(joint, values, asked, took)
+
+    def _take(self, joint: str, values: Mapping[str, int], time: float, took: float = 0.0) -> None:
+        """Judges what was read, and writes it down; time: when the servo felt it [s]. took: until the answer was there [s]."""
+        bus, servo = self.bus, self.ids[joint]
+        self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
+        if "present_position" not in values:
+            return
         angle = bus.profile.angle(values["present_position"])
         self.angles[joint] = angle
-        self.journal.write(t=round((before + after) / 2, 6), joint=joint, position=round(angle, 6),
-                           duty=round(values["present_load"] * bus.profile.load_unit, 4),
-                           voltage=values["present_voltage"] / 10, temperature=values["present_temperature"])
+        if GOAL in values and joint in self._told:
+            if values[GOAL] == self._told[joint][0]:
+                self._open.discard(joint)
+            else:
+                self._open.add(joint)
+                self._repair(joint)
+        self.readings[joint] += 1
+        more = {"took": round(took, 6)} if took else {}
+        if "present_voltage" in values:
+            more |= {"duty": round(values["present_load"] * bus.profile.load_unit, 4),
+                     "voltage": values["present_voltage"] / 10, "temperature": values["present_temperature"]}
+        self.journal.write(t=round(time, 6), joint=joint, position=round(angle, 6), **more)

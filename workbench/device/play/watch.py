@@ -44,6 +44,7 @@ class WatchOptions:
 
 TRIPPED = 255
 """What the register of a bus watchdog holds once it has stopped the servo, which then refuses goals."""
+HELD_UP = "could not be read for {:.1f} s, as the computer or the adapter was held up"
 SUDDEN = ("electrical shock", "current")
 """Alarms of a servo that burns what it gets: torque goes at once."""
 
@@ -71,14 +72,20 @@ class Watch:
         self._only_release, self.reaction = True, None
         self._seen.clear()
 
+    def failed(self, servo: int) -> int:
+        """How many questions in a row a servo has left unanswered."""
+        return self._failed[servo]
+
     def heard(self, servo: int) -> float:
         """When a servo last answered [s]."""
         return self._answered.get(servo, -math.inf)
 
     def answered(self, servo: int, time: float, values: Mapping[str, int], alarms: tuple[str, ...]) -> None:
         """A whole answer at a time [s]: registers in counts, and the alarms of its error byte."""
+        since, self._failed[servo] = time - self._answered.get(servo, time), 0
+        if since >= self._options.silent:
+            self._react("neutral", servo, HELD_UP.format(since))
         self._answered[servo] = time
-        self._failed[servo] = 0
         low = self._profile.supply[0]
         volts = values["present_voltage"] / 10 if "present_voltage" in values else None
         heat, limit = values.get("present_temperature"), self._limits.get(servo, 70)
@@ -117,7 +124,7 @@ class Watch:
             if self._failed[servo] >= self._options.confirm:
                 self._react("neutral", servo, f"silent for {since:.1f} s")
             else:
-                self._react("neutral", servo, f"could not be read for {since:.1f} s, as the computer or the adapter was held up")
+                self._react("neutral", servo, HELD_UP.format(since))
             return
 
     def _judge(self, servo: int, what: str, bad: bool, how: Literal["neutral", "release"], reason: str) -> None:

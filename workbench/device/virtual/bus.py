@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Protocol
 
 from workbench.device.virtual.clock import SECOND, Clock
-from workbench.device.virtual.protocol import BROADCAST, Instruction
+from workbench.device.virtual.protocol import BROADCAST, SYNC_READ, Instruction
 
 if TYPE_CHECKING:
     from workbench.device.virtual.servo import VirtualServo
@@ -157,6 +158,9 @@ class ServoBus:
 
     def _dispatch(self, packet: Instruction, end: int, burst: Burst, key: tuple[int, int]) -> None:
         start = end - burst.byte * (len(packet.parameters) + 6)
+        if packet.instruction == SYNC_READ and packet.servo == BROADCAST and packet.intact:
+            self._asked_in_turn(packet.parameters[:2], list(packet.parameters[2:]), key, end)
+            return
         for servo in self.servos:
             if packet.servo not in (servo.ident, BROADCAST) or servo is burst.talker:
                 continue
@@ -165,6 +169,17 @@ class ServoBus:
             if self._talking_until.get(id(servo), -1) > start:  # it was talking itself, and heard nothing
                 continue
             servo.receive(packet, end)
+
+    def _asked_in_turn(self, what: bytes, ids: list[int], key: tuple[int, int], time: int) -> None:
+        """Sync Read: each answers when the one before it has; one that does not silences all after it."""
+        if not ids:
+            return
+        for servo in self.servos:
+            if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key:
+                end = servo.answer_in_turn(what, time)
+                if end is not None:
+                    self.clock.at(end, partial(self._asked_in_turn, what, ids[1:], key, end))
+                    return
 
     def _collide(self, one: Burst, two: Burst) -> None:
         """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""

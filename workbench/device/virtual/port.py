@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from collections import deque
 from collections.abc import Sequence
 from functools import partial
@@ -11,17 +12,23 @@ from dynamixel_sdk import PortHandler
 from workbench.device.virtual.bus import ServoBus
 from workbench.device.virtual.clock import MILLISECOND, SECOND
 
+CHUNK = 62
+"""Bytes that an FTDI chip hands over at once, without waiting for more."""
+
 
 class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     """An adapter such as the U2D2 on a virtual bus; `echo` hears itself, as adapters without direction control do.
 
-    unplugged: as if pulled out: what the operating system then raises is raised.
+    unplugged: as if pulled out: what the operating system then raises is raised. latency: how long bytes are kept at most, as an
+    FTDI chip does where they are fewer than 62 [s]; jitter: by how much less it may be [s].
     """
 
     def __init__(self, bus: ServoBus, rate: int = 1_000_000, echo: bool = False) -> None:
         super().__init__("virtual")
         self.bus, self.echo = bus, echo
         self.unplugged = False
+        self.latency, self.jitter, self._rng = 0.0, 0.0, random.Random(0)
+        self._kept: list[int] = []
         self._rx: deque[int] = deque()
         self._sending_until = 0
         bus.join(self)
@@ -31,7 +38,20 @@ class VirtualPort(PortHandler):  # type: ignore[misc]  # the SDK is untyped
     def hear(self, times: Sequence[int], values: bytes, garbled: Sequence[bool], rate: int) -> None:
         """Bytes from the bus; at a wrong rate they come out as noise."""
         wrong = abs(rate - self.baudrate) > 0.03 * self.baudrate
-        self._rx.extend(value ^ 0xA5 if wrong else value for value in values)
+        heard = [value ^ 0xA5 if wrong else value for value in values]
+        if not self.latency:
+            self._rx.extend(heard)
+            return
+        if not self._kept:
+            delay = self.latency - self.jitter * self._rng.random()
+            self.bus.clock.after(round(delay * SECOND), self._hand_over)
+        self._kept += heard
+        if len(self._kept) >= CHUNK:
+            self._hand_over()
+
+    def _hand_over(self) -> None:
+        self._rx.extend(self._kept)
+        self._kept.clear()
 
     def setupPort(self, cflag_baud: int) -> bool:
         """Any rate will do."""

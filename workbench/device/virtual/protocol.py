@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol as TypingProtocol
 
 BROADCAST = 0xFE
-PING, READ, WRITE, REG_WRITE, ACTION, RESET, REBOOT, SYNC_WRITE = 1, 2, 3, 4, 5, 6, 8, 0x83
+PING, READ, WRITE, REG_WRITE, ACTION, RESET, REBOOT, SYNC_WRITE, SYNC_READ = 1, 2, 3, 4, 5, 6, 8, 0x83, 0x82
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from workbench.device.virtual.protocol import PING, READ, SYNC_WRITE, WRITE, Instruction
+from workbench.device.virtual.protocol import PING, READ, SYNC_READ, SYNC_WRITE, WRITE, Instruction
 
 HEADER = b"\xff\xff\xfd\x00"
 STATUS = 0x55
@@ -80,7 +80,7 @@ def crc16(data: bytes) -> int:
 
 def _narrow(instruction: int, parameters: bytes) -> bytes:
     """Parameters with addresses and lengths of one byte, as the servo's conduct has them."""
-    if instruction in (READ, SYNC_WRITE) and len(parameters) >= 4:
+    if instruction in (READ, SYNC_WRITE, SYNC_READ) and len(parameters) >= 4:
         return bytes([parameters[0], parameters[2]]) + parameters[4:]
     if instruction == WRITE and len(parameters) >= 2:
         return parameters[:1] + parameters[2:]

@@ -150,6 +150,17 @@ class VirtualServo:
         self._refresh(time)
         self._answer(time, 0, bytes(self._table[address:address + count]), self.profile.answer_times[1], level=1)
 
+    def answer_in_turn(self, what: bytes, time: int) -> int | None:
+        """One of many that were asked at once for `what`, address and count, when it is its turn. When its last byte is out, None
+        where it says nothing."""
+        address, count = what
+        if not self.powered or self.mute or time < self._deaf_until or address + count > self.profile.size:
+            return None
+        self._heard = time
+        self.alarms()
+        self._refresh(time)
+        return self._answer(time, 0, bytes(self._table[address:address + count]), self.profile.answer_times[1], level=1)
+
     def _write(self, packet: Instruction, time: int) -> None:
         error, ready = RANGE, time
         took = self.profile.answer_times[2] + self.profile.answer_times[3] * max(len(packet.parameters) - 1, 0)
@@ -261,12 +272,13 @@ class VirtualServo:
         return self["cw_angle_limit"] == 0 and self["ccw_angle_limit"] == 0
 
     def _answer(self, time: int, error: int, parameters: bytes, took: float, level: int, broadcast: bool = False,
-                ident: int | None = None) -> None:
+                ident: int | None = None) -> int | None:
+        """Puts an answer on the wire; when its last byte will be out [ticks], None where there is none."""
         if broadcast or self.mute or self["status_return_level"] < level:
-            return
+            return None
         delay = self["return_delay_time"] * self.profile.return_delay_unit + took + self._rng.uniform(0, 2e-6)
         data = self.profile.protocol.status(self.ident if ident is None else ident, error | self.alarms(), parameters)
-        self.bus.talk(self, data, self.rate, self._starts(time + round(delay * SECOND), len(data)))
+        return self.bus.talk(self, data, self.rate, self._starts(time + round(delay * SECOND), len(data)))
 
     def _starts(self, first: int, count: int) -> list[int]:
         """Starts of so many bytes; none falls into the motor interrupt."""

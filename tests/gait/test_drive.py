@@ -1,0 +1,122 @@
+"""Steering once a cycle: path, step-to-step map, the quadratic programme, and the loop closed on a robot that obeys the map."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from workbench.files import InputError
+from workbench.gait.drive.controller import CycleController, DriveOptions, limited, observed, plan
+from workbench.gait.drive.path import WayPath
+from workbench.gait.drive.step_map import StepMap, increments
+
+MAP = StepMap(bias=0.0, gain=1.0, memory=0.4, ahead=0.12, aside=0.0, aside_gain=0.0, scatter=(0.01, 0.001), most=0.15)
+PERIOD = 0.4
+
+
+def test_a_path_passes_its_way_points_and_begins_ahead() -> None:
+    path = WayPath([(1.0, 0.0), (2.0, 0.5), (2.0, 1.5)])
+    assert path.heading(0.0) == pytest.approx(0.0, abs=1e-6)
+    for point in path.points:
+        assert np.hypot(*(path.p - point).T).min() < 0.004
+    along, left = path.project(np.array([0.5, 0.03]), 0.5)
+    assert along == pytest.approx(0.5, abs=0.05)
+    assert left > 0.02
+
+
+def test_a_straight_path_projects_exactly_and_goes_on_beyond_its_end() -> None:
+    path = WayPath([(2.0, 0.0)])
+    assert path.project(np.array([2.3, -0.1]), 2.0) == pytest.approx((2.3, -0.1))
+
+
+@pytest.mark.parametrize("points", [[], [(1.0, 0.0), (1.0, 0.0)], [(float("nan"), 0.0)], [(2000.0, 0.0)]])
+def test_impossible_way_points_are_refused(points: list[tuple[float, float]]) -> None:
+    with pytest.raises(InputError, match="way-point"):
+        WayPath(points)
+
+
+def test_increments_are_in_the_frame_at_each_beginning() -> None:
+    yaw = np.pi / 2
+    poses = np.array([[0.0, 0.0, yaw], [-0.01, 0.1, yaw + 0.1], [-0.01, 0.1, yaw + 0.1 - 2 * np.pi]])
+    assert increments(poses)[0] == pytest.approx([0.1, 0.01, 0.1])
+    assert increments(poses)[1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_without_binding_limits_the_plan_is_the_least_squares_solution() -> None:
+    """The programme written out as one linear least-squares problem in the turns, solved by the normal equations."""
+    o, N = DriveOptions(most=10.0, most_change=10.0), 4
+    left, heading, before, bias = 0.05, 0.1, 0.02, 0.03
+    targets = np.array([0.0, 0.05, 0.1, 0.1, 0.1])
+
+    def rolled(u: np.ndarray) -> np.ndarray:
+        y, e, last, rows = left, heading - targets[0], before, []
+        for j in range(N):
+            rows += [y / o.aside, e / o.turned, (u[j] - last) / o.change]
+            y, e = y + MAP.ahead * e + MAP.aside, e + MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - np.diff(targets)[j]
+            last = u[j]
+        return np.array([*rows, y / o.aside, e / o.turned])
+
+    base = rolled(np.zeros(N))
+    J = np.column_stack([rolled(np.eye(N)[j]) - base for j in range(N)])
+    best = -np.linalg.solve(J.T @ J, J.T @ base)
+    assert plan(left, heading, before, bias, targets, MAP, o) == pytest.approx(best, abs=1e-5)
+
+
+def test_the_plan_keeps_its_limits_where_they_bind() -> None:
+    o = DriveOptions()
+    u = plan(0.5, 1.0, 0.0, 0.1, np.zeros(o.horizon + 1), MAP, o)
+    assert np.abs(u).max() <= o.most + 1e-6
+    assert np.abs(np.diff(np.concatenate([[0.0], u]))).max() <= o.most_change + 1e-6
+    assert u[0] == pytest.approx(-o.most_change, abs=1e-5)
+    assert limited(-1.0, 0.1, o) == pytest.approx(0.1 - o.most_change)
+
+
+@pytest.mark.parametrize("law", ["mpc", "proportional"])
+@pytest.mark.parametrize("bias", [np.radians(3.0), np.radians(-4.0)])
+def test_a_robot_that_turns_by_itself_is_brought_onto_the_line(law: str, bias: float) -> None:
+    """Without steering it would turn by 3 or 4 deg a cycle. One pose in ten is lost."""
+    driven = _drive(DriveOptions(law=law), bias, lost=0.1)  # type: ignore[arg-type]
+    assert abs(driven[-1, 1]) < 0.03
+    assert abs(driven[-1, 2]) < np.radians(4.0)
+
+
+def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
+    o, x = DriveOptions(drift=1e-6), np.zeros(13)
+    x[6] = o.first_bias**2
+    heading = 0.0
+    for _ in range(40):
+        heading += 0.03
+        x = observed(x, np.array([0.0, 0.0, heading]), 0.0, replace(MAP, scatter=(1e-4, 0.0)), o)
+    assert x[3] == pytest.approx(0.03, abs=1e-4)
+    assert np.sqrt(x[6]) < 1e-3
+
+
+def test_a_robot_that_the_cameras_lost_is_stopped() -> None:
+    controller = CycleController(WayPath([(3.0, 0.0)]), MAP, PERIOD, DriveOptions(lost=3))
+    context = controller.CreateDefaultContext()
+    stops = []
+    for _ in range(4):
+        controller.GetInputPort("pose").FixValue(context, np.full(3, np.nan))
+        context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
+        stops.append(controller.GetOutputPort("stop").Eval(context)[0])
+    assert stops == [0, 0, 1, 1]
+
+
+def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40) -> np.ndarray:
+    """A robot that obeys MAP, plus its own bias and the map's scatter. Poses (cycles, 3)."""
+    rng = np.random.default_rng(3)
+    controller = CycleController(WayPath([(10.0, 0.0)]), MAP, PERIOD, options)
+    context = controller.CreateDefaultContext()
+    pose, played, committed, poses = np.zeros(3), 0.0, 0.0, []
+    for _ in range(cycles):
+        seen = np.full(3, np.nan) if rng.random() < lost else pose + rng.normal(size=3) * [1e-4, 1e-4, 0.002]
+        controller.GetInputPort("pose").FixValue(context, seen)
+        context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
+        after = float(controller.GetOutputPort("turn").Eval(context)[0])
+        turned = MAP.turned(committed, played) + bias + rng.normal() * MAP.scatter[0]
+        pose = pose + np.array([MAP.ahead * np.cos(pose[2]), MAP.ahead * np.sin(pose[2]), turned])
+        played, committed = committed, after
+        poses.append(pose)
+    return np.array(poses)

@@ -1,0 +1,292 @@
+"""The host's side of the campaign: a motion played on emulated servos while every k-th event goes wrong, in virtual time.
+
+An event is a packet of the host's or an answer of a servo. Faults that pass (a lost answer, a stall) strike at every k-th event;
+faults that stay (a servo that falls silent) strike once, at event k. `Run.play` says which invariants were violated.
+"""
+
+from __future__ import annotations
+
+import csv
+import random
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tests.device.servos import Robot, arm, robot
+from tests.rude.monitor import Monitor, Sample
+from workbench.device.bus import BusError
+from workbench.device.bus.survey import survey
+from workbench.device.play import PlayOptions, perform
+from workbench.device.stop import Stop
+from workbench.files import InputError
+from workbench.motion import Motion
+from workbench.robot.servo_profile_file import servo_profile
+
+JOINTS = ("one", "three", "two")
+ANGLES = np.radians([[0.0, 0, 0], [12, -10, 8], [-6, 9, -12], [0, 4, 5], [10, -8, 0], [0, 0, 0]])
+MOTION = Motion("wave", 0.1 * np.arange(6), JOINTS, ANGLES)
+START = {"one": 0.25, "two": -0.2, "three": 0.1}
+FOUND_WITHIN = 0.4
+"""A silent, hot or overloaded servo ends the motion within so long [s], and a pose of 0.1 s."""
+
+
+@dataclass
+class Run:
+    """One playing with one kind of fault. k: of the events. seed: of what is random in a fault."""
+
+    family: str
+    fault: str
+    k: int
+    seed: int = 0
+    robot: Robot = field(init=False)
+    struck: list[float] = field(init=False, default_factory=list)
+    excused: set[int] = field(init=False, default_factory=set)
+    stop: Stop = field(init=False, default_factory=Stop)
+    events: int = field(init=False, default=0)
+    armed: bool = field(init=False, default=False)
+
+    def __post_init__(self) -> None:
+        self.rng = random.Random(f"{self.family}/{self.fault}/{self.k}/{self.seed}")
+
+    # What goes wrong
+
+    def due(self, once: bool = False) -> bool:
+        """Counts an event; whether it is to fail."""
+        if not self.armed:
+            return False
+        self.events += 1
+        hit = self.events == self.k if once else self.events % self.k == 0
+        if hit:
+            self.struck.append(self.now)
+        return hit
+
+    @property
+    def now(self) -> float:
+        """Virtual time [s]."""
+        return self.robot.wire.clock.now / 72e6
+
+    def install(self) -> None:
+        """Puts the fault between the host, the wire and the servos."""
+        port, wire = self.robot.port, self.robot.wire
+        write, talk = port.writePort, wire.talk
+        servos = set(map(id, self.robot.servos.values()))
+
+        def on_write(packet: list[int]) -> int:
+            if self.fault in AT_WRITES:
+                changed = AT_WRITES[self.fault](self, list(packet))
+                if changed is None:
+                    return len(packet)
+                packet = changed
+            return write(packet)
+
+        def on_talk(talker: object, values: bytes, rate: int, starts: list[int] | int) -> int:
+            if id(talker) in servos and self.fault in AT_ANSWERS and self.due():
+                values, starts = AT_ANSWERS[self.fault](self, values, starts)
+                if not values:
+                    return starts if isinstance(starts, int) else starts[0]
+            return talk(talker, values, rate, starts)
+
+        port.writePort, wire.talk = on_write, on_talk
+
+    # The run
+
+    def play(self) -> list[str]:
+        """Plays, and returns what was violated, a line each."""
+        with tempfile.TemporaryDirectory() as folder:
+            return self._play(Path(folder))
+
+    def _play(self, folder: Path) -> list[str]:
+        self.robot = r = robot(self.family, START, model=arm(folder))
+        if self.fault == "slow adapter":
+            r.port.latency, r.port.jitter = 1e-3 * (self.k % 17), 1e-3 * (self.k % 17) * (self.seed % 2)
+        commands = MOTION.commands(2)
+        monitor, profile = Monitor(fastest=1.05 * float(commands.speeds.max())), servo_profile(self.family)
+        bus = r.bus()
+        found = survey(bus, r.model, ids=())
+        self.install()
+        self.armed = True
+
+        def sample() -> None:
+            s = r.servos
+            angle = {v.joint: r.body.sense(v.joint, r.wire.clock.now).angle for v in s.values()}
+            monitor.samples.append(Sample(
+                self.now, {v.joint: bool(v.powered and v["torque_enable"]) for v in s.values()},
+                {v.joint: profile.angle(v["goal_position"]) for v in s.values()}, angle,
+                {v.joint: v["moving_speed"] * profile.speed_unit for v in s.values()}))
+            r.at(0.002, sample)
+
+        r.at(0.0, sample)
+        result, said = None, ""
+        try:
+            result = perform(bus, found, commands, folder / "w.csv", lambda: self.stop.reason, PlayOptions(rest=0.3))
+        except (BusError, InputError) as e:
+            said = str(e)
+        ended = self.now
+        self.armed = False
+        r.wire.clock.advance(r.wire.clock.now + 72_000_000)
+        monitor.excused = self.excused
+        out = monitor.too_fast()
+        gone = r.port.unplugged
+        if not gone:
+            out += monitor.after_release(ended) + monitor.torque_at_the_end()
+        if self.struck and self.fault in ASKED:
+            out += monitor.after_stop(self.struck[0]) if self.fault == "ctrl-c" else monitor.after_release(self.struck[-1] + 0.03)
+        if result is None:
+            return out if said else [*out, "ended without a word"]
+        out += self._told(monitor, result, commands, ended)
+        return out + self._logged(monitor, folder / "w.csv", result)
+
+    def _told(self, monitor: Monitor, result: object, commands: object, ended: float) -> list[str]:
+        """Success is only said where all was done; what should have ended it did."""
+        ids = self.robot.model.bus_ids
+        fine = not (result.stopped or result.unknown or result.missed)
+        out = []
+        if fine:
+            near = 1.5 * servo_profile(self.family).count
+            ends = [*commands.times.tolist()[1:], commands.end]
+            poses = [(result.started + t, result.started + e, {ids[j]: a for j, a in zip(commands.joints, row)})
+                     for t, e, row in zip(commands.times.tolist(), ends, commands.goals.tolist())]
+            out += monitor.poses_missed(poses, near)
+            if self.fault in ENDS_IT and self.struck and result.started < self.struck[0] < result.ended - 0.6:
+                out.append(f"{self.fault} at {self.struck[0]:.3f} s, and all is said to be well")
+        if self.fault in ENDS_IT and self.struck and result.started < self.struck[0] < result.ended:
+            late = result.ended - self.struck[0]
+            if late > FOUND_WITHIN + 0.11:
+                out.append(f"{self.fault} at {self.struck[0]:.3f} s ended the motion only {late:.3f} s later")
+        return out
+
+    def _logged(self, monitor: Monitor, log: Path, result: object) -> list[str]:
+        if not log.exists():
+            return [] if result.log_problem else ["no log, and nothing said of it"]
+        rows = list(csv.DictReader(log.read_text().splitlines()))
+        goals = np.array([[float(row[f"goal.{j}"]) for j in JOINTS] for row in rows])
+        changed = np.flatnonzero(np.abs(np.diff(goals, axis=0)).max(axis=1) > 1e-6)
+        if not np.isfinite(result.started) or not len(changed):
+            return []
+        zero = result.started - float(rows[changed[0] + 1]["time"])
+        ids = self.robot.model.bus_ids
+        cells = [(float(row["time"]) + zero, ids[j], np.radians(float(row[f"position.{j}"])))
+                 for row in rows for j in JOINTS if row[f"position.{j}"]]
+        return monitor.log_errors(cells, np.radians(0.6))
+
+
+# Faults at the host's packets: what becomes of one, None where nothing goes out.
+
+def _stall(shortest: float, longest: float) -> Callable[[Run, list[int]], list[int] | None]:
+    def strike(run: Run, packet: list[int]) -> list[int]:
+        if run.due(once=longest > 0.25):
+            run.robot.port.pause(run.rng.uniform(shortest, longest))
+        return packet
+    return strike
+
+
+def _garbled_command(run: Run, packet: list[int]) -> list[int]:
+    if run.due():
+        packet[run.rng.randrange(len(packet))] ^= 1 << run.rng.randrange(8)
+    return packet
+
+
+def _lost_command(run: Run, packet: list[int]) -> list[int] | None:
+    return None if run.due() else packet
+
+
+def _once(do: Callable[[Run], None]) -> Callable[[Run, list[int]], list[int] | None]:
+    def strike(run: Run, packet: list[int]) -> list[int]:
+        if run.due(once=True):
+            do(run)
+        return packet
+    return strike
+
+
+def _mute(run: Run) -> None:
+    run.robot.servos["two"].mute = True
+
+
+def _hot(run: Run) -> None:
+    run.robot.servos["two"].temperature = 69.0
+
+
+def _overload(run: Run) -> None:
+    run.robot.servos["two"].overload = True
+
+
+def _cable(run: Run) -> None:
+    run.robot.servos["two"].power(False)
+    run.excused.add(2)
+
+
+def _brown_out(run: Run) -> None:
+    for servo in run.robot.servos.values():
+        servo.power(False)
+        servo.power(True)
+
+
+def _unplug(run: Run) -> None:
+    run.robot.port.unplugged = True
+
+
+def _ctrl_c(run: Run) -> None:
+    run.stop.ask("Ctrl-C")
+
+
+def _ctrl_c_twice(run: Run) -> None:
+    run.stop.ask("Ctrl-C")
+    run.robot.at(0.02, lambda: run.stop.ask("Ctrl-C"))
+
+
+AT_WRITES: dict[str, Callable[[Run, list[int]], list[int] | None]] = {
+    "short stall": _stall(0.005, 0.06), "long stall": _stall(0.3, 0.6), "garbled command": _garbled_command,
+    "lost command": _lost_command, "silent servo": _once(_mute), "hot servo": _once(_hot), "overload": _once(_overload),
+    "cable": _once(_cable), "brown-out": _once(_brown_out), "unplugged": _once(_unplug), "ctrl-c": _once(_ctrl_c),
+    "ctrl-c twice": _once(_ctrl_c_twice)}
+
+
+# Faults at the servos' answers.
+
+def _lost(run: Run, values: bytes, starts: list[int] | int) -> tuple[bytes, list[int] | int]:
+    return b"", starts
+
+
+def _cut(run: Run, values: bytes, starts: list[int] | int) -> tuple[bytes, list[int] | int]:
+    n = run.rng.randrange(1, len(values))
+    return values[:n], starts if isinstance(starts, int) else starts[:n]
+
+
+def _flip(run: Run, values: bytes, starts: list[int] | int) -> tuple[bytes, list[int] | int]:
+    k = run.rng.randrange(len(values))
+    return values[:k] + bytes([values[k] ^ 1 << run.rng.randrange(8)]) + values[k + 1:], starts
+
+
+def _stray(run: Run, values: bytes, starts: list[int] | int) -> tuple[bytes, list[int] | int]:
+    first = starts if isinstance(starts, int) else starts[0]
+    return bytes([run.rng.randrange(256)]) + values, [first, *(t + 720 for t in (range(
+        first, first + 720 * len(values), 720) if isinstance(starts, int) else starts))]
+
+
+AT_ANSWERS: dict[str, Callable[[Run, bytes, list[int] | int], tuple[bytes, list[int] | int]]] = {
+    "lost answer": _lost, "cut answer": _cut, "flipped bit": _flip, "stray byte": _stray}
+
+ENDS_IT = ("silent servo", "hot servo", "overload", "cable", "brown-out")
+"""Faults that have to end the motion."""
+ASKED = ("ctrl-c", "ctrl-c twice")
+FAULTS = (*AT_WRITES, *AT_ANSWERS, "slow adapter")
+EVERY = (3, 5, 7, 11, 17, 29, 53, 97)
+"""Of the events, for faults that pass."""
+
+
+def campaign(faults: int, seed: int = 0) -> tuple[int, list[tuple[Run, str]]]:
+    """Runs until so many faults have struck. Returns how many did, and what was violated by which run."""
+    rng, struck, out = random.Random(seed), 0, []
+    n = 0
+    while struck < faults:
+        fault = FAULTS[n % len(FAULTS)]
+        passing = fault in AT_ANSWERS or fault in ("short stall", "garbled command", "lost command")
+        k = rng.choice(EVERY) if passing else rng.randrange(1, 900)
+        run = Run(("AX-12A", "XL-330", "STS3215")[n // len(FAULTS) % 3], fault, k, rng.randrange(1000))
+        out += [(run, line) for line in run.play()]
+        struck += max(len(run.struck), 1)
+        n += 1
+    return struck, out

@@ -1,0 +1,68 @@
+"""Every k-th event of a playing fails, for every kind of fault; a monitor that shares no code with the player judges."""
+
+import pytest
+
+from tests.rude.host_campaign import EVERY, FAULTS, Run, campaign
+from tests.rude.monitor import Monitor, Sample
+
+FOUND = [
+    ("XL-330", "short stall", 3, 26),
+    ("XL-330", "lost command", 53, 702),
+    ("XL-330", "lost command", 7, 241),
+    ("XL-330", "garbled command", 7, 573),
+    ("AX-12A", "short stall", 3, 93),
+    ("STS3215", "long stall", 544, 255),
+]
+"""Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
+lost on the wire, or were sent in a bunch after a stall, and exit code 0."""
+
+
+@pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])
+def test_what_the_campaign_once_found(found):
+    assert Run(*found).play() == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_fault_makes_the_player_do_harm_or_lie(seed):
+    """1,500 faults in all."""
+    struck, violated = campaign(300, seed)
+    assert struck >= 300
+    assert [f"{run.family}, {run.fault}, {run.k}, {run.seed}: {line}" for run, line in violated] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(100, 120))
+def test_a_hundred_thousand_faults(seed):
+    """5,000 for each seed."""
+    struck, violated = campaign(5_000, seed)
+    assert struck >= 5_000
+    assert [f"{run.family}, {run.fault}, {run.k}, {run.seed}: {line}" for run, line in violated] == []
+
+
+def test_faults_strike():
+    """A campaign in which nothing happens proves nothing."""
+    for fault in ("lost answer", "lost command", "short stall", "stray byte"):
+        run = Run("AX-12A", fault, EVERY[2])
+        run.play()
+        assert len(run.struck) > 10, fault
+    assert len(FAULTS) == len(set(FAULTS)) >= 17
+
+
+def test_the_monitor_sees_what_it_is_there_for():
+    """Each invariant, broken on purpose."""
+
+    def sample(time, **of):
+        values = {"torque": True, "goal": 0.0, "angle": 0.0, "speed": 1.0} | of
+        return Sample(time, *({1: values[k]} for k in ("torque", "goal", "angle", "speed")))
+
+    assert "torque 0.100 s after" in Monitor(1.0, [sample(0.0), sample(0.1)]).after_release(0.0)[0]
+    limp = [sample(0.1, torque=False), sample(0.2, torque=False, angle=0.1)]
+    assert "moves by 0.100 rad" in Monitor(1.0, limp).after_release(0.0)[0]
+    away = [sample(0.1, goal=0.1), sample(0.2, goal=0.3)]
+    assert "goal goes from 0.100 to 0.300" in Monitor(1.0, away).after_stop(0.0)[0]
+    assert Monitor(1.0, away[::-1]).after_stop(0.0) == []
+    for speed in (0.0, 2.0):
+        assert "to a goal 0.50 rad away" in Monitor(1.0, [sample(0.0, goal=0.5, speed=speed)]).too_fast()[0]
+    assert Monitor(1.0, [sample(0.0)]).torque_at_the_end() == ["servo 1 still has torque"]
+    assert Monitor(1.0, [sample(0.0), sample(0.1)]).poses_missed([(0.0, 0.2, {1: 0.3})], 0.01)
+    assert Monitor(1.0, [sample(0.0), sample(0.1)]).log_errors([(0.05, 1, 0.1)], 0.01)

@@ -1,0 +1,99 @@
+"""Bytes on a port, as they come: what answers a ping, how soon, and whether the adapter hears itself."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
+
+from workbench.device.bus.errors import BusError, NoAnswerError
+from workbench.device.bus.group import HEADER1, HEADER2, crc16
+
+if TYPE_CHECKING:
+    from workbench.device.bus.bus import Bus
+
+NOBODY = 0xFC
+"""ID that is asked to find out whether the adapter hears itself; who has it answers after the echo."""
+SLOWEST = 50.0
+"""How long an adapter may keep an answer [ms], beyond its bytes; FTDI chips keep it for 16 on Linux unless told otherwise."""
+LEAST = 3.0
+"""Patience with the fastest adapter [ms]: what a computer that does other things besides takes now and then."""
+QUESTIONS = 10
+
+
+def ping(protocol: int, servo: int) -> bytes:
+    """The packet."""
+    if protocol == 1:
+        body = bytes([servo, 2, 1])
+        return HEADER1 + body + bytes([~sum(body) & 0xFF])
+    head = HEADER2 + bytes([servo, 3, 0, 1])
+    return head + crc16(head).to_bytes(2, "little")
+
+
+def hear(port: Any, data: bytes, most: int, patience: float) -> bytes:
+    """What comes back within the time of `most` bytes and `patience` [ms] after a packet, whatever it is."""
+    port.clearPort()
+    port.writePort(list(data))
+    deadline = port.getCurrentTime() + (len(data) + most) * port.tx_time_per_byte + patience
+    back = b""
+    while port.getCurrentTime() < deadline:
+        back += bytes(port.readPort(most))
+    return back
+
+
+def clean(protocol: int, answer: bytes) -> bool:
+    """Whether this is one whole answer to a ping; a stray byte or two before it, as the bus turns round, are not the servo's."""
+    length = 6 if protocol == 1 else 14
+    at = answer.find(HEADER1 if protocol == 1 else HEADER2)
+    packet = answer[at:at + length]
+    if not 0 <= at <= 2 or len(answer) - at != length:
+        return False
+    if protocol == 1:
+        return ~sum(packet[2:-1]) & 0xFF == packet[-1]
+    return crc16(packet[:-2]) == int.from_bytes(packet[-2:], "little")
+
+
+def hears_itself(port: Any, protocol: int) -> bool:
+    """Whether a packet comes back."""
+    sent = ping(protocol, NOBODY)
+    return hear(port, sent, len(sent) + 14, SLOWEST).startswith(sent)
+
+
+def measure_latency(bus: Bus, servo: int) -> float:
+    """How long a servo's answers take beyond their bytes [s], the median of ten; the port's patience is set by the slowest of
+    them. NoAnswerError where it does not answer with all the patience there is."""
+    port, took = bus.port, []
+    floor, port.patience = max(float(port.patience), LEAST), SLOWEST
+    size = bus.profile.registers["id"].size
+    bytes_of = (8 + 6 + size if bus.profile.protocol == 1 else 14 + 11 + size) * port.tx_time_per_byte
+    try:
+        for _ in range(QUESTIONS):
+            begun = bus.now()
+            with suppress(NoAnswerError):
+                bus.read(servo, "id")
+                took.append(1000 * (bus.now() - begun) - bytes_of)
+    finally:
+        port.patience = floor
+    if not took:
+        raise NoAnswerError("no answer", servo, bus.joints.get(servo))
+    took.sort()
+    port.patience = max(floor, min(1.5 * took[-1] + 2, SLOWEST))
+    bus.latency = max(took[len(took) // 2], 0.0) / 1000
+    return bus.latency
+
+
+def slow_adapter(latency: float) -> str:
+    """What to do about answers that come late by so much [s]; "" where it is no worth a word."""
+    if latency < SLOW_ANSWERS:
+        return ""
+    return (f"answers come {1000 * latency:.0f} ms late: the adapter keeps them. On Linux an FTDI chip is told not to by "
+            "`echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer`")
+
+
+SLOW_ANSWERS = 2e-3
+"""From here on it is worth a word [s]."""
+
+
+def echo_error() -> BusError:
+    """Of an adapter that hears itself."""
+    return BusError("the adapter hears what it sends itself, so that every ID seems to answer; use one that does not "
+                    "(U2D2, USB2Dynamixel), or say --echo")

@@ -1,0 +1,57 @@
+"""How a motion is played, and how it went."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class PlayOptions:
+    """How a motion is played.
+
+    ramp_speed: of the fastest joint on the way to neutral [rad/s], a tenth of what an AX-12 can do. step: between the goals of
+    a ramp [s]. arrive: how near to its goal a joint has to come [rad], beyond what it droops under the robot's weight; within:
+    how long it may take beyond the ramp [s]. seat: by how much at most a joint is told more than neutral, so that it is there
+    itself before it is let down onto its droop [rad]; seat_seconds: how long it gets for that, and then to come to rest [s].
+    rest: how long the robot stands in neutral before the first pose and after the last [s]; a recording needs half a second of
+    it. watchdog: silence after which servos that can stop by themselves do [s]. start_torque: share of the torque limit that the
+    servos get for the first way to neutral, so that a joint that is caught somewhere is not torn off. torque: the same for the
+    motion. hold: torque stays on at the end.
+    """
+
+    ramp_speed: float = 0.6
+    step: float = 0.02
+    arrive: float = math.radians(12)
+    within: float = 1.0
+    seat: float = math.radians(4)
+    seat_seconds: float = 0.3
+    rest: float = 1.0
+    watchdog: float = 0.5
+    start_torque: float = 0.5
+    torque: float = 1.0
+    hold: bool = False
+
+
+@dataclass(frozen=True)
+class Played:
+    """How it went. started: when the first pose was sent, ended: when the last one's dwell was over or the motion was stopped,
+    on the bus's clock [s]. worst_late: by which a pose was late [s]. stopped: why it ended early, "" where it did not. released:
+    whether torque is off. unknown: joints that did not say so when they were asked. rates: readings of each joint in the motion,
+    a second. repaired: goals that did not arrive and were sent again. missed: goals known not to have arrived in time, and poses
+    sent only when the next one was due. log_problem: why there is no joint log, "" where there is one."""
+
+    journal: Path
+    started: float
+    ended: float
+    poses: int
+    worst_late: float
+    stopped: str
+    released: bool
+    unknown: tuple[str, ...] = ()
+    rates: Mapping[str, float] = field(default_factory=dict)
+    repaired: int = 0
+    missed: int = 0
+    log_problem: str = ""

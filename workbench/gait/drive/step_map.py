@@ -1,0 +1,118 @@
+"""The step-to-step map: what one cycle of the gait does to heading and position, given how much it was asked to turn.
+
+    heading(k+1) = heading(k) + bias + gain · turn(k) + memory · turn(k-1)
+    ahead, aside of one cycle, in the body's frame at its beginning: means, and aside changes with turn
+
+fitted by least squares to rollouts in which each cycle's turn is drawn at random. Its residuals are the gait's own scatter from
+cycle to cycle, which no controller that acts once a cycle can remove.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.compare.metrics import heading
+from workbench.files import InputError
+from workbench.gait.drive.family import GaitFamily
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation import Job, SimulationConfig, simulate_batch
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MapOptions:
+    """How the map is fitted.
+
+    cycles: of each rollout; 30 give each of four numbers some twenty independent samples. rollouts: of one model. most: largest
+    turn asked [rad per stance]; beyond 0.15 the puppy's feet leave their reach. hold: cycles for which a turn is kept, so that
+    both gain and memory show. time_step: of the simulation [s].
+    """
+
+    cycles: int = 30
+    rollouts: int = 3
+    most: float = 0.15
+    hold: int = 2
+    time_step: float = 1e-3
+
+
+@dataclass(frozen=True)
+class StepMap:
+    """bias [rad per cycle], gain and memory [rad per rad of turn], ahead and aside [m per cycle], aside_gain [m per rad of turn];
+    scatter: standard deviation of one cycle's heading change [rad] and of its aside [m] about the map. most: largest turn [rad]
+    that it was fitted to."""
+
+    bias: float
+    gain: float
+    memory: float
+    ahead: float
+    aside: float
+    aside_gain: float
+    scatter: tuple[float, float]
+    most: float
+
+    def turned(self, turn: float, before: float) -> float:
+        """Heading change of a cycle [rad], without the robot's own bias beyond the map's."""
+        return self.bias + self.gain * turn + self.memory * before
+
+
+def cycle_poses(take: Take, begin: float, period: float, cycles: int) -> Array:
+    """x, y [m] and heading [rad] of the base at the beginning of each cycle and the end of the last, (cycles + 1, 3). begin: of
+    the first cycle [s after the first command]."""
+    assert take.p_WB is not None
+    assert take.quat_WB is not None
+    times = begin + period * np.arange(cycles + 1) + (0.0 if np.isnan(take.starts_at) else take.starts_at)
+    columns = [take.p_WB[:, 0], take.p_WB[:, 1], heading(take.quat_WB)]
+    return np.column_stack([np.interp(times, take.time, c) for c in columns])
+
+
+def fit_step_map(family: GaitFamily, model: RobotModel, seed: int = 0, options: MapOptions | None = None) -> StepMap:
+    """The map of one robot. InputError where the robot falls, or steering does nothing to it."""
+    options = options or MapOptions()
+    rng = np.random.default_rng(seed)
+    drawn = rng.uniform(-options.most, options.most, (options.rollouts, -(-options.cycles // options.hold)))
+    turns = np.repeat(drawn, options.hold, axis=1)[:, :options.cycles]
+    config = SimulationConfig(time_step=options.time_step, contact_period=0.0, log_period=0.01)
+    begin = family.table(0.0).start_seconds
+    seconds = begin + options.cycles * family.period
+    takes = simulate_batch([Job(model, config, family.sequence(list(u)), seconds) for u in turns])
+    rows, changes = [], []
+    for take, asked in zip(takes, turns):
+        poses = cycle_poses(take, begin, family.period, options.cycles)
+        if not np.isfinite(poses).all() or _fell(take):
+            raise InputError(None, "the robot falls while its turning is varied; this gait cannot be steered")
+        moved = increments(poses)
+        rows.append(np.column_stack([np.ones(len(asked) - 1), asked[1:], asked[:-1]])[1:])
+        changes.append(moved[2:])
+    return _fitted(np.concatenate(rows), np.concatenate(changes), options.most)
+
+
+def increments(poses: Array) -> Array:
+    """Of poses (N + 1, 3): ahead, aside [m] in the frame at each cycle's beginning, and heading change [rad], (N, 3)."""
+    step, yaw = np.diff(poses, axis=0), poses[:-1, 2]
+    ahead = np.cos(yaw) * step[:, 0] + np.sin(yaw) * step[:, 1]
+    aside = -np.sin(yaw) * step[:, 0] + np.cos(yaw) * step[:, 1]
+    return np.column_stack([ahead, aside, np.arctan2(np.sin(step[:, 2]), np.cos(step[:, 2]))])
+
+
+def _fitted(A: Array, changes: Array, most: float) -> StepMap:
+    turning, *_ = np.linalg.lstsq(A, changes[:, 2], rcond=None)
+    side, *_ = np.linalg.lstsq(A[:, :2], changes[:, 1], rcond=None)
+    left = float(np.std(changes[:, 2] - A @ turning, ddof=3)), float(np.std(changes[:, 1] - A[:, :2] @ side, ddof=2))
+    gain = float(turning[1])
+    if abs(gain) * most < left[0]:
+        turns, scatter = np.rad2deg(abs(gain) * most), np.rad2deg(left[0])
+        raise InputError(None, f"steering by {most:g} rad turns this gait by {turns:.1f} deg a cycle, less than its scatter "
+                               f"({scatter:.1f} deg); it cannot be steered")
+    ahead = float(changes[:, 0].mean())
+    return StepMap(float(turning[0]), gain, float(turning[2]), ahead, float(side[0]), float(side[1]), left, most)
+
+
+def _fell(take: Take) -> bool:
+    assert take.quat_WB is not None
+    x, y = take.quat_WB[:, 1], take.quat_WB[:, 2]
+    return bool(np.min(1 - 2 * (x**2 + y**2)) < np.cos(np.radians(45)))

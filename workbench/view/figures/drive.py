@@ -1,0 +1,45 @@
+"""A driven path: where the robot was to go, where it went, and what was decided in each cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from workbench.gait.drive.loop import Driven
+from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, legend_above, new_figure, styled
+
+
+@styled
+def driven_path(closed: Driven, straight: Driven | None = None) -> Figure:
+    """Seen from above, x forward to the right, y left upwards [m]: the path, the way-points, the steered robot and, if given, the
+    same robot with the straight gait."""
+    figure = new_figure(9, 4.8)
+    axes = figure.subplots()
+    axes.plot(*closed.path.p.T, color=COMMAND, linewidth=1.2, linestyle="--", label="path")
+    axes.plot(*closed.path.points.T, "o", color=COMMAND, markersize=6, label="way-points")
+    if straight is not None:
+        axes.plot(straight.poses[:, 0], straight.poses[:, 1], color=OTHERS[0], linewidth=1.4, label="not steered")
+    axes.plot(closed.poses[:, 0], closed.poses[:, 1], ".-", color=SIMULATED, label="steered, end of each cycle")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("forward [m]")
+    axes.set_ylabel("left [m]")
+    legend_above(axes)
+    return figure
+
+
+@styled
+def driven_cycles(closed: Driven, most: float) -> Figure:
+    """Per cycle: lateral error [cm], heading error [deg], turn that was played [rad per stance] with its limit, and the estimated
+    turning bias [deg per cycle]. most: largest turn [rad per stance]."""
+    figure = new_figure(9, 6.4)
+    rows = figure.subplots(4, 1, sharex=True)
+    cycles = np.arange(len(closed.turns))
+    for axes, values, label in zip(rows, (100 * closed.left, np.rad2deg(closed.off), closed.turns, np.rad2deg(closed.bias)),
+                                   ("left of path [cm]", "heading error [deg]", "turn [rad]", "bias [deg/cycle]")):
+        axes.axhline(0, color="#999999", linewidth=0.8)
+        axes.plot(cycles, values, ".-", color=ACCENT if label.startswith("bias") else SIMULATED)
+        axes.set_ylabel(label)
+    for limit in (-most, most):
+        rows[2].axhline(limit, color=COMMAND, linestyle=":", linewidth=1)
+    rows[-1].set_xlabel("cycle")
+    return figure

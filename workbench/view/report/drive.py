@@ -1,0 +1,73 @@
+"""The page of a driven path."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from workbench.files.reading import write_whole
+from workbench.gait.certificate import CLAIM
+from workbench.gait.drive.loop import SETTLED, Driven
+from workbench.gait.drive.step_map import StepMap
+from workbench.robot import RobotModel
+from workbench.view.figures.drive import driven_cycles, driven_path
+from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
+
+
+def drive_numbers(driven: Driven) -> dict[str, object]:
+    """For JSON: why it stopped, errors from `SETTLED` on, and how far it passed from each way-point. Metres and degrees."""
+    s, end = driven.settled, driven.poses[-1]
+    return {"reason": driven.reason, "cycles": len(driven.turns) - 1,
+            "end": {"x": float(end[0]), "y": float(end[1]), "heading_deg": float(np.rad2deg(end[2]))},
+            "largest_lateral_error_m": float(np.abs(driven.left[s]).max()) if s.any() else None,
+            "largest_heading_error_deg": float(np.rad2deg(np.abs(driven.off[s]).max())) if s.any() else None,
+            "missed_waypoints_m": [float(v) for v in driven.missed()], "bias_deg_per_cycle": float(np.rad2deg(driven.bias[-1]))}
+
+
+def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driven, straight: Driven | None, most: float
+                ) -> list[Path]:
+    """Writes drive.json and report.html into `folder`; returns the paths, the page first. straight: the same robot, not steered;
+    most: largest turn [rad per stance]."""
+    numbers = drive_numbers(closed)
+    content = {"format": 1, "claim": CLAIM, "steered": numbers,
+               "not_steered": None if straight is None else drive_numbers(straight),
+               "step_map": {k: v if not isinstance(v, tuple) else list(v) for k, v in vars(step_map).items()},
+               "poses": closed.poses.tolist(), "turns": closed.turns.tolist()}
+    write_whole(folder / "drive.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
+    report = Report("Driven path", f"{closed.reason}; way-points passed at {misses} cm.", CLAIM,
+                    provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
+    report.add(Section("The path", [Picture(driven_path(closed, straight), "Both robots are the same, with the same gait.")]))
+    cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
+    report.add(Section("Cycle by cycle", [cycles, _errors(closed, straight)]))
+    report.add(Section("The step-to-step map", [_map(step_map), Text(
+        "The scatter of one cycle's heading bounds what any controller that acts once a cycle can reach.")]))
+    return [report.write(folder / "report.html"), folder / "drive.json"]
+
+
+def _errors(closed: Driven, straight: Driven | None) -> Table:
+    rows = []
+    for name, run in (("steered", closed), ("not steered", straight)):
+        if run is not None:
+            n = drive_numbers(run)
+            errors = _number(n["largest_lateral_error_m"], 100), _number(n["largest_heading_error_deg"], 1)
+            rows.append([name, run.reason, *errors])
+    return Table(["robot", "stopped", "largest lateral error [cm]", "largest heading error [deg]"], rows,
+                 f"Errors at the ends of cycles, from {SETTLED} m along the path on.")
+
+
+def _number(value: object, factor: float) -> str:
+    return f"{factor * value:.1f}" if isinstance(value, float) else "–"
+
+
+def _map(m: StepMap) -> Table:
+    deg = np.rad2deg
+    return Table(["quantity", "value"], [
+        ["heading change per cycle, going straight", f"{deg(m.bias):.2f} deg"],
+        [f"at the largest turn of {m.most:g} rad, same cycle", f"{deg(m.gain * m.most):.1f} deg"],
+        [f"at the largest turn of {m.most:g} rad, next cycle", f"{deg(m.memory * m.most):.1f} deg"],
+        ["distance per cycle", f"{100 * m.ahead:.1f} cm"],
+        ["scatter of one cycle's heading", f"{deg(m.scatter[0]):.2f} deg"],
+        ["scatter of one cycle's lateral position", f"{1000 * m.scatter[1]:.1f} mm"]])
