@@ -102,7 +102,7 @@ def _servo(rng: Rng) -> ServoConstants:
 def _bus_servo(rng: Rng) -> ServoConstants:
     """A small bus servo with a proportional law."""
     return ServoConstants(
-        model="bus servo", stall_torque=1.0, no_load_speed=7.0, rated_voltage=6.0,
+        model="bus servo", stall_torque=1.0, no_load_speed=7.0, rated_voltage=6.0, torque_tolerance=0.1, back_emf_tolerance=0.1,
         supply_voltage=round(float(rng.uniform(5.6, 6.2)), 2), coulomb_friction=0.03, viscous_friction=0.01,
         reflected_inertia=0.004, compliance_slope=None, compliance_margin=None,
         punch=None, proportional_gain=round(float(rng.uniform(2.5, 5.0)), 2))

@@ -16,6 +16,7 @@ class ParallelSpring(Effect):
     name = "parallel_spring"
     layer = "structure"
     places = ("joint",)
+    tied = "gravity against torque"
     parameters = (Parameter("stiffness", "N m/rad", 0.0, 20.0, 0.1),)
 
     def sentence(self, spec: EffectSpec) -> str:
