@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
-FREEDOM = 4.0
-"""Of the t of sizes: twelve degrees of play, where one servo in a hundred has four, cost nine nats more than one degree does."""
-SELDOM = float(student_t.ppf(0.995, FREEDOM))
-"""Scales that one in a hundred is from the center."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -139,15 +135,15 @@ class Prior:
     def of(cls, h: Hypothesis, options: EvidenceOptions) -> Prior:
         n = len(h.numbers)
         center, scale, normal, one_sided = [np.zeros(n)], [np.ones(n)], [np.ones(n, bool)], [np.zeros(n, bool)]
-        freedom = [np.ones(n)]
+        freedom, furthest = [np.ones(n)], float(student_t.ppf(0.995, options.freedom))
         for c in h.effects:
             low, high = c.bounds()
             shapes, seldom = c.shapes, np.full(c.size, np.nan) if c.read_off else c.seldom()
             told = np.isfinite(seldom)
             center.append(np.where(c.read_off, 1.0, np.zeros(c.size)))
-            width = np.where(told, seldom / SELDOM, 1.0 if c.read_off else options.width)
+            width = np.where(told, seldom / furthest, 1.0 if c.read_off else options.width)
             scale.append(np.where(shapes, options.doublings, width))
-            freedom.append(np.where(told, FREEDOM, 1.0))
+            freedom.append(np.where(told, options.freedom, 1.0))
             normal.append(shapes)
             one_sided.append(~shapes & ((low >= 0) | (high <= 0)) & (not c.read_off))
         return cls(*(np.concatenate(x) for x in (center, scale, normal, one_sided, freedom)))

@@ -1,0 +1,46 @@
+"""Priors and ends of an effect's size by what one servo in a hundred passes."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from workbench.effects.registry import known_effects
+from workbench.identify.evidence.hypothesis import Prior, start
+from workbench.identify.evidence.options import EvidenceOptions
+from workbench.identify.parameters import Candidate
+from workbench.robot import puppy_model
+
+KNOWN = known_effects()
+
+
+def prior_of(name: str, neutral: float) -> tuple[Candidate, Prior]:
+    c = Candidate.of(KNOWN[name], ("j",), (neutral,))
+    return c, Prior.of(start(()).with_effect(c, np.array([1.0])), EvidenceOptions())
+
+
+@pytest.mark.parametrize(("name", "neutral", "beyond"), [("backlash", 0.0, 4.0), ("command_delay", 0.0, 0.04)])
+def test_one_in_a_hundred_is_beyond_what_the_effect_says(name, neutral, beyond):
+    c, prior = prior_of(name, neutral)
+    (x,) = c.sizes([beyond])
+    assert quad(lambda v: np.exp(prior.log(np.array([v]))), x, np.inf)[0] == pytest.approx(0.01, rel=1e-3)
+    assert quad(lambda v: np.exp(prior.log(np.array([v]))), 0.0, np.inf)[0] == pytest.approx(1.0, rel=1e-3)
+
+
+def test_twelve_degrees_of_play_cost_more_than_where_nobody_says_what_is_usual():
+    (_, play), (_, soft) = prior_of("backlash", 0.0), prior_of("joint_compliance", np.inf)
+    cost = [p.log(np.array([1.0])) - p.log(np.array([12.0])) for p in (play, soft)]
+    assert cost[0] > 8.0 > 3.0 > cost[1]
+
+
+def test_friction_twice_as_much_one_way_is_as_far_as_half():
+    c, _ = prior_of("friction_asymmetry", 1.0)
+    assert c.sizes([2.0])[0] == pytest.approx(-c.sizes([0.5])[0])
+    assert c.values(c.sizes([3.0]))[0] == pytest.approx(3.0)
+
+
+def test_no_number_goes_further_than_twice_that_and_a_stiffness_has_no_end():
+    model = puppy_model()
+    reach = {name: KNOWN[name].reach(None, model, ("flm",)) for name in ("backlash", "friction_asymmetry", "joint_compliance")}
+    assert reach["backlash"] == pytest.approx(8.0)
+    assert np.exp(reach["friction_asymmetry"]) == pytest.approx(2.5**2)
+    assert reach["joint_compliance"] == np.inf
