@@ -7,11 +7,13 @@ import pytest
 
 from tests.device.servos import arm, robot
 from tests.device.test_play import START, limp
+from workbench.api.robot_run import run_on_robot
 from workbench.device.bus.survey import survey
 from workbench.device.play import PlayOptions, perform
 from workbench.device.stop import Stop
 from workbench.device.tables.limits import check_limits
 from workbench.device.virtual import seconds
+from workbench.files import InputError
 from workbench.motion import Motion
 from workbench.recording.formats.read import read_recording
 
@@ -249,3 +251,18 @@ def test_the_journal_tells_of_the_second_signal(tmp_path):
     assert result.log_problem == ""
     assert read_recording(tmp_path / "w.csv").time[-1] > 0.5
     assert json.dumps(result.stopped)
+
+
+def test_a_run_that_was_stopped_before_it_began_says_why(tmp_path):
+    """Not that there is no joint log, which is only what follows from it."""
+    r = robot(angles=START, model=arm(tmp_path))
+    with pytest.raises(InputError, match=r"^stopped: Ctrl-C; there is no joint log"):
+        run_on_robot(r.bus(), r.model, wave(0.1), 1, tmp_path / "run", lambda: "Ctrl-C", options=OPTIONS)
+
+
+def test_a_run_whose_servo_did_not_confirm_its_release_is_not_done(tmp_path):
+    r = robot(angles=START, model=arm(tmp_path))
+    r.at(3.0, lambda: setattr(r.servos["two"], "mute", True))
+    run = run_on_robot(r.bus(), r.model, wave(0.1), 3, tmp_path / "run", lambda: "", options=OPTIONS)
+    assert not run.done
+    assert any("torque may still be on in two" in warning for warning in run.warnings)

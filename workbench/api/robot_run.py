@@ -16,6 +16,7 @@ from workbench.device.capture.background import BackgroundRecording
 from workbench.device.controller.play import ControllerRun, play_by_controller
 from workbench.device.play import Played, PlayOptions, perform, preflight
 from workbench.device.tables.table_file import table_file
+from workbench.files import InputError
 from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_registers import save_registers
@@ -26,13 +27,15 @@ Progress = Callable[[str, float | None], None]
 
 @dataclass(frozen=True)
 class RobotRun:
-    """session: its file. takes: as they stand in it. capture: of the cameras, None where there were none."""
+    """session: its file. takes: as they stand in it. capture: of the cameras, None where there were none. done: whether all was
+    played that was asked for, and torque is off."""
 
     session: Path
     takes: tuple[dict[str, Any], ...]
     played: Played | ControllerRun
     capture: Capture | None
     warnings: tuple[str, ...]
+    done: bool = True
 
 
 def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folder: Path, stop: Callable[[], str], *,
@@ -59,6 +62,8 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
                          options, progress=tell)
     finally:
         capture = None if background is None else background.stop(played.ended if played else None)
+    if played.log_problem:
+        raise InputError(None, f"stopped: {played.stopped}; there is no joint log: {played.log_problem}")
     if virtual is not None and played.poses:
         tell("what the cameras saw", None)
         capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
@@ -67,9 +72,14 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     takes = _takes(name, cycles, base, played, capture)
     session = write_session(folder, model, takes, "registers.yaml")
     warnings = [f"register {d}" for d in registers.departures(model)] + list(capture.problems if capture else ())
+    if played.missed:
+        warnings.insert(0, f"{played.missed} goals did not reach their servos in time; this was not the motion asked for")
+    if played.unknown:
+        warnings.insert(0, f"torque may still be on in {', '.join(played.unknown)}: no answer; switch the robot's power off")
     if played.stopped:
         warnings.insert(0, f"stopped: {played.stopped}")
-    return RobotRun(session, tuple(takes), played, capture, tuple(warnings))
+    done = not (played.missed or played.unknown or played.stopped)
+    return RobotRun(session, tuple(takes), played, capture, tuple(warnings), done)
 
 
 def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int, folder: Path, stop: Callable[[], str], *,

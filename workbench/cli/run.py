@@ -76,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"wrote {done.session}")
         if done.played.stopped:
             return 130 if done.played.stopped.startswith("Ctrl-C") else 2
+        if not done.done:
+            return 2
         session = load_session(done.session)
         comparison = compare_session(session, progress=progress, n_jobs=args.jobs)
         write_comparison(comparison, session.model, args.out / "comparison", f"Session {session.path}", progress)
