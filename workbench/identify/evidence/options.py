@@ -37,15 +37,12 @@ class EvidenceOptions:
     its size is looked for, from a tenth of a servo's count to a lost arm.
 
     The priors. width: Cauchy scale of an effect's sizes, in typical ones (A. Gelman et al., Ann. Appl. Stat. 2, 2008: a weak
-    prior with heavy tails); sheet: standard deviation of the logarithm of torque at full duty and of back-EMF that a data sheet
-    says: of one servo that was weighed against (STS3215, 12 V) they are 2.5 and 1.9 times that; doublings: standard deviation of
-    a number that only shapes an effect, a factor of four either way. expected: effects that one joint's servo is thought to lack,
-    spread over all names that are tried; it pays for having searched many.
     prior with heavy tails); freedom: degrees of freedom of Student's t of a size of which an effect says what one servo in a
     hundred passes, with that as its 99 % point: 12 deg of play then cost nine nats more than 1 deg, where 4 are passed by one in
-    a hundred; doublings: standard deviation of a number that only shapes an effect, a factor of four either way.
-    expected: effects that one joint's servo is thought to lack, spread over all names that are tried; it pays for having searched
-    many.
+    a hundred; sheet: standard deviation of the logarithm of torque at full duty and of back-EMF that a data sheet says: of one
+    servo that was weighed against (STS3215, 12 V) they are 2.5 and 1.9 times that; doublings: standard deviation of a number that
+    only shapes an effect, a factor of four either way. expected: effects that one joint's servo is thought to lack, spread over
+    all names that are tried; it pays for having searched many.
 
     The search. explored [s]: the longest correlation that counts while it explores, about a stick or a slip, as what poor models
     leave is correlated for longer. horizon [s]: of the windows, each from the recorded state, by which it explores: several times
