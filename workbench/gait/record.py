@@ -125,8 +125,9 @@ def from_plain(kind: type[T], content: Mapping[str, Any]) -> T:
     values: dict[str, Any] = {}
     for key, value in content.items():
         f = known[key]
-        inner = hints[f.name]
-        values[f.name] = (from_plain(inner, value) if is_dataclass(inner) else tuple(value) if isinstance(value, list)
+        inner: Any = hints[f.name]
+        nested = isinstance(inner, type) and is_dataclass(inner)
+        values[f.name] = (from_plain(inner, value) if nested else tuple(value) if isinstance(value, list)
                           else math.nan if value is None and inner is float else value)
     for key, f in known.items():
         if f.name not in values and f.default is MISSING:
