@@ -74,12 +74,7 @@ def rows(model: RobotModel, folder: Path = GAITS) -> list[Row]:
 def certified(certificate: Certificate) -> Did:
     """What the certificate says."""
     n = certificate.nominal
-    return Did("certificate", n["forward m/s"], n["heading deg/m"], n["tilt deg"], largest_torque(certificate))
-
-
-def largest_torque(certificate: Certificate) -> float:
-    """Of any joint from power-on to standstill, lasting 10 ms [N m]."""
-    return max(float(certificate.ways[part]["peak torque N m"]) for part in ("start", "gait", "stop"))
+    return Did("certificate", n.forward, n.heading, n.tilt, certificate.ways.torque)
 
 
 def played(row: Row, model: RobotModel, by: str) -> Did:
@@ -124,12 +119,11 @@ def markdown(found: list[Row]) -> str:
     for row in found:
         n, d, c = row.certificate.nominal, row.certificate.draws, row.certificate.cycle
         five = d["speed m/s"][1] if "speed m/s" in d else None
-        back = list(c.get("cycles until it is back", {}).values())
         lines.append(
-            f"| `{row.name}`: `{row.command}` | {n['forward m/s']:.3f} | {'–' if five is None else f'{five:.3f}'} | "
-            f"{d['falls']} of {d['count']} | {d['heading deg/m RMS']:.0f} | {n['tilt deg']:.1f} deg, "
-            f"{largest_torque(row.certificate):.2f} N m | {'–' if not back or None in back else f'{max(back)} cycles'} | "
-            f"{c['heading deg, standard deviation']:.2g} deg |")
+            f"| `{row.name}`: `{row.command}` | {n.forward:.3f} | {'–' if five is None else f'{five:.3f}'} | "
+            f"{d['falls']} of {d['count']} | {d['heading deg/m RMS']:.0f} | {n.tilt:.1f} deg, "
+            f"{row.certificate.ways.torque:.2f} N m | {'–' if c.slowest is None else f'{c.slowest} cycles'} | "
+            f"{c.heading:.2g} deg |")
     return "\n".join(lines)
 
 

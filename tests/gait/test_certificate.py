@@ -1,6 +1,7 @@
 """Certificates: bound to their table and robot, and asked for by export."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from tests.command import refused, succeeds
 from workbench.files import InputError
-from workbench.gait.certificate import NAME, Certificate, check_certificate, has_mark, read_certificate
+from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.examine import Examiner
@@ -64,11 +65,11 @@ def test_says_what_there_is_to_say(made):
     assert c.other_engine["largest speed apart"] < 0.02
     assert {m.name for m in c.margins} >= {"tilt over draws", "slip over draws", "foot clearance over draws", "engines apart"}
     assert c.draws["speed m/s"][1] is None  # of two draws there is no 5th percentile
-    back = c.cycle["cycles until it is back"]
+    back = c.cycle.back
     assert {"from neutral", "at once", "a pose got lost", "a push to the left", "from another table"} <= set(back)
     assert all(n is not None and n <= 5 for n in back.values())
-    assert c.cycle["heading deg, standard deviation"] < 1.0
-    assert c.ways["at rest"]["largest angle off neutral deg"] < 6
+    assert c.cycle.heading < 1.0
+    assert c.ways.rest.off < 6
     assert shape_from(json.loads((folder / NAME).read_text())["shape"]) == table.shape
     assert "a claim about the model" in json.loads((folder / NAME).read_text())["claim"]
     assert c.as_text() == certified.certificate.as_text()
@@ -151,9 +152,15 @@ def test_the_robotis_walk_needs_none(capsys, tmp_path):
     assert "wrote" in said
 
 
-def test_nan_is_null():
-    empty = Certificate(True, "r", {}, "m", (), {"slip m/s": float("nan"), "rms": np.float64(0.5)}, {}, {}, {}, {}, {}, {})
-    assert json.loads(empty.as_text())["nominal"] == {"slip m/s": None, "rms": 0.5}
+def test_what_is_not_known_is_null_in_the_file_and_comes_back_as_nan(made, tmp_path):
+    certificate = made[3].certificate
+    blind = replace(certificate, nominal=replace(certificate.nominal, slip=float("nan"), power=np.float64(30.5)))
+    (tmp_path / NAME).write_text(blind.as_text())
+    assert json.loads(blind.as_text())["nominal"]["slip m/s"] is None
+    again = read_certificate(tmp_path / NAME)
+    assert math.isnan(again.nominal.slip)
+    assert again.nominal.power == 30.5
+    assert (again.ways, again.cycle) == (certificate.ways, certificate.cycle)
 
 
 def test_engines_that_disagree_anywhere_break_the_certificate(made):

@@ -14,6 +14,7 @@ from workbench.files import InputError
 from workbench.files.reading import read_text
 from workbench.gait.evaluate import table_sha256
 from workbench.gait.limits import Margin
+from workbench.gait.record import Nominal, Steadiness, Ways, from_plain, to_plain
 from workbench.motion import Motion, PoseTable
 from workbench.robot import RobotModel
 
@@ -22,6 +23,10 @@ MARK = "made by workbench optimize; its certificate is certificate.json beside i
 """What stands in the first line of a motion that has a certificate."""
 CLAIM = "All numbers are the model's: a speed here is a claim about the model until a robot has walked it."
 PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went 37."
+
+
+RECORDS: dict[str, type[Any]] = {"nominal": Nominal, "ways": Ways, "cycle": Steadiness}
+"""Fields that are records of their own."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +46,19 @@ class Certificate:
     tables: Mapping[str, str]
     model_sha256: str
     margins: tuple[Margin, ...]
-    nominal: Mapping[str, Any]
+    nominal: Nominal
     draws: Mapping[str, Any]
     floor: Mapping[str, Any]
     other_engine: Mapping[str, Any]
-    ways: Mapping[str, Any]
-    cycle: Mapping[str, Any]
+    ways: Ways
+    cycle: Steadiness
     shape: Mapping[str, Any]
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """What the file holds, in plain types, with the sha256 of all the rest."""
-        content = plain({"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"},
+        records = {k: to_plain(getattr(self, k)) for k in RECORDS}
+        content = plain({"format": 1, "claim": CLAIM, **{k: v for k, v in vars(self).items() if k != "margins"}, **records,
                          "margins": [vars(m) for m in self.margins]})
         return {**content, "sha256": _digest(content)}
 
@@ -63,12 +69,12 @@ class Certificate:
     def summary(self) -> str:
         """In a few lines, for a person."""
         n, d = self.nominal, self.draws
-        turns = n["unit"] == "rad/s"
+        turns = n.unit == "rad/s"
         unit, factor = ("deg/s", 180 / math.pi) if turns else ("m/s", 1.0)
-        nominal = f"{factor * n['speed']:.3g} {unit} on the nominal robot of the model"
+        nominal = f"{factor * n.speed:.3g} {unit} on the nominal robot of the model"
         lines = [f"{self.request}: {nominal}"]
         if d.get("count"):
-            lowest, five = d[f"speed {n['unit']}"][:2]
+            lowest, five = d[f"speed {n.unit}"][:2]
             low = f"lowest {factor * lowest:.3g}" if five is None else f"5th percentile {factor * five:.3g}"
             falls = f"{d['falls']} fell (below {100 * d['falls at most']:.2g} % at 95 %)"
             lines = [f"{self.request}: {low} {unit} of {d['count']} random variants of the robot, {nominal}",
@@ -79,7 +85,7 @@ class Certificate:
         advice = max((m for m in self.margins if m.advice), key=lambda m: m.use, default=None)
         if advice is not None and advice.use > 1:
             lines.append(f"warning: beyond {advice}: it heats")
-        if self.cycle.get("cycles until it is back"):
+        if self.cycle.back:
             lines.append(_returns(self.cycle))
         if self.other_engine:
             e = self.other_engine
@@ -89,14 +95,12 @@ class Certificate:
         return "\n".join(lines)
 
 
-def _returns(cycle: Mapping[str, Any]) -> str:
+def _returns(cycle: Steadiness) -> str:
     """Whether the gait is one limit cycle, and how steady, in a line."""
-    back = cycle["cycles until it is back"]
-    lost = [entry for entry, cycles in back.items() if cycles is None]
-    scatter = f"heading scatters by {cycle['heading deg, standard deviation']:.2g} deg from cycle to cycle"
-    if lost:
-        return f"does not come back to its cycle: {', '.join(lost)}; {scatter}"
-    return f"entered otherwise, pushed, or with a pose lost it walks as before after {max(back.values())} cycles; {scatter}"
+    scatter = f"heading scatters by {cycle.heading:.2g} deg from cycle to cycle"
+    if cycle.lost:
+        return f"does not come back to its cycle: {', '.join(cycle.lost)}; {scatter}"
+    return f"entered otherwise, pushed, or with a pose lost it walks as before after {cycle.slowest} cycles; {scatter}"
 
 
 def read_certificate(path: str | Path) -> Certificate:
@@ -107,9 +111,10 @@ def read_certificate(path: str | Path) -> Certificate:
     try:
         content = json.loads(read_text(path))
         digest = content.pop("sha256")
+        good = content["format"] == 1 and digest == _digest(content)
         margins = tuple(Margin(**m) for m in content.pop("margins"))
-        kept = {k: content[k] for k in Certificate.__dataclass_fields__ if k != "margins"}
-        good = content["format"] == 1 and digest == _digest({**content, "margins": [vars(m) for m in margins]})
+        kept = {k: from_plain(RECORDS[k], content[k]) if k in RECORDS else content[k]
+                for k in Certificate.__dataclass_fields__ if k != "margins"}
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(path, f"not a certificate ({type(e).__name__}: {e})") from None
     if not good:

@@ -6,7 +6,7 @@ import math
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from workbench.gait.limit_cycle import LimitCycle
 from workbench.gait.limits import contact_margin, return_margin, run_margins, table_margins, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure
+from workbench.gait.record import Nominal, Steadiness
 from workbench.gait.request import Request
 from workbench.gait.requirements import direction_margins, drift, floor_margins, speed_margins
 from workbench.gait.second_engine import conditions
@@ -124,18 +125,14 @@ def _vendor_table(machine: GaitMachine) -> PoseTable | None:
         return None
 
 
-def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> dict[str, Any]:
+def _cycle(cycle: LimitCycle | None, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> Steadiness:
     """How the gait repeats, from cycle to cycle, and from where it comes back to that."""
-    told: dict[str, Any] = {"speed m/s, standard deviation": nominal.scatter[0],
-                            "heading deg, standard deviation": math.degrees(nominal.scatter[1])}
     walked = [math.degrees(m.scatter[1]) for m in draws if not m.fell and math.isfinite(m.scatter[1])]
-    if walked:
-        told["heading deg, standard deviation, median of draws"] = float(np.median(walked))
-    if cycle is not None:
-        told["watched"] = cycle.watched
-        told["cycles until it is back"] = {r.entry: r.cycles for r in cycle.returns}
-        told["fell"] = [r.entry for r in cycle.returns if r.fell]
-    return told
+    told = Steadiness(nominal.scatter[0], math.degrees(nominal.scatter[1]), float(np.median(walked)) if walked else None)
+    if cycle is None:
+        return told
+    return replace(told, watched=cycle.watched, back={r.entry: r.cycles for r in cycle.returns},
+                   fell=tuple(r.entry for r in cycle.returns if r.fell))
 
 
 def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]:
@@ -147,16 +144,11 @@ def _floor(request: Request, measures: dict[str, GaitMeasure]) -> dict[str, Any]
             "all": float(np.std(list(speeds.values()))), "heading deg/m, all": float(np.std(list(drifts.values())))}
 
 
-def _numbers(machine: GaitMachine, request: Request, m: GaitMeasure, feet: FeetMeasure) -> dict[str, Any]:
+def _numbers(machine: GaitMachine, request: Request, m: GaitMeasure, feet: FeetMeasure) -> Nominal:
     weight, speed = machine.model.kinematics.mass * GRAVITY, max(float(np.hypot(*m.velocity)), 1e-6)
-    return {
-        "speed": request.progress(m), "unit": request.unit, "heading deg/m": math.degrees(drift(request, m)),
-        "forward m/s": m.velocity[0], "left m/s": m.velocity[1], "turning deg/s": math.degrees(m.turn_rate),
-        "electrical power W": m.power, "mechanical power W": m.mechanical,
-        "electrical cost of transport": m.power / (weight * speed),
-        "mechanical cost of transport": m.mechanical / (weight * speed),
-        "mean supply current A": m.current, "peak supply current A": m.peak_current, "jerk of the base m/s^3": m.jerk,
-        "tilt deg": math.degrees(m.tilt), "slip m/s": feet.slip, "foot clearance mm": 1000 * feet.clearance,
-        "tipping margin deg": math.degrees(feet.tipping),
-        "RMS torque N m": dict(zip(machine.model.joints, m.rms))}
-
+    return Nominal(
+        speed=request.progress(m), unit=request.unit, heading=math.degrees(drift(request, m)), forward=m.velocity[0],
+        left=m.velocity[1], turning=math.degrees(m.turn_rate), power=m.power, mechanical_power=m.mechanical,
+        cost_of_transport=m.power / (weight * speed), mechanical_cost_of_transport=m.mechanical / (weight * speed),
+        current=m.current, peak_current=m.peak_current, jerk=m.jerk, tilt=math.degrees(m.tilt), slip=feet.slip,
+        clearance=1000 * feet.clearance, tipping=math.degrees(feet.tipping), rms=dict(zip(machine.model.joints, m.rms)))

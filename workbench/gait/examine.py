@@ -17,6 +17,7 @@ from workbench.gait.feet import FeetMeasure, feet_measure
 from workbench.gait.legs import Leg
 from workbench.gait.limit_cycle import LimitCycle, limit_cycle
 from workbench.gait.measure import GaitMeasure, base_jerk, fallen, measure
+from workbench.gait.record import Rest, Stretch, Ways
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.second_engine import Condition, Pair
 from workbench.gait.self_contact import Nearness, SelfContact
@@ -88,7 +89,7 @@ class NominalRun:
     take: Take
     measure: GaitMeasure
     feet: FeetMeasure
-    ways: dict[str, Any]
+    ways: Ways
     near: Nearness
     cycles: int
 
@@ -120,25 +121,19 @@ class Examiner:
         """How many are played to walk for so long [s], after the first."""
         return 1 + max(2, math.ceil(seconds / self.table.period))
 
-    def _ways(self, take: Take) -> dict[str, Any]:
+    def _ways(self, take: Take) -> Ways:
         """Of the parts of a whole run: start, gait, stop, and what follows."""
         assert take.p_WB is not None
         begin, end = self.table.start_seconds, self._walked_until(self.options.seconds)
         over = end + float(self.table.stop.dwells_ms.sum()) / 1000
-        parts = {"start": (take.time >= 0) & (take.time < begin), "gait": (take.time >= begin) & (take.time < end),
-                 "stop": take.time >= end}
-        told: dict[str, Any] = {}
-        for name, inside in parts.items():
-            told[name] = {"seconds": float(np.ptp(take.time[inside])), "peak torque N m": float(_lasting(take, inside)),
-                          "tilt deg": float(np.degrees(_tilt(take)[inside].max())),
-                          "jerk of the base m/s^3": _jerk(take, inside)}
-        rest = take.time > over + REST / 2
-        told["at rest"] = {"speed m/s": float(np.abs(np.gradient(take.p_WB[rest], take.time[rest], axis=0)).max()),
-                           "tilt deg": float(np.degrees(_tilt(take)[rest].max())),
-                           "largest angle off neutral deg": float(np.degrees(np.abs(take.q[rest]).max()))}
-        told["without a jerk"] = bool(max(told[k]["jerk of the base m/s^3"] for k in ("start", "stop"))
-                                      <= 1.5 * told["gait"]["jerk of the base m/s^3"])
-        return told
+        inside = ((take.time >= 0) & (take.time < begin), (take.time >= begin) & (take.time < end), take.time >= end)
+        start, gait, stop = (
+            Stretch(float(np.ptp(take.time[part])), _lasting(take, part), float(np.degrees(_tilt(take)[part].max())),
+                    _jerk(take, part)) for part in inside)
+        after = take.time > over + REST / 2
+        rest = Rest(float(np.abs(np.gradient(take.p_WB[after], take.time[after], axis=0)).max()),
+                    float(np.degrees(_tilt(take)[after].max())), float(np.degrees(np.abs(take.q[after]).max())))
+        return Ways(start, gait, stop, rest, bool(max(start.jerk, stop.jerk) <= 1.5 * gait.jerk))
 
     def robots(self, robots: Sequence[RobotModel]) -> list[Drawn]:
         """Robots of the ensemble, by the compiled station; where that gives up, because something other than a foot touched the

@@ -61,8 +61,7 @@ def draw_ranges(certificate: Certificate) -> Figure:
 
 def _nominal(certificate: Certificate) -> dict[str, float]:
     n = certificate.nominal
-    names = ("heading deg/m", "slip m/s", "foot clearance mm", "tipping margin deg", "electrical power W")
-    out = {k: float(n[k]) for k in names if n[k] is not None and math.isfinite(n[k])}
-    out[f"speed {n['unit']}"] = float(n["speed"])
-    out["largest RMS torque N m"] = max(n["RMS torque N m"].values())
-    return out
+    values = {"heading deg/m": n.heading, "slip m/s": n.slip, "foot clearance mm": n.clearance, "tipping margin deg": n.tipping,
+              "electrical power W": n.power, "tilt deg": n.tilt, f"speed {n.unit}": n.speed,
+              "largest RMS torque N m": n.largest_rms}
+    return {k: v for k, v in values.items() if math.isfinite(v)}

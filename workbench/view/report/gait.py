@@ -76,12 +76,12 @@ def _vendor_walk(model: RobotModel, seconds: float) -> tuple[Take, GaitMeasure] 
 def _headline(result: Optimized) -> str:
     assert result.certified is not None
     n, d = result.certified.certificate.nominal, result.certified.certificate.draws
-    turns = n["unit"] == "rad/s"
-    speed = f"{math.degrees(n['speed']):.0f} deg/s" if turns else f"{100 * n['speed']:.0f} cm/s"
+    turns = n.unit == "rad/s"
+    speed = f"{math.degrees(n.speed):.0f} deg/s" if turns else f"{100 * n.speed:.0f} cm/s"
     request = str(result.request)
     said = f"{request[0].upper()}{request[1:]}: {speed} on the model"
     if d.get("count"):
-        low = d["speed " + n["unit"]][1]
+        low = d["speed " + n.unit][1]
         if low is not None:
             five = f"{math.degrees(low):.0f} deg/s" if turns else f"{100 * low:.0f} cm/s"
             said = f"{request[0].upper()}{request[1:]}: {five} or more on 95 % of the robots drawn, {speed} on the nominal one"
@@ -91,17 +91,17 @@ def _headline(result: Optimized) -> str:
 
 def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
     n, d, e = certificate.nominal, certificate.draws, certificate.other_engine
-    turns = n["unit"] == "rad/s"
+    turns = n.unit == "rad/s"
     factor, unit = (180 / math.pi, "deg/s") if turns else (100.0, "cm/s")
     worst = max((m for m in certificate.margins if not m.advice), key=lambda m: m.use)
     advised = [f"ROBOTIS advises {m.limit:.2f}" for m in certificate.margins if m.advice and m.unit == "N m"]
-    numbers = [("speed", f"{factor * n['speed']:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} by the step"),
+    numbers = [("speed", f"{factor * n.speed:.1f} {unit}", f"± {factor * certificate.floor['steps']:.1f} by the step"),
                ("limit that binds", worst.name, f"{worst.value:.3g} of {worst.limit:.3g} {worst.unit}, {worst.where}"),
-               ("largest RMS torque", f"{max(n['RMS torque N m'].values()):.2f} N m", advised[0] if advised else ""),
-               ("electrical power", f"{n['electrical power W']:.0f} W",
-                f"cost of transport {n['electrical cost of transport']:.1f}")]
+               ("largest RMS torque", f"{n.largest_rms:.2f} N m", advised[0] if advised else ""),
+               ("electrical power", f"{n.power:.0f} W",
+                f"cost of transport {n.cost_of_transport:.1f}")]
     if d.get("count"):
-        lowest, five = d["speed " + n["unit"]][:2]
+        lowest, five = d["speed " + n.unit][:2]
         name, low = ("slowest draw", lowest) if five is None else ("5th percentile of draws", five)
         numbers.insert(0, (name, f"{factor * low:.1f} {unit}", f"heading {d['heading deg/m RMS']:.1f} deg/m RMS"))
     if e:
@@ -153,7 +153,7 @@ def _draws_section(certificate: Certificate) -> Section:
                   Picture(draw_ranges(certificate), "Thick: 5 to 95 % of the robots; thin: all; circle: the median; green: the "
                           "nominal robot.")]
     steps = ", ".join(f"{k} {100 * v:.1f}" for k, v in floor["speed"].items())
-    unit = "0.01 rad/s" if certificate.nominal["unit"] == "rad/s" else "cm/s"
+    unit = "0.01 rad/s" if certificate.nominal.unit == "rad/s" else "cm/s"
     parts.append(Text(f"Numerical floor: the speed of the nominal robot by step and contact model is {steps} {unit}; heading "
                       f"differs by {floor['heading deg/m, all']:.1f} deg/m (standard deviation)."))
     e = certificate.other_engine
@@ -161,7 +161,7 @@ def _draws_section(certificate: Certificate) -> Section:
                       f"{e['heading apart deg/m']:+.1f} deg/m apart." if e else
                       "No second engine played it: what is said here is one engine's word."))
     if e:
-        parts.append(Table(["condition", f"speed [{n['unit']}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
+        parts.append(Table(["condition", f"speed [{n.unit}]", f"in {e['name']}", "heading [deg/m]", f"in {e['name']}"],
                            [[k, *(f"{c[key]:.3f}" for key in ("speed", "speed elsewhere")),
                              *(f"{c[key]:+.1f}" for key in ("heading deg/m", "heading elsewhere deg/m"))]
                             for k, c in e["conditions"].items()]))
@@ -169,9 +169,10 @@ def _draws_section(certificate: Certificate) -> Section:
 
 
 def _way_section(certificate: Certificate) -> Section:
-    rows = [[name, *(f"{value:.2f}" for value in part.values())] for name, part in certificate.ways.items()
-            if isinstance(part, dict) and name != "at rest"]
-    said = ("Neither jerks the robot more than the gait itself." if certificate.ways["without a jerk"] else
+    ways = certificate.ways
+    rows = [[name, *(f"{value:.2f}" for value in (part.seconds, part.torque, part.tilt, part.jerk))]
+            for name, part in (("start", ways.start), ("gait", ways.gait), ("stop", ways.stop))]
+    said = ("Neither jerks the robot more than the gait itself." if ways.smooth else
             "The robot is jerked more than by the gait itself.")
     return Section("In, out and back", [
         Text("The start leads from neutral through the gait's stance and one cycle of half its size into the gait, the stop back "
@@ -183,15 +184,13 @@ def _way_section(certificate: Certificate) -> Section:
 def _cycle_parts(certificate: Certificate) -> list[Part]:
     """Whether the gait comes back to its cycle, and how much its cycles differ."""
     c = certificate.cycle
-    said = (f"From cycle to cycle heading scatters by {c['heading deg, standard deviation']:.2g} deg and speed by "
-            f"{100 * c['speed m/s, standard deviation']:.2g} cm/s (standard deviations, nominal robot)")
-    median = c.get("heading deg, standard deviation, median of draws")
+    said = (f"From cycle to cycle heading scatters by {c.heading:.2g} deg and speed by {100 * c.speed:.2g} cm/s (standard "
+            "deviations, nominal robot)")
+    median = c.heading_of_draws
     parts: list[Part] = [Text(said + ("." if median is None else f"; over draws heading by {median:.2g} deg (median)."))]
-    back = c.get("cycles until it is back")
-    if back:
-        fell = set(c["fell"])
-        never = f"not in {c['watched']}"
-        rows = [[entry, "fell" if entry in fell else never if n is None else str(n)] for entry, n in back.items()]
+    if c.back:
+        never = f"not in {c.watched}"
+        rows = [[entry, "fell" if entry in c.fell else never if n is None else str(n)] for entry, n in c.back.items()]
         parts.append(Table(["entered", "cycles until it walks as from neutral"], rows,
                            "Forward and sideways speed and turn of a cycle within a tenth of the settled gait's."))
     return parts
