@@ -30,8 +30,8 @@ class GaitLimits:
     links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
     twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
     ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides hangs on friction, which is known
-    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.3 to
-    0.45 of the speed in every gait that was found. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where
+    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.36
+    of the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where
     the feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot
     [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and
     latency is seen on its first metre, and another `turn` corrects it: 0.06 rad a stance took 25 and 40 deg/m out of two gaits,

@@ -28,7 +28,7 @@ def demo_options() -> OptimizeOptions:
     first = options_of(1)
     return replace(first, budget=replace(first.budget, seeds=30, screened=5, generations=6, population=8, draws=4, enough=1),
                    certify=replace(first.certify, draws=20, seconds=4.0, draw_seconds=2.0, variants=("2 ms", "1 ms", "0.5 ms")),
-                   screening=Screening((8,)))
+                   screening=Screening((8,), certified=2))
 
 
 def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float | None], None]) -> Section:
