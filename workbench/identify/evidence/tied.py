@@ -64,4 +64,3 @@ def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate)
     occam = 0.5 * c.size * math.log(2 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1])
     effect = density + occam + log_odds(len(region.candidates), options.expected)
     return AsTorque(by, alike, 1.0 / (1.0 + math.exp(min(torque - effect, 700.0))))
-
