@@ -15,6 +15,7 @@ from workbench.effects.apply import played
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, ServoConstants, load_servo_constants, puppy_model
+from workbench.robot.servo_profile_file import servo_profile, with_family_law
 from workbench.servo import ServoLaw
 from workbench.simulation import Job, Simulation
 from workbench.simulation.batch import run_job
@@ -173,3 +174,18 @@ def test_the_other_law_drops_what_goes_with_a_proportional_gain_alone():
     servo = REAL.updated({"compliance_slope": 32, "compliance_margin": 1, "punch": 32})
     assert servo.minimum_duty == servo.dead_zone == 0.0
     assert servo.goal_ramp == REAL.goal_ramp
+
+
+def test_what_a_file_leaves_out_of_the_law_comes_from_its_family() -> None:
+    sheet = ServoConstants(model="STS3215", stall_torque=2.94, no_load_speed=4.71, rated_voltage=12.0, supply_voltage=12.0,
+                           coulomb_friction=0.05, viscous_friction=0.06, reflected_inertia=0.028, proportional_gain=2.6,
+                           compliance_slope=None, compliance_margin=None, punch=None)
+    family = servo_profile("STS3215").nominal
+    full = with_family_law(sheet, ("stall_torque", "goal_ramp"))
+    assert full.goal_ramp == 0.0  # the file said so
+    for key in ("goal_delay", "minimum_duty", "dead_zone", "load_friction"):
+        assert getattr(full, key) == family[key].value > 0
+        assert full.share_known(key) == pytest.approx(family[key].sd / family[key].value)
+    assert full.stall_torque == 2.94
+    assert with_family_law(replace(sheet, model="a servo of no family"), ()) == replace(sheet, model="a servo of no family")
+    assert with_family_law(ServoConstants(), ()) == ServoConstants()  # of the AX-12A nothing more is known

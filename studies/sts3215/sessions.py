@@ -25,12 +25,9 @@ DUTY_PER_UNIT = 0.16489
 """Duty per radian of position error for each unit of the firmware's position gain, as the logs' authors state it."""
 GAINS, PROGRAMMES = (8, 16, 32), ("lift_and_drop", "sin_sin")
 SERVO = {"model": "STS3215", "stall_torque": 2.94, "no_load_speed": 4.71, "rated_voltage": 12.0, "supply_voltage": 12.0,
-         "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278,
-         "minimum_duty": {"value": 0.015, "sd": 0.0075}, "dead_zone": {"value": 0.0879, "sd": 0.044},
-         "goal_delay": {"value": 0.02, "sd": 0.01}, "goal_ramp": {"value": 299.0, "sd": 15.0},
-         "load_friction": {"value": 0.3, "sd": 0.18}, "torque_tolerance": 0.5, "back_emf_tolerance": 0.5}
+         "coulomb_friction": 0.0528, "viscous_friction": 0.059, "reflected_inertia": 0.0278}
 """Torque and speed of the data sheet at 12 V; friction and reflected inertia as published for the type (Rhoban/bam, M1);
-the law, and how well it is known, as in data/servos/sts3215.yaml, with the default goal speed, 3400 counts/s."""
+the rest of the law comes from the family's profile, data/servos/sts3215.yaml, as in any session that leaves it out."""
 SDF = """<?xml version="1.0"?>
 <sdf version="1.9"><model name="sts3215_rig">
 <link name="stand"/>

@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import Any
 
 from workbench.files import InputError
-from workbench.files.yaml_file import Fields
+from workbench.files.yaml_file import Fields, read_yaml
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
-from workbench.robot.servo_constants import KEYS, ServoConstants, load_servo_constants, servo_constants
+from workbench.robot.servo_constants import KEYS, ServoConstants, servo_constants
+from workbench.robot.servo_profile_file import with_family_law
 
 _CONSTANTS = set(KEYS)
 
@@ -36,7 +37,7 @@ def read_model(top: Fields) -> RobotModel:
     bodies = _rigid_bodies(f, links)
     ids = _bus_ids(f, joints)
     feet = _feet(f, links)
-    servos = read_servos(f, joints)
+    servos = read_servos(f, joints, by_family=True)
     held = f.flag("held")
     f.done()
     return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
@@ -100,21 +101,27 @@ def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
     return ids
 
 
-def read_servos(f: Fields, joints: tuple[str, ...]) -> dict[str, ServoConstants]:
-    """Constants by joint, of the key `servos`: one for all or one for each, as files or as they are; empty where it is absent."""
+def read_servos(f: Fields, joints: tuple[str, ...], by_family: bool = False) -> dict[str, ServoConstants]:
+    """Constants by joint, of the key `servos`: one for all or one for each, as files or as they are; empty where it is absent.
+
+    by_family: whether what the file leaves out of the servo's law (delay, goal ramp, minimum duty, dead zone, load friction, …)
+    comes from its family's profile, with its uncertainty; else it is absent.
+    """
     given = f.raw("servos")
     if given is None:
         return {}
     if not isinstance(given, Mapping) or not set(given).isdisjoint(_CONSTANTS.difference(joints)):
-        return dict.fromkeys(joints, _constants(f, "servos", given))
+        return dict.fromkeys(joints, _constants(f, "servos", given, by_family))
     each = Fields(f.path, given, f.at("servos"))
-    return {_name(each, joint, joint, "joint", joints): _constants(each, joint, value) for joint, value in each.items()}
+    return {_name(each, joint, joint, "joint", joints): _constants(each, joint, value, by_family)
+            for joint, value in each.items()}
 
 
-def _constants(f: Fields, key: str, value: Any) -> ServoConstants:
-    if not isinstance(value, Mapping):
-        return load_servo_constants(f.existing(key, value))
-    return servo_constants(value, f.path, f.at(key))
+def _constants(f: Fields, key: str, value: Any, by_family: bool) -> ServoConstants:
+    path, place = (f.path, f.at(key)) if isinstance(value, Mapping) else (f.existing(key, value), "")
+    content = value if isinstance(value, Mapping) else read_yaml(path)
+    servo = servo_constants(content, path, place)
+    return with_family_law(servo, content) if by_family else servo
 
 
 def _name(f: Fields, key: str, value: Any, kind: str, known: tuple[str, ...]) -> str:

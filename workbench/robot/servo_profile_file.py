@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path, PurePath
 from types import MappingProxyType
@@ -13,12 +14,14 @@ from workbench.files import InputError
 from workbench.files.plug_ins import with_plug_ins
 from workbench.files.resources import resource_dir
 from workbench.files.yaml_file import Fields, top_of
-from workbench.robot.servo_constants import TOLERANCES
+from workbench.robot.servo_constants import TOLERANCES, ServoConstants
 from workbench.robot.servo_profile import LAW_KEYS, MORE_KEYS, LawRegister, Register, ServoProfile, Switch, Uncertain
 
 ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
                  "reflected_inertia", *LAW_KEYS, *MORE_KEYS)
+BY_GAIN = ("minimum_duty", "dead_zone", "derivative_gain")
+"""Of the law by proportional gain; that by compliance has punch and margin in their place."""
 _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
            "min_voltage_limit", "torque_enable", "goal_position", "moving_speed", "torque_limit", "max_torque",
            "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
@@ -81,6 +84,25 @@ def servo_profile(model: str) -> ServoProfile:
             return profile
     raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
                            f"profile of its own ({_plain(model)}.yaml; docs/extending.md says how), as its counts are unknown")
+
+
+def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:
+    """The constants, with what their file leaves out of the servo's law taken from its family's profile, with its uncertainty.
+
+    given: keys of the file; what it gives stays, 0 too. Servos of an unknown family stay as they are. What belongs to the law by
+    proportional gain is not added to a servo with the law by compliance.
+    """
+    wanted = _plain(servo.model)
+    family = next((p for p in servo_profiles().values() if wanted in (_plain(p.name), *map(_plain, p.models.values()))), None)
+    if family is None:
+        return servo
+    keys = [k for k in MORE_KEYS if k in family.nominal and k not in given]
+    if servo.proportional_gain is None:
+        keys = [k for k in keys if k not in BY_GAIN]
+    if not keys:
+        return servo
+    values: dict[str, Any] = {k: family.nominal[k].value for k in keys}
+    return replace(servo, **values, sd=tuple(sorted((dict(servo.sd) | {k: family.nominal[k].sd for k in keys}).items())))
 
 
 def model_name(number: int, protocol: int) -> str:
