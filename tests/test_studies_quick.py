@@ -18,7 +18,7 @@ RECORDINGS = {"evidence": "data/xl330", "sts3215": "data/sts3215", "xl330": "dat
 
 
 def test_studies_are_found():
-    assert {"evidence", "next_experiment", "walk_spread"} <= set(STUDIES)
+    assert {"evidence", "next_experiment", "puppy_gap"} <= set(STUDIES)
 
 
 @pytest.mark.slow
