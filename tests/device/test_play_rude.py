@@ -29,15 +29,17 @@ def wave(dwell, poses=20, degrees=10.0):
 
 def stalled(bus, at, seconds_long):
     """The computer stands still once, in a reading, from a time on [s]."""
-    read, done = bus.read, []
+    done = []
 
-    def slow(servo, *names):
-        if not done and bus.now() >= at:
-            done.append(bus.now())
-            bus.pause(seconds_long)
-        return read(servo, *names)
+    def slowed(read):
+        def slow(servos, *names):
+            if not done and bus.now() >= at:
+                done.append(bus.now())
+                bus.pause(seconds_long)
+            return read(servos, *names)
+        return slow
 
-    bus.read = slow
+    bus.read, bus.read_all = slowed(bus.read), slowed(bus.read_all)
     return done
 
 

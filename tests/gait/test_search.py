@@ -134,7 +134,7 @@ def test_a_search_that_is_far_from_the_speed_asked_for_ends_halfway(machine):
 def test_a_request_that_is_not_met_names_the_nearest_table(machine, tmp_path):
     brief = replace(options_of(1).certify, draws=0, seconds=1.0, floor_seconds=0.3, step=2e-3, variants=("2 ms",))
     options = OptimizeOptions(replace(SMALL, draws=0), brief, planned=False)
-    request = Request(speed=1.5)
+    request = Request(speed=0.6)
     lax = replace(request.limits, drift=50.0, aside=50.0)
     result = optimize(machine, replace(request, limits=lax), Ensemble(), options, quiet)
     assert not result.met

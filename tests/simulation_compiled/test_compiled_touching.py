@@ -116,7 +116,7 @@ def one_step(model: RobotModel, base: str, random: np.random.Generator) -> Step:
     reference = sim._bank()[1].get_discrete_state(0).CopyToVector()
     sim.simulator.AdvanceTo(config.time_step)
     after = plant.GetPositionsAndVelocities(context).copy()
-    return Step(x, reference, np.zeros(4 * len(q) + 1), goal, np.ones(len(q)), 0.0, after)
+    return Step(x, reference, reference, np.zeros(4 * len(q) + 1), goal, np.ones(len(q)), 0.0, after)
 
 
 def check(model: RobotModel, base: str) -> None:
