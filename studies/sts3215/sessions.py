@@ -103,10 +103,10 @@ CASES = (
     Case("quiet", "arm150_0.741kg"),
     Case("quiet, repeated", "arm150_0.741kg", 2),
     Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), size=0.228, within=0.2),
-    Case("arm", "arm100_0.741kg", effects=("link_length", "com_shift", "payload"), size=-50.0, within=0.2),
+    Case("arm", "arm100_0.741kg", effects=("link_length", "com_shift", "payload"), size=-0.05, within=0.2),
     Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
     Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
-    Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_skew",), size=1.01, within=0.002),
+    Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),
     Case("zero", "arm150_0.741kg", 2, edit=encoder(3.0), effects=("zero_offset",), size=3.0),
 )
 
