@@ -54,7 +54,7 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
     if result.problem:
         report.add(Section("Not met", [Text(result.problem)]))
     report.add(Section("The gait", [Replay(replay, "From rest, with the ground's forces." + ghost, strip),
-                                    *_walking(take, on, walk)]))
+                                    *_walking(take, on, result.table, walk)]))
     report.add(_limits_section(certificate))
     report.add(_draws_section(certificate))
     report.add(_way_section(certificate))
@@ -110,18 +110,19 @@ def _key_numbers(certificate: Certificate) -> list[tuple[str, str, str]]:
     return numbers
 
 
-def _walking(take: Take, model: RobotModel, walk: tuple[Take, GaitMeasure] | None) -> list[Part]:
+def _walking(take: Take, model: RobotModel, table: GaitTable, walk: tuple[Take, GaitMeasure] | None) -> list[Part]:
     stance = stance_of(foot_phases(take, model), take)
-    last = float(take.since_start[-1])
+    stopping = float(table.stop.dwells_ms.sum()) / 1000 + table.period  # the way back to neutral, and the rest after it
+    last = max(float(take.since_start[-1]) - stopping, 2.0)
     others = {} if walk is None else {"ROBOTIS walk": walk[0]}
     assert take.torque is not None
     limit = {j: model.servo(j).torque_at_full_duty for j in take.joints}
     busiest = take.joints[int(np.argmax((take.torque**2).mean(axis=0)))]
     return [
         Picture(body_path(take, others=others), "Path of the body, from above and over time."),
-        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in the last two seconds."),
-        Picture(phase_portrait(busiest, take.resampled(take.time[take.time > last - 2.0])),
-                f"Speed over angle of {busiest}, the servo with most to do, in the last two seconds."),
+        Picture(footfalls(stance, span=(max(last - 2.0, 0.0), last)), "When each foot stands, in two seconds of walking."),
+        Picture(phase_portrait(busiest, take.resampled(take.time[(take.since_start > last - 2.0) & (take.since_start < last)])),
+                f"Speed over angle of {busiest}, the servo with most to do, in the same two seconds."),
         Details("Commanded and reached angles, torques, attitude", [
             Picture(joint_grid(take, stance=by_joint(stance, model), span=(max(last - 1.5, 0.0), last)),
                     "Each joint, commanded (ramp) and reached; the foot's stance is shaded."),
