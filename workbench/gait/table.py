@@ -100,7 +100,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tup
              _table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
     stop = [_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
             _table(machine, np.vstack([stand, neutral]), np.vstack([small[-1:], stand]), back, 1.0, source)]
-    return GaitTable(shape, cycle, _joined(start, source), _joined(stop, source), paths.off, q)
+    return GaitTable(shape, cycle, joined(start, source), joined(stop, source), paths.off, q)
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
@@ -125,7 +125,8 @@ def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np
     return PoseTable(machine.model.joints, counts, speeds, dwells, source, units)
 
 
-def _joined(parts: list[PoseTable], source: str) -> PoseTable:
+def joined(parts: list[PoseTable], source: str) -> PoseTable:
+    """One table without sections, of the poses of all parts in turn; of the same joints."""
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
     return PoseTable(first.joints, goals, speeds, dwells, source, first.units)

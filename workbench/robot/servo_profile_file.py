@@ -78,10 +78,9 @@ def servo_profiles() -> Mapping[str, ServoProfile]:
 
 def servo_profile(model: str) -> ServoProfile:
     """The family of a servo by its name or a model's (as `model` in servo.yaml); InputError where nobody knows it."""
-    wanted = _plain(model)
-    for profile in servo_profiles().values():
-        if wanted in (_plain(profile.name), *map(_plain, profile.models.values())):
-            return profile
+    profile = _family_of(model)
+    if profile is not None:
+        return profile
     raise InputError(None, f"no servo profile for '{model}'; expected one of {', '.join(servo_profiles())}, or a "
                            f"profile of its own ({_plain(model)}.yaml; docs/extending.md says how), as its counts are unknown")
 
@@ -92,8 +91,7 @@ def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConst
     given: keys of the file; what it gives stays, 0 too. Servos of an unknown family stay as they are. What belongs to the law by
     proportional gain is not added to a servo with the law by compliance.
     """
-    wanted = _plain(servo.model)
-    family = next((p for p in servo_profiles().values() if wanted in (_plain(p.name), *map(_plain, p.models.values()))), None)
+    family = _family_of(servo.model)
     if family is None:
         return servo
     keys = [k for k in MORE_KEYS if k in family.nominal and k not in given]
@@ -111,6 +109,11 @@ def model_name(number: int, protocol: int) -> str:
         if profile.protocol == protocol and number in profile.models:
             return profile.models[number]
     return f"unknown model {number}"
+
+
+def _family_of(model: str) -> ServoProfile | None:
+    wanted = _plain(model)
+    return next((p for p in servo_profiles().values() if wanted in (_plain(p.name), *map(_plain, p.models.values()))), None)
 
 
 def _plain(name: str) -> str:

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
-import numpy as np
-
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, read_certificate
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
-from workbench.gait.table import GaitTable, gait_table
-from workbench.motion import Commands, PoseTable
+from workbench.gait.table import GaitTable, gait_table, joined
+from workbench.motion import Commands
 from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
@@ -59,10 +57,7 @@ class GaitFamily:
 
     def sequence(self, turns: Sequence[float]) -> Commands:
         """The start, and a cycle for each of `turns` [rad per stance], as one schedule."""
-        parts = [self.table(0.0).start, *(self.table(u).cycle for u in turns)]
-        goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
-        first = parts[0]
-        return PoseTable(first.joints, goals, speeds, dwells, "drive", first.units).commands(1)
+        return joined([self.table(0.0).start, *(self.table(u).cycle for u in turns)], "drive").commands(1)
 
 
 def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
