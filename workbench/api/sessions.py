@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,7 +11,7 @@ from workbench.compare import compare_session as comparing
 from workbench.compare.prediction import predict_session
 from workbench.compare.results import Comparison
 from workbench.compare.session import Session, load_session
-from workbench.compare.session_takes import LeftOut, no_progress
+from workbench.compare.session_takes import LeftOut
 from workbench.experiment.next_experiment import with_next_experiment
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
@@ -23,12 +22,12 @@ from workbench.motion import Motion, save_motion
 from workbench.recording import Take
 from workbench.robot import RobotModel, load_model
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison
 from workbench.view.report.diagnosis import write_diagnosis
 from workbench.view.report.notebook import comparison_html, diagnosis_html, prediction_html
 
-Progress = Callable[[str, float | None], None]
 """Called with what is being done and the share done (0 to 1; None where it is not known)."""
 
 

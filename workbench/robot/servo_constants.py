@@ -10,6 +10,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
+from workbench.robot.torque_speed import TorqueSpeedLine
 
 COUNT = math.radians(300 / 1023)
 """One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""
@@ -118,6 +119,11 @@ class ServoConstants:
     def back_emf(self) -> float:
         """Torque lost per joint speed by the motor's back-EMF [N m s/rad]."""
         return self.stall_torque / self.no_load_speed
+
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """What the servo can give at full duty and its supply voltage."""
+        return TorqueSpeedLine(self.torque_at_full_duty, self.back_emf, self.viscous_friction, self.coulomb_friction)
 
     def share_known(self, key: str) -> float:
         """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0. Besides the keys

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
-
-Array = NDArray[np.float64]
+from workbench.robot.torque_speed import TorqueSpeedLine
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,11 @@ class ServoLaw:
                         column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"),
                         column("stall_torque") / column("rated_voltage"), column("derivative_gain"), column("ramp"),
                         column("command_filter"), column("load_friction"))
+
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """What the servos can give at full duty and their supply voltage."""
+        return TorqueSpeedLine(self.full_torque, self.back_emf, self.viscous, self.coulomb)
 
     @property
     def damping(self) -> Array:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.leftover import left_over
 from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, with_known
@@ -26,6 +24,7 @@ from workbench.identify.results.ties import Tie
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
+from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.search import Found
     from workbench.identify.fitting.constancy import Drift
 
-Array = NDArray[np.float64]
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 

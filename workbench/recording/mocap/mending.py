@@ -15,8 +15,8 @@ from workbench.recording.mocap.tracks import Tracks, tracks_of
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LONGEST_MENDED = 0.05
 """Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop: nothing is invented there."""
 _SPIKE = 0.06
