@@ -62,11 +62,11 @@ class ComparisonResult:
 class DiagnoseOptions:
     """How a session is diagnosed.
 
-    jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
-    folder that keeps every rollout, so that a run that was killed continues; None: nothing is kept. without: names of effects
-    (docs/effects.md) that are known to be absent, and are not searched for. previous: model.yaml of an earlier diagnosis of this
-    robot, which is then nominal: findings are what is new. engine: "auto" (compiled rollouts that Drake judges) or "drake" (all
-    rollouts by Drake, much slower). InputError for fewer than one process or another engine.
+    jobs: number of parallel simulations. thorough: search to the end, however long it takes, instead of stopping at a limit of
+    work. resume: folder for cached rollouts, from which an interrupted run continues; None: nothing is kept. without: names of
+    effects (docs/formats.md, section 7) that are known to be absent; they are not searched for. previous: model.yaml of an
+    earlier diagnosis of this robot, taken as nominal, so that findings are the changes since. engine: "auto" (compiled rollouts,
+    checked by Drake) or "drake" (all rollouts by Drake, much slower). InputError for fewer than one process or an unknown engine.
     """
 
     jobs: int = 2
