@@ -22,10 +22,10 @@ from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
-from workbench.identify.explained import Problem
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
+from workbench.identify.search_result import Problem
 from workbench.robot import RobotModel
 from workbench.types import Progress
 

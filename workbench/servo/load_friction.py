@@ -15,7 +15,7 @@ MOST_LOAD = 2.0
 
 
 @dataclass(frozen=True)
-class Rubbing(ServoTerm):
+class LoadFrictionTerm(ServoTerm):
     """Shares of the load (n,): coefficient always, static more at rest, which fades as exp(-(w / speed)^2), speed [rad/s],
     backdrive more where the load drives the motor."""
 
@@ -45,4 +45,4 @@ def nominal_terms(law: ServoLaw) -> tuple[ServoTerm, ...]:
     if not law.load_friction.any():
         return ()
     none = np.zeros_like(law.load_friction)
-    return (Rubbing(law.load_friction, none, 1.0, none),)
+    return (LoadFrictionTerm(law.load_friction, none, 1.0, none),)
