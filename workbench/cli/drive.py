@@ -25,7 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("points", metavar="X,Y", nargs="+", type=_point,
                         help="way-points [m]: x forward, y left of where the robot stands (put -- before a negative x)")
     parser.add_argument("--gait", metavar="MOTION", required=True,
-                        help="gait.csv of `workbench optimize`, with its certificate beside it")
+                        help="gait.csv written by `workbench optimize`, in the same folder as its certificate")
     add_model(parser)
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")

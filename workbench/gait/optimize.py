@@ -19,12 +19,12 @@ from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certi
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
+from workbench.gait.feasibility import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.planned import planned_seeds
-from workbench.gait.possible import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape

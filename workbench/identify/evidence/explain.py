@@ -24,10 +24,10 @@ from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
-from workbench.identify.explained import Problem
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
+from workbench.identify.search_result import Problem
 from workbench.robot import RobotModel
 from workbench.types import Progress
 

@@ -44,9 +44,9 @@ WORTH_SAYING = 0.01
 
 @dataclass(frozen=True)
 class Explanation:
-    """The likeliest model, and all that was believed beside it (`workbench.identify.explained.Explained`). found, posteriors: one
-    a region; robot: what acts in all of them; refuted: by registers or by takes kept back; missed: commands that never arrived;
-    drifts: parameters that drift within a take; stopped: by the limit of work."""
+    """The most probable model, with all alternatives (a `workbench.identify.search_result.SearchResult`). found, posteriors: one
+    for each region; robot: effects that act on all joints; refuted: effects rejected by registers or by held-out takes; missed:
+    commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work was reached."""
 
     nominal: RobotModel
     rollouts: Rollouts

@@ -38,7 +38,7 @@ class Problem:
     options: EvidenceOptions
 
 
-class Explained(Protocol):
+class SearchResult(Protocol):
     """What a search found."""
 
     @property
