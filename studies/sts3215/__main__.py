@@ -20,11 +20,11 @@ from typing import Any
 from studies.common import ROOT, run_study
 from studies.sts3215.sessions import CASES, Case, write_session
 from workbench.compare.session import load_session
-from workbench.compare.session_takes import Progress
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis, Finding
 from workbench.robot import RobotModel, load_model
+from workbench.types import Progress
 
 SAID = 0.5
 """Confidence from which on a name counts."""
@@ -67,11 +67,11 @@ def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outc
 
 
 def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None, since: str, jobs: int,
-              progress: Progress) -> Outcome:
+              progress: Progress, memory: Path | None = None) -> Outcome:
     """A session written, diagnosed and saved."""
     session = load_session(write_session(folder, data, case))
     began = time.monotonic()
-    result = diagnose_session(session, progress, jobs, previous=previous)
+    result = diagnose_session(session, progress, jobs, memory=memory, previous=previous)
     result.diagnosis.save(folder / "diagnosis")
     outcome = judged(case, result.diagnosis, since, time.monotonic() - began)
     print(f"{case.name} ({since}): {'right' if outcome.rightly else 'WRONG'}, {outcome.seconds:.0f} s", flush=True)
@@ -89,16 +89,18 @@ def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) 
     """All sessions alone, then all with the law of the first."""
     if unknown := set(args.only) - {c.name for c in CASES}:
         raise InputError(None, f"--only: no session is named {min(unknown)!r}; expected of {', '.join(c.name for c in CASES)}")
+    if args.memory is not None:
+        args.memory.mkdir(parents=True, exist_ok=True)
     cases = [replace(c, **QUICK) for c in CASES if c.name in QUICK_CASES] if quick else list(CASES)
     law, outcomes = args.law, []
     if law is None:
-        outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress))
+        outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress, args.memory))
         law = out / "law" / "diagnosis" / "model.yaml"
     known = load_model(law)
     for case in (c for c in cases[1:] if not args.only or c.name in args.only):
         for previous, since in ((known, SINCE), (None, ALONE)):
             folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
-            outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress))
+            outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress, args.memory))
     (out / "outcomes.json").write_text(json.dumps([o.to_json() for o in outcomes], indent=1))
     right, false = sum(o.rightly for o in outcomes), sum(len(o.false) for o in outcomes)
     return f"{right} of {len(outcomes)} sessions rightly; {false} false names of {SAID} or more"
@@ -109,6 +111,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the logs")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study goes on")
     parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="of these sessions alone, beside the law's")
     parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
     args, others = parser.parse_known_args()

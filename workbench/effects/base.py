@@ -21,11 +21,11 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
 
-Array = NDArray[np.float64]
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
@@ -109,6 +109,8 @@ class Effect:
     """The effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
     """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
+    needs_steady_load: ClassVar[bool] = False
+    """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True
     """Whether a robot whose base is held can show it; not what only the floor does to feet."""
     hidden_by_zeroing: ClassVar[bool] = False

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
+from workbench.robot.torque_speed import TorqueSpeedLine
 from workbench.robot.torque_table import TorqueTable
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,11 @@ class ServoLaw:
                         column("stall_torque") / column("rated_voltage"), column("derivative_gain"), column("ramp"),
                         column("command_filter"), column("load_friction"),
                         tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
+
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """What the servos can give at full duty and their supply voltage."""
+        return TorqueSpeedLine(self.full_torque, self.back_emf, self.viscous, self.coulomb)
 
     @property
     def damping(self) -> Array:

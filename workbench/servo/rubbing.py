@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.servo.law import ServoLaw
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 MOST_LOAD = 2.0
 """Of the torque at full duty: beyond it friction grows no further, as the solver needs a bound."""

@@ -15,8 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, DependencyTicket, Di
 from workbench.servo.law import ServoLaw
 from workbench.servo.system import BRISTLE_SHARPNESS, BRISTLE_SLIP, ServoBank
 from workbench.servo.terms import Instant, ServoTerm, most_friction, wanted_friction
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 LOAD_SMOOTHING = 2e-3
 """Time constant [s] of the load that friction sees: following at once, friction and load would feed on each other from step to

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.robot.torque_table import TorqueTable
 from workbench.servo.law import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.fit import weights_covariance
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, with_known
+from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
 from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
@@ -28,6 +26,7 @@ from workbench.identify.results.unknown_torque import UnknownTorque, said
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
+from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
 
-Array = NDArray[np.float64]
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 
@@ -69,11 +67,12 @@ class Explanation:
     @property
     def calibrated(self) -> RobotModel:
         """The same, with how well its servos' numbers are known now."""
-        sds: dict[Uncertain, float] = {}
+        model = self.model
         for region, p in zip(self.rollouts.regions, self.posteriors):
-            variances = np.diag(p.best.covariance(region, self.options))
-            sds |= {n: n.sd * math.sqrt(v) for n, v in zip(p.best.hypothesis.numbers, variances)}
-        return with_known(self.model, sds)
+            numbers = p.best.hypothesis.numbers
+            n, covariance = len(numbers), p.best.covariance(region, self.options)
+            model = with_known(model, numbers, widened(covariance[:n, :n], self.options.formal))
+        return model
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
@@ -101,7 +100,8 @@ class Explanation:
                 fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
                 out.append(Finding(
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
-                    estimates(c, x, covariance[s, s]), fit, validation, tuple(others[:1]),
+                    estimates(c, x, covariance[s, s] if tie is None else tie.covariance(covariance[s, s], x)), fit, validation,
+                    tuple(others[:1]),
                     c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
                     family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
@@ -148,10 +148,11 @@ class Explanation:
         blocks: dict[tuple[str, tuple[str, ...]], Array] = {}
         for region, p in zip(self.rollouts.regions, self.posteriors):
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+            moved = mixing(h.numbers)
             for k, number in enumerate(h.numbers):
-                degrees = np.degrees(number.sd)
-                zero = turned_horn(number.joint, number.sd)
-                blocks.setdefault((zero.effect, zero.where), np.array([[degrees**2 * covariance[k, k]]]))
+                if number.name == ZERO:
+                    zero, row = turned_horn(number.joint, number.sd), np.degrees(moved[k])
+                    blocks[zero.effect, zero.where] = np.array([[row @ covariance[:len(row), :len(row)] @ row]])
             for (c, x), s in zip(h.sizes(), h.slices()):
                 slopes = value_slopes(c, x)
                 blocks[c.name, c.where] = slopes @ covariance[s, s] @ slopes.T
