@@ -14,7 +14,7 @@ from workbench.view.report.words import capital, change, listed, probable, unbro
 
 
 def unknown_torque_section(unknown: UnknownTorque) -> Section:
-    """What is known of it, with its plot."""
+    """Its probability, size and errors, with its plot."""
     rows = [["probability", probable(unknown.confidence)], ["RMS over the recorded motion", f"{1e3 * unknown.rms:.2g} mN m"],
             ["error where it was fitted", change(unknown.fit)], ["error on unseen stretches", change(unknown.validation)]]
     parts: list[Part] = [
@@ -27,10 +27,10 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
 
 
 def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
-    """Of the nominal law, within what was known of it."""
+    """Adjusted constants of the nominal law."""
     shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
     rows = [[r.number.replace("_", " "), listed(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}", unbroken(unit),
              f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
     said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
-    return Section("What was recalibrated", [Text(said), *folded(
+    return Section("Recalibrated constants", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
