@@ -77,6 +77,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
+    for tied in diagnosis.tied:
+        print(f"  {tied.said()}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
     return 0
 

@@ -169,7 +169,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
-        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated)
+        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated, tied=found.tied)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings or found.recalibrated else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))
 

@@ -18,6 +18,7 @@ from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turne
 from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
+from workbench.identify.evidence.tied_names import gravity_over_torque
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
@@ -29,12 +30,14 @@ from workbench.robot.model_file import parameter_names
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.fit import Fitted
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
     from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
     from workbench.identify.fitting.constancy import Drift
+    from workbench.identify.results.tied_names import GravityOverTorque
 
 Array = NDArray[np.float64]
 WORTH_SAYING = 0.01
@@ -45,7 +48,8 @@ WORTH_SAYING = 0.01
 class Explanation:
     """The likeliest model, and all that was believed beside it (`workbench.identify.explained.Explained`). found, posteriors: one
     a region; robot: what acts in all of them; refuted: by registers or by takes kept back; missed: commands that never arrived;
-    drifts: parameters that drift within a take; stopped: by the limit of work."""
+    drifts: parameters that drift within a take; stopped: by the limit of work; tied_names: by region, each effect fitted that
+    gravity over torque could be."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -57,6 +61,14 @@ class Explanation:
     missed: tuple[DroppedCommands, ...] = ()
     drifts: tuple[Drift, ...] = ()
     stopped: bool = False
+    tied_names: tuple[list[Fitted], ...] = ()
+
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """Gravity over torque where it is not as told, with the effects that could be it."""
+        said = (gravity_over_torque(region, self.options, p, fits)
+                for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.tied_names))
+        return tuple(s for s in said if s is not None)
 
     @property
     def model(self) -> RobotModel:

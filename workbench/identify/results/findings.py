@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
 from workbench.files.reading import write_together
@@ -15,6 +15,9 @@ from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.reasons import Description, Reason
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import model_text
+
+if TYPE_CHECKING:
+    from workbench.identify.results.tied_names import GravityOverTorque
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]
@@ -234,8 +237,9 @@ class Diagnosis:
     verdict: docs/formats.md, section 6. nominal: the session's robot; model: the same with the findings' effects; posterior: of
     their parameters, in the units of section 7. gap: where, when and by how much recordings differ from the nominal model.
     findings, rejected: effects that were kept, and not kept. unexplained: what the fitted model leaves. recalibrated: servo
-    constants adjusted within their tolerance. left_out: damaged takes, (name, reason). stopped: whether the search reached its
-    limit of work. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
+    constants adjusted within their tolerance. tied: gravity over torque, which angles tell as one number. left_out: damaged
+    takes, (name, reason). stopped: whether the search reached its limit of work. provenance: versions, seed, seconds; searched:
+    of long sessions, the seconds of each take that were used.
     """
 
     verdict: Verdict
@@ -251,6 +255,7 @@ class Diagnosis:
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
     recalibrated: tuple[Recalibrated, ...] = ()
+    tied: tuple[GravityOverTorque, ...] = ()
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -267,6 +272,8 @@ class Diagnosis:
         }
         if self.recalibrated:
             out["recalibrated"] = [r.to_json() for r in self.recalibrated]
+        if self.tied:
+            out["tied"] = [t.to_json() for t in self.tied]
         if self.stopped:
             out["stopped"] = True
         if self.left_out:
