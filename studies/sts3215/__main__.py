@@ -65,7 +65,8 @@ def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outc
     said = [f for f in diagnosis.findings if f.confidence >= SAID]
     named = [f for f in said if f.effect in case.effects]
     false = tuple(f.effect for f in said if f.effect not in case.effects)
-    ties = [t for t in diagnosis.tied if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
+    ties = [t for t in diagnosis.tied
+            if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
     size, value = None, None
     if case.moment is not None:
         value = next((float(t.ratio.value) for t in ties if t.since), None)  # type: ignore[arg-type]
@@ -74,8 +75,8 @@ def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outc
         value = next((float(v.value) for v in named[0].parameters.values() if not isinstance(v.value, tuple)), None)
         size = None if value is None else abs(value - case.size) <= case.within * abs(case.size)
     quiet = not said and not any(t.since for t in diagnosis.tied)
-    return Outcome(case.name, since, diagnosis.findings, diagnosis.tied, bool(named or ties) if case.effects else quiet, bool(named),
-                   false, value, size, seconds)
+    rightly = bool(named or ties) if case.effects else quiet
+    return Outcome(case.name, since, diagnosis.findings, diagnosis.tied, rightly, bool(named), false, value, size, seconds)
 
 
 def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None, since: str, jobs: int,
