@@ -1,7 +1,7 @@
-"""Writes docs/effects.md from the effects themselves: `python -m docs.effects_page`.
+"""MkDocs hook that generates the page effects.md from the effects.
 
-Names, units, ranges, relations and the first paragraph come from the code, what parameters mean from docs/formats.md. The
-formula, what an effect looks like in a recording, and what it is confused with, are said here, once for each.
+Names, units, ranges, relations and the first paragraph come from the code, the meaning of parameters from docs/formats.md. The
+formula, the signature in a recording, and the effects it is easily confused with are given here, once for each.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
 from workbench.effects.base import Effect, Parameter
 from workbench.effects.registry import known_effects
-from workbench.files.reading import write_whole
 from workbench.robot import EffectSpec
 
-PAGE = Path(__file__).with_name("effects.md")
+PAGE = "effects.md"
 LAYERS = {
     "timing": "Timing: what reaches the servos, and when", "actuator": "Actuators: what a servo makes of its goal",
     "structure": "Structure: what lies between servo and link", "inertia": "Inertia: masses",
@@ -200,9 +202,15 @@ of the servo's joint, q_link: angle of its link; τ: torque; e, d, duty, slope, 
 nominal Coulomb and viscous friction τ_C and b₀; t: time since the first command; m, c: mass and centre of mass of a link;
 F_t, F_n: tangential and normal contact force. Index 0: nominal.
 
-Generated from the code and from [the formats page](formats.md#7-effects) by `python -m docs.effects_page`.
+Generated from the code and from [the formats page](formats.md#7-effects).
 """
 FORMATS = Path(__file__).with_name("formats.md")
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Adds the page to the site."""
+    files.append(File.generated(config, PAGE, content=page()))
+    return files
 
 
 def page() -> str:
@@ -284,7 +292,3 @@ def _yaml(spec: EffectSpec) -> str:
     numbers = {k: f"[{', '.join(f'{x:g}' for x in v)}]" if isinstance(v, tuple) else f"{v:g}" for k, v in spec.parameters.items()}
     inside = f", parameters: {{{', '.join(f'{k}: {v}' for k, v in numbers.items())}}}" if numbers else ""
     return f"- {{effect: {spec.effect}, where: [{', '.join(spec.where)}]{inside}}}"
-
-
-if __name__ == "__main__":
-    print(write_whole(PAGE, page()))

@@ -20,12 +20,12 @@ from typing import Any
 from studies.common import ROOT, run_study
 from studies.sts3215.sessions import CASES, Case, write_session
 from workbench.compare.session import load_session
-from workbench.compare.session_takes import Progress
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis, Finding
 from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import RobotModel, load_model
+from workbench.types import Progress
 
 SAID = 0.5
 """Confidence from which on a name counts."""

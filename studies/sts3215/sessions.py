@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 
-Array = NDArray[np.float64]
 Entry = dict[str, Any]
 JOINT, ARM = "servo", "arm"
 DUTY_PER_UNIT = 0.16489

@@ -19,7 +19,7 @@ QUESTIONS = {
     "where are the report's sentences made": ("view/report/words.py", "def in_words"),
     "who chooses the next experiment": ("experiment/design.py", "def design_experiment"),
     "what must a plug-in effect say": ("effects/base.py", "class Effect"),
-    "where is the servo's torque-speed line": ("servo/law.py", "class ServoLaw"),
+    "where is the servo's torque-speed line": ("robot/torque_speed.py", "def no_load_speed"),
     "where do radians become counts": ("robot/servo_units.py", "class ServoUnits"),
     "where are InputError": ("files/errors.py", "class InputError"),
     "where is the prior of an effect's size": ("identify/evidence/hypothesis.py", "class Prior"),

@@ -21,8 +21,7 @@ from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_registers import save_registers
 from workbench.simulation.virtual_robot import VirtualRobot
-
-Progress = Callable[[str, float | None], None]
+from workbench.types import Progress
 
 
 @dataclass(frozen=True)

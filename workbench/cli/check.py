@@ -32,7 +32,7 @@ def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[st
     if found.refused:
         raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
-    return frozenset(t.name for t in session.takes if f"take '{t.name}'" in found.damaged)
+    return found.damaged_takes
 
 
 def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:

@@ -36,8 +36,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
-                        help="exclude this effect (a name from docs/effects.md) from the search, because you know it is absent; "
-                        "repeatable")
+                        help="exclude this effect (a name from section 7 of docs/formats.md) from the search, because you know "
+                        "it is absent; repeatable")
     parser.add_argument("--model", metavar="FILE", dest="previous",
                         help="model.yaml of an earlier diagnosis of this robot: its servos and effects are nominal, as well as "
                         "they were known then, and findings are what is new")

@@ -8,14 +8,13 @@ fractions of one.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.options import COMPARE
 from workbench.compare.session_takes import RegisteredTake
 from workbench.recording.take import Take
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 ACROSS = "~"
 """Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""

@@ -12,7 +12,7 @@ from workbench.compare.compare_session import Run, provenance, roll_out
 from workbench.compare.comparison import compare_takes
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
-from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, readable, register_take
+from workbench.compare.session_takes import ReadTake, RegisteredTake, readable, register_take
 from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
@@ -21,6 +21,7 @@ from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 
 
 def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *,

@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
 from workbench.compare.options import COMPARE
 from workbench.compare.results import Comparison, TakeComparison
 from workbench.compare.session import Session
-from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, read_takes, register_takes
+from workbench.compare.session_takes import ReadTake, RegisteredTake, read_takes, register_takes
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -23,8 +22,7 @@ from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.compiled import covers
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress, no_progress
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,9 @@ from workbench.compare.results import NAN, Channel, Comparison, Pair, TakeCompar
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.types import Array
 
 __all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "aligned", "compare_takes", "noise_of"]
-
-Array = NDArray[np.float64]
 
 
 def compare_takes(

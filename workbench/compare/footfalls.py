@@ -11,9 +11,7 @@ from scipy.spatial.transform import Rotation
 from workbench.compare.options import COMPARE
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, foot_points
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

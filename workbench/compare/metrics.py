@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 def rms(x: Array, axis: int = 0) -> Array:

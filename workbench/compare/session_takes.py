@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,13 +29,9 @@ from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
 from workbench.robot import RobotModel
 from workbench.simulation import Start
+from workbench.types import Progress, no_progress
 
-Progress = Callable[[str, float | None], None]
 LeftOut = tuple[tuple[str, str], ...]
-
-
-def no_progress(what: str, done: float | None = None) -> None:
-    """Says nothing."""
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
 from workbench.files import InputError
 from workbench.files.reading import read_text, write_whole
 from workbench.recording.formats.numbers import number_columns
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 HEADER = "# workbench inverse dynamics, format 1"
 _WRENCH = tuple(f"{kind}.{axis}" for kind in ("moment", "force") for axis in "xyz")

@@ -16,8 +16,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm, nominal_terms
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

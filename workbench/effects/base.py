@@ -21,11 +21,11 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
 
-Array = NDArray[np.float64]
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]

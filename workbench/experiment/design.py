@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
@@ -23,17 +22,17 @@ from workbench.experiment.moves import JointMoves, long_runs
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, reshown, seen, shown
 from workbench.experiment.rivals import Pair
-from workbench.experiment.runs import Progress, Runs, spans
+from workbench.experiment.runs import Runs, spans
 from workbench.experiment.segment import Segment
 from workbench.experiment.stance import BodyMoves
 from workbench.identify.results.findings import NextExperiment
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, legs
+from workbench.types import Array, Progress, no_progress
 
 __all__ = ["Experiment", "ObservationModel", "Separation", "design_experiment"]
 
-Array = NDArray[np.float64]
 Base = Literal["free", "fixed"]
 
 
@@ -69,10 +68,6 @@ class Experiment:
         told = [s for s in self.separations if s.separated]
         return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
                               ) if told else None
-
-
-def no_progress(what: str, done: float | None = None) -> None:
-    """Says nothing."""
 
 
 def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]],

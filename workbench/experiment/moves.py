@@ -8,14 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.experiment.limits import Reach
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import GRAVITY, RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from workbench.compare.session_takes import Progress, no_progress
 from workbench.experiment.design import design_experiment
 from workbench.identify.diagnosis import DiagnosisResult
 from workbench.identify.results.findings import Diagnosis
 from workbench.motion import Motion
+from workbench.types import Progress, no_progress
 
 MOTION = "next_experiment.csv"
 """The motion's file, beside findings.json."""

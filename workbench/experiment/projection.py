@@ -17,8 +17,8 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.results.ties import ObservationModel
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Imitator = Literal["a", "b"]
 
 

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import effect_named
 from workbench.experiment.options import EXPERIMENT
 from workbench.robot import EffectSpec, RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)

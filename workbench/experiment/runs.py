@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.experiment.limits import Reach
@@ -18,9 +17,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
+from workbench.types import Array, Progress
 
 
 class Runs:

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -16,8 +15,8 @@ from workbench.experiment.moves import Path
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import RobotModel, foot_points, legs
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Body = tuple[float, float, float, float, float, float]
 """Displacement of the base: forward, left, up as shares of the legs' length; roll, pitch, yaw [deg]."""
 

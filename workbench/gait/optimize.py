@@ -15,7 +15,7 @@ from workbench.files import InputError
 from workbench.files.option_checks import check_whole
 from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
@@ -33,6 +33,7 @@ from workbench.motion import Motion, load_motion
 from workbench.motion.files import motion_text
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Progress
 
 WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""

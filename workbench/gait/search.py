@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cma
@@ -18,6 +18,7 @@ from workbench.gait.request import Request
 from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
+from workbench.types import Progress
 
 STEERED = 2
 """How often a gait is steered before the next generation."""
@@ -30,7 +31,6 @@ ALIKE = 4
 """How many seeds of one family and one way of the knees are tried on the ensemble's robots."""
 IN_TURN = 3
 """Generations of each start before the best of them goes on alone."""
-Progress = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)

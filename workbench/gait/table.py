@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 GENTLY = (700, 300)
 """Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.7 s are 1 rad/s, a fifth of

@@ -14,7 +14,7 @@ from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
 from workbench.compare.logged import how_logged
 from workbench.compare.session import Base, Session
-from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
+from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
 from workbench.identify.conclusions import Residuals, change, verdict_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed
@@ -41,6 +41,7 @@ from workbench.identify.subset import subset_used
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 
 BESIDE_DRAKE = "{} model apart from Drake [sigma]"
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from workbench.types import Progress
+
 if TYPE_CHECKING:
-    from workbench.compare.session_takes import Progress
     from workbench.identify.conclusions import ReadOff, Residuals
     from workbench.identify.estimators.dropped_again import TakesAsPlayed
     from workbench.identify.estimators.dropped_commands import DroppedCommands

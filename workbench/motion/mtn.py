@@ -20,8 +20,7 @@ from workbench.files.numerals import number_of
 from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,15 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.robot_section import read_model, read_servos
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

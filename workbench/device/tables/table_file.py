@@ -74,7 +74,7 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
         servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)
         low, high = (min(max(round(CENTRE + limit / AX12A.count), 0), LARGEST) if math.isfinite(limit) else edge
                      for limit, edge in zip(limits, (0, LARGEST)))
-        no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
+        no_load = float(servo.line.no_load_speed)
         bounds.append(JointBounds(
             ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
             low=min(low, CENTRE, int(table.goals[:, i].min())), high=max(high, CENTRE, int(table.goals[:, i].max())),

@@ -11,8 +11,6 @@ from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Rubbing, ServoTerm
 
-Array = NDArray[np.float64]
-
 
 class LoadFriction(Effect):
     """Coulomb friction that grows with the torque that the gear transmits. Driven backwards, the gear needs 1 / (1 - coefficient)

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from workbench.files.option_checks import check_choice, check_positive, check_whole
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.step_map import StepMap
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Law = Literal["mpc", "proportional"]
 
 

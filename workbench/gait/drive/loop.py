@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +17,8 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.stepped import SteppedRun
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 FALLEN = math.cos(math.radians(45))
 """Upward component of the base's z axis below which the robot lies."""
 SETTLED = 0.8

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.compare.session_takes import Progress
 from workbench.identify.evidence.checks import checks, drifts, refuted
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
@@ -29,6 +28,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 
 def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
 from workbench.identify.evidence.leftover import left_over
 from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
@@ -27,6 +25,7 @@ from workbench.identify.results.ties import Tie
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
+from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.results.tied_names import GravityOverTorque
 
-Array = NDArray[np.float64]
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 

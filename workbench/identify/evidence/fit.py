@@ -7,17 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.region import Region
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Asks = Generator[list[Hypothesis], list[Array], T]
 """Yields hypotheses to be rolled out, is sent the residuals (n,) [rad] that each leaves."""

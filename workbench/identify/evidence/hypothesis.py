@@ -15,11 +15,11 @@ from scipy.stats import t as student_t
 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
 
-Array = NDArray[np.float64]
 FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.nuisance import as_mapping, recalibrated
@@ -15,8 +14,8 @@ from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Wants = tuple[int, Hypothesis]
 """A region, by its index, and what it wants rolled out."""
 

@@ -23,8 +23,7 @@ from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

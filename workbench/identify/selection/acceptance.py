@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.fit import Fit
@@ -17,8 +16,7 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
 from workbench.identify.selection.scheduling import standing_out
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = ACCEPTANCE.least_share

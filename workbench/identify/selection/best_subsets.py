@@ -22,8 +22,7 @@ from workbench.identify.options import FIT
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS
 from workbench.identify.selection.record import SelectionStep
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

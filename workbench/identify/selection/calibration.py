@@ -16,8 +16,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
 from workbench.identify.selection.model_comparison import NamePosterior
 from workbench.identify.selection.options import CALIBRATION, COMPARISON, SCHEDULING
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],

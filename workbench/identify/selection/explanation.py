@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, finding, posterior, rejected, ties, unexplained
 from workbench.identify.estimators.dropped_again import with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -30,6 +29,7 @@ from workbench.identify.selection.model_comparison import NamePosterior, compare
 from workbench.identify.selection.record import SelectionResult
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced
 from workbench.robot import Posterior, RobotModel
+from workbench.types import Progress
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import channel_gaps
@@ -32,10 +32,11 @@ from workbench.identify.selection.reevaluation import reevaluated
 from workbench.identify.selection.scheduling import asked, standing_out
 from workbench.identify.selection.screening import tried
 from workbench.identify.selection.swap import best_sets
+from workbench.types import Progress
 
 
-def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
-           ) -> SelectionResult:
+def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough: bool = False,
+           played: TakesAsPlayed | None = None) -> SelectionResult:
     """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
     left out of what is played; read anew by what fixed-base takes identified."""
     current = nominal = search.evaluated([])
@@ -76,7 +77,8 @@ def _may_go_on(search: Search, fit: Fit) -> bool:
 
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep],
-           report: Report, most_work: float, closed: float = ACCEPTANCE.least_closed) -> tuple[Search, Fit, list[SelectionStep]]:
+           report: Progress, most_work: float, closed: float = ACCEPTANCE.least_closed
+           ) -> tuple[Search, Fit, list[SelectionStep]]:
     """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
     usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
     stopped, rounds = False, list(rounds)

@@ -11,10 +11,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit, Sizes
-from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
@@ -25,11 +24,10 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import PAIR_MOVE, RECORD
 from workbench.identify.selection.record import SelectionStep, judged_by_all
 from workbench.identify.selection.swap import NOTHING, in_place
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
 
-
-def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Report
+def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Progress
            ) -> tuple[Fit, list[SelectionStep]]:
     """The fit, with two effects in the place of the last that floating-base takes identified, one of them at least of the ground
     or of masses, where that left much and these bring enough more, and the rounds with them."""

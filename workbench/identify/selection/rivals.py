@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
@@ -15,8 +14,7 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.odds import by_both, is_by_floating_base
 from workbench.identify.selection.options import FORWARD, RIVAL
 from workbench.identify.selection.record import SelectionStep
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TakenIn = dict[Key, tuple[SelectionStep, CandidateFit]]
 """By effect, when it was taken and on what."""

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import Asks, Solved, fit_blocks, through
@@ -18,9 +15,7 @@ from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutReque
 from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 Asking = Part[list[CandidateFit]]
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from workbench.identify.fitting.fit import Fit, Sizes
@@ -33,8 +32,8 @@ from workbench.identify.selection.best_subsets import (
 )
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS, SWAP
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only predict."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Recalibrated, Rejected
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.tied_names import GravityOverTorque
+from workbench.types import Progress
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
@@ -43,7 +44,6 @@ from workbench.view.scene.replay import write_replay
 
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
-Progress = Callable[[str, float | None], None]
 
 
 def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: Path, title: str,
