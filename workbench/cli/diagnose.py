@@ -80,6 +80,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
         print(f"  {finding_line(finding)}")
     for unknown in diagnosis.unknown_torques:
         print(f"  {unknown_line(unknown)}")
+    for tied in diagnosis.tied:
+        print(f"  {tied.said()}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
     return 0
 

@@ -172,7 +172,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
-        unknown_torques=unknown)
+        unknown_torques=unknown, tied=found.tied)
     changed = bool(findings or unknown or found.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if changed else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))

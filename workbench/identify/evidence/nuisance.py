@@ -7,15 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Fitted
 from workbench.identify.evidence.hypothesis import Prior, Uncertain, log_odds
@@ -21,8 +20,8 @@ from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 GRAVITY = "gravity against torque"
 """The tie of what gravity does with what all torques do."""
 TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia")

@@ -18,6 +18,7 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.identify.results.ties import Tie
 from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
@@ -69,6 +70,11 @@ class Selected:
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """None: the nominal law is taken as it is."""
+        return ()
+
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """None: cameras and floors see more than angles."""
         return ()
 
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
