@@ -225,11 +225,6 @@ def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Pat
     return write_together(folder, gait_files(table, certified))
 
 
-def shape_from(content: dict[str, Any]) -> GaitShape:
-    """The shape that a certificate holds."""
-    return GaitShape(**{**content, "knees": tuple(content["knees"])})
-
-
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
     """In a line: what binds, by how much, and what works."""
     said = f"{request}: not met"
