@@ -62,7 +62,8 @@ def compare_plan(machine: GaitMachine, planned: Planned, table: GaitTable, take:
     ours = _planned_motion(machine, planned)
     every = [_simulated(machine, planned, take, table.start_seconds + c * table.period, table.period, K, ours)
              for c in range(1, cycles)]
-    theirs = Motion(*(np.mean([getattr(m, name) for m in every], axis=0) for name in ("p", "R", "q", "feet")),
+    mean = {name: np.mean([getattr(m, name) for m in every], axis=0) for name in ("p", "R", "q", "feet")}
+    theirs = Motion(mean["p"], mean["R"], mean["q"], mean["feet"],
                     {a: (np.mean([m.bodies[a][0] for m in every], axis=0), np.mean([m.bodies[a][1] for m in every], axis=0))
                      for a in ours.bodies})
     errors = {a: BodyError(_rms(np.concatenate([m.bodies[a][0] - ours.bodies[a][0] for m in every])),
@@ -143,4 +144,4 @@ def _speed(planned: Planned, table: GaitTable, take: Take, cycles: int) -> float
         heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
         return abs(float(np.diff(np.interp(ends, take.time, heading))[0] / np.diff(ends)[0] / planned.task.turn_rate))
     gone = [float(np.diff(np.interp(ends, take.time, take.p_WB[:, i]))[0]) for i in (0, 1)]
-    return float(np.hypot(*gone) / np.diff(ends)[0] / asked)
+    return float(np.hypot(gone[0], gone[1]) / np.diff(ends)[0] / asked)

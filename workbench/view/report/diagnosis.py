@@ -12,14 +12,13 @@ from workbench.compare.channels import BODY, joint_of
 from workbench.identify.options import PROBLEM
 from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
 from workbench.identify.results.take_report import TakeReport
-from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.types import Progress
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.report.servo_law import recalibrated_section, unknown_torque_section
+from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
     capital,
@@ -99,7 +98,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     for unknown in diagnosis.unknown_torques:
         report.add(unknown_torque_section(unknown))
     if diagnosis.tied:
-        report.add(_tied(diagnosis.tied))
+        report.add(tied_section(diagnosis.tied))
     if diagnosis.recalibrated:
         report.add(recalibrated_section(diagnosis.recalibrated))
     if takes:
@@ -237,13 +236,6 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         parts.append(Text("Tried in its place, and rejected:"))
         parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
-
-
-def _tied(ties: Sequence[GravityOverTorque]) -> Section:
-    """Gravity over torque, and each effect that would explain it alone."""
-    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
-    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
-        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
 
 
 def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]
