@@ -2,9 +2,9 @@
 
     python -m studies.sts3215 --data ../shared/data/sts3215 --out OUT [--quick] [--only NAME ...]
 
-For each session: effects with confidence, size beside the truth, and time. With the law of another session, the first repetition
-of the rig as weighed is diagnosed first, and its model.yaml is what the others are held against (`diagnose --model`). Frequencies
-and sizes are those of one servo; nothing in the diagnosis was set on them.
+For each session: effects with confidence, estimated and true size, and time. With the law of another session, the first
+repetition of the rig as weighed is diagnosed first, and the others are compared with its model.yaml (`diagnose --model`).
+Frequencies and sizes are those of one servo; nothing in the diagnosis was set on them.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ ALONE, SINCE = "alone", "since another session"
 @dataclass(frozen=True)
 class Outcome:
     """Of one session. rightly: the change was named, alone or in its tie, or, where there is none, nothing; named: alone; false:
-    names that are no truth; value: the size that was told, `sized` whether that is within what the case allows, None where none
-    was told; seconds: of processor."""
+    names that are wrong; value: the estimated size, and `sized` whether it is as close to the truth as the case demands, None
+    without an estimate; seconds: of processor."""
 
     case: str
     since: str
@@ -61,7 +61,7 @@ class Outcome:
 
 
 def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outcome:
-    """What a diagnosis said beside what is true."""
+    """A diagnosis compared with the truth."""
     said = [f for f in diagnosis.findings if f.confidence >= SAID]
     named = [f for f in said if f.effect in case.effects]
     false = tuple(f.effect for f in said if f.effect not in case.effects)
@@ -126,8 +126,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the logs")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study goes on")
-    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="of these sessions alone, beside the law's")
+    parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study resumes")
+    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="these sessions alone, beyond the law's")
     parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
     args, others = parser.parse_known_args()
     return run_study("sts3215", __doc__, partial(study, args), others)

@@ -1,4 +1,4 @@
-"""Sessions of real logs with a change that is known: what the session is told differs from what was recorded.
+"""Sessions of real logs with a known change: the session describes another rig, gain, clock or zero than was recorded.
 
 A pendulum that one Feetech STS3215 swings (kscalelabs/sysid, commit ca1ecb1), on three rigs that its authors weighed.
 """
@@ -65,9 +65,9 @@ RIGS = {r.name: r for r in (Rig("arm150_0.741kg", 0.741, 0.150, 0.018793, 1.1268
 @dataclass(frozen=True)
 class Case:
     """One session. recorded: rig and repetition of the logs; told: the rig that the session describes. gain: by which the told
-    gain is larger than the servo's; edit: what is done to a log's rows. effects: names that say rightly what changed; size: of
-    the first number of the first of them, in the unit of docs/formats.md; moment: gravity over torque in its place, in times what
-    was told; within: share of the size, or of the change of `moment`, within which an answer is right."""
+    gain is larger than the servo's; edit: applied to a log's rows. effects: names that describe the change rightly; size: of the
+    first number of the first of them, in the unit of docs/formats.md; moment: instead of a size, the true gravity over torque
+    relative to the described rig; within: share of the size, or of the change of `moment`, within which an answer is right."""
 
     name: str
     recorded: str

@@ -17,7 +17,7 @@ from workbench.identify.evidence.tied_names import gravity_over_torque, names_of
 
 OPTIONS = EvidenceOptions()
 SHIFT = 0.04
-"""Of the logarithm of torque, what one typical size of either effect does."""
+"""Change of the logarithm of torque that one typical size of either effect equals."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Scaled(Linear):
 
 
 def found(log_ratio, sd, options=OPTIONS):
-    """A rig with gravity over torque so far from nominal, whose torque is known to sd: what is said of its plain fit."""
+    """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie."""
     names = [candidate(name) for name in ("ground_tilt", "parallel_spring", "backlash")]
     here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(3)
@@ -44,7 +44,7 @@ def found(log_ratio, sd, options=OPTIONS):
     return here, fit, fits
 
 
-def test_a_motor_stronger_than_its_data_sheet_is_said_as_a_ratio_with_all_names():
+def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_names():
     here, fit, fits = found(math.log(0.6), 0.5)
     ratio = ratio_of(here, OPTIONS, fit)
     assert math.exp(ratio.log) == pytest.approx(0.6, rel=0.01)
@@ -52,14 +52,14 @@ def test_a_motor_stronger_than_its_data_sheet_is_said_as_a_ratio_with_all_names(
     assert tied.confidence == 0.0
     assert "ground_tilt" in {n.effect for n in tied.names}
     sizes = {g.hypothesis.effects[0].name: g.hypothesis.sizes()[0][1][0] for g in fits}
-    assert sizes["ground_tilt"] == pytest.approx(math.log(0.6) / SHIFT, rel=0.3)  # what the days' torque leaves to it
+    assert sizes["ground_tilt"] == pytest.approx(math.log(0.6) / SHIFT, rel=0.3)
     said = json.dumps(tied.to_json())
-    assert "times what the files say" in said
+    assert "times that of the files" in said
     assert "`load:`" in said
     assert "`--model`" in said
 
 
-def test_what_days_make_of_a_motor_is_not_said():
+def test_variation_between_days_is_not_reported():
     assert found(0.05, 0.5)[2] == []
 
 

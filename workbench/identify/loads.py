@@ -1,4 +1,4 @@
-"""Which joints carry a load in the recordings: what only a load shows cannot be told where there is none."""
+"""Joints that carry a load in the recordings: effects that only a load shows cannot be identified at others."""
 
 from __future__ import annotations
 

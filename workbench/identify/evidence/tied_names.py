@@ -33,7 +33,7 @@ class Ratio:
     sd: float
 
     def is_apart(self, options: EvidenceOptions) -> bool:
-        """Whether it is further from one than errors and what a servo's torque differs by between days."""
+        """Whether it differs from one by more than its error and the variation of a servo's torque between days."""
         between_days = (options.drift or SinceThen()).torque
         return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
 
@@ -61,8 +61,8 @@ def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | Non
 
 
 def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Fitted]]:
-    """Each effect of the tie fitted alone in the place of all, with the servo's torques as told, within what they differ by
-    between days; the likeliest first. Nothing where gravity over torque is as told."""
+    """Fits of each effect of the tie alone, with the servo's torques at their nominal values but for their variation between
+    days; the likeliest first. Empty where gravity over torque is nominal."""
     ratio = ratio_of(region, options, f)
     members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
     if ratio is None or not members or not ratio.is_apart(options):
@@ -78,7 +78,7 @@ def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[li
 
 
 def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:
-    """The numbers with torques no less certain than they stay from day to day: then an effect has to explain what is beyond."""
+    """The numbers with torques that may vary no more than between days, so that an effect has to explain the rest."""
     drift = options.drift or SinceThen()
     more = all_torques(numbers)
     if any(n.others for n in numbers) or not more.any():
@@ -88,7 +88,7 @@ def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Unce
 
 def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: Sequence[Fitted]
                         ) -> GravityOverTorque | None:
-    """What is said of the tie; None where gravity over torque is as told. fits: of `names_of_tie`."""
+    """The tie as it is reported; None where gravity over torque is nominal. fits: of `names_of_tie`."""
     ratio = ratio_of(region, options, p.best)
     if ratio is None or not fits:
         return None

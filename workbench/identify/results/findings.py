@@ -235,8 +235,8 @@ class Diagnosis:
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
     recalibrated: tuple[Recalibrated, ...] = ()
-    unknown_torques: tuple[UnknownTorque, ...] = ()
     tied: tuple[GravityOverTorque, ...] = ()
+    unknown_torques: tuple[UnknownTorque, ...] = ()
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):

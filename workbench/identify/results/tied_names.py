@@ -1,4 +1,4 @@
-"""What a servo's own angles tell as one number, with all names that could stand for it."""
+"""The ratio of gravity to torque, which is all that servo logs determine, with every effect that could have changed it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from workbench.identify.results.findings import Estimate
 
 @dataclass(frozen=True)
 class TiedName:
-    """One effect that would do it all. sentence: for a person, with its size; behind [nats]: how much less likely the recordings
-    are by it than by the best of its tie."""
+    """One effect that alone would explain the ratio. sentence: for a person, with its size; behind [nats]: how much less likely
+    the recordings are with it than with the best effect of the tie."""
 
     effect: str
     where: tuple[str, ...]
@@ -28,8 +28,8 @@ class TiedName:
 
 @dataclass(frozen=True)
 class GravityOverTorque:
-    """Gravity over torque of the joints `where`, in times what the robot's files say. confidence: that an effect of this tie is
-    there, and not the servo's torques alone; since: whether the files are those of an earlier diagnosis."""
+    """Gravity over torque of the joints `where`, relative to the robot's files. confidence: probability that one of the effects
+    is present, rather than a change of the servo's torques alone; since: whether the files are those of an earlier diagnosis."""
 
     where: tuple[str, ...]
     ratio: Estimate
@@ -41,7 +41,7 @@ class GravityOverTorque:
         """For a person: the ratio, everything that it may come from, and how to find out."""
         low, high = self.ratio.low, self.ratio.high
         told = f"Gravity over torque in {', '.join(self.where)} is {self.ratio.value:.2f} ({low:.2f} to {high:.2f}) times " \
-               f"{'that of the model before' if self.since else 'what the files say'}"
+               f"{'that of the earlier model' if self.since else 'that of the files'}"
         each = [f"all torques of the servo times {1 / float(self.ratio.value):.2f}",  # type: ignore[arg-type]
                 *(f"{n.sentence.rstrip('.')} ({n.behind:.0f} nats behind)" if n.behind >= 1 else n.sentence.rstrip('.')
                   for n in self.names)]

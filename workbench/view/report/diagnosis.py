@@ -95,10 +95,10 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
         report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
-    for unknown in diagnosis.unknown_torques:
-        report.add(unknown_torque_section(unknown))
     if diagnosis.tied:
         report.add(tied_section(diagnosis.tied))
+    for unknown in diagnosis.unknown_torques:
+        report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:
         report.add(recalibrated_section(diagnosis.recalibrated))
     if takes:

@@ -27,6 +27,13 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
     return Section(f"Unknown torque at {unknown.joint}", parts)
 
 
+def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
+    """Gravity over torque, and each effect that would explain it alone."""
+    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
+    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
+        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
+
+
 def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     """Adjusted constants of the nominal law."""
     shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
