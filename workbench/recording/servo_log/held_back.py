@@ -6,12 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.servo_log.following import JointLog
 from workbench.recording.servo_log.response import Response, fitted, shapes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

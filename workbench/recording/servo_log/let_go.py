@@ -6,12 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.servo_log.following import JointLog
 from workbench.recording.servo_log.response import Response, fitted, shapes
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -118,13 +116,13 @@ def _free(log: JointLog, stretch: tuple[int, int], fit: Response, c: LetGoChecks
     return not (at_upper or at_lower)
 
 
-def _follows(shaped: Array, log: JointLog, rest: NDArray[np.bool_], c: LetGoChecks) -> bool:
+def _follows(shaped: Array, log: JointLog, rest: Mask, c: LetGoChecks) -> bool:
     """Whether outside the stretches the joint does follow its goals."""
     fit = fitted(shaped, log.position, rest)
     return fit.explained >= c.before and fit.gain >= c.firm
 
 
-def _runs(true: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(true: Mask) -> list[tuple[int, int]]:
     """First index, and the one after the last, of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
