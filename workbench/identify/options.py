@@ -55,6 +55,8 @@ class ProblemOptions:
     """Which of these."""
     least_body_sigma: tuple[float, ...] = (1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004)
     """Of the body's channels [m, m, rad, m, rad, rad]: below this no contact model is believed."""
+    still: float = 0.02
+    """A joint whose recorded angle covers less than this tells nothing of its servo or gear [rad]."""
     late: float = 0.1
     """By how much every model may shift an estimated start [s]: a robot whose servos got each other's speeds sets out so unlike
     the nominal one that its start was estimated 62 ms early."""

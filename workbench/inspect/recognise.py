@@ -15,6 +15,7 @@ from workbench.files.errors import UnknownFolderError
 from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
+from workbench.recording.servo_log.goal_stamps import STAMPS
 from workbench.robot import ROBOTS, RobotModel, load_servo_constants
 from workbench.robot.servo_units import unknown_family
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 _LISTED = 20
 """Names in one line of text; JSON has them all."""
-_SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units")
+_SAID = ("Format Version", "Export Frame Rate", "Total Exported Frames", "Length Units", STAMPS)
 """Of a Motive header: what other fields of the inspection say."""
 _RESULTS = {"findings": ("verdict", "findings"), "comparison": ("takes", "joints_by_error"), "certificate": ("claim", "margins"),
             "bench": ("figures",)}
