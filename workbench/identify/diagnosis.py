@@ -79,7 +79,7 @@ class _Settings:
         return EvidenceOptions(drift=None if self.previous is None else SinceThen())
 
     def provenance(self) -> dict[str, object]:
-        """What the results say of them."""
+        """These options, as the results record them."""
         since = {} if self.previous is None else {"model before": self.previous.sha256}
         return since | ({"without": sorted(self.without)} if self.without else {})
 
@@ -87,13 +87,12 @@ class _Settings:
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
                      thorough: bool = False, without: Sequence[str] = (), previous: RobotModel | None = None,
                      engine: str = "auto") -> DiagnosisResult:
-    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
+    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that caches every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
-    effects that are known not to be there, and are not looked for; InputError where one is no effect. previous: the robot as an
-    earlier diagnosis left it, whose servos and effects are then nominal, so that findings are what is new; InputError where that
-    is another robot. Rollouts are the compiled
-    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model, or `engine` is
-    "drake"."""
+    effects that are known to be absent, and are not searched for; InputError for an unknown effect. previous: the robot of an
+    earlier diagnosis, whose servos and effects are taken as nominal, so that findings are the changes since; InputError where
+    that is another robot. Rollouts are compiled where the compiled station supports the model, unless Drake disagrees on the
+    nominal or on the final model, or `engine` is "drake"."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
     settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic(), previous)
@@ -176,8 +175,8 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:
-    """What was measured of the robot's geometry, unless with that in the model the takes are told worse; not always better, as
-    beside what else is missing the right leg may walk the wrong way."""
+    """The measured geometry of the robot, unless it makes the residuals larger; it need not make them smaller, since combined
+    with other missing effects even the right leg length may walk the wrong way."""
     if not build.measured:
         return build
     there = Search(evaluator, build.added_to(model)).evaluated([])
@@ -186,7 +185,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
 
 
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:
-    """Rollouts beside the robot with its measured geometry: what steps and contact models leave open is another robot's."""
+    """Rollouts of the robot with its measured geometry, whose numerical floor and contact spread are its own."""
     read = [replace(t, model=known.model_of(t.spec)) for t in takes]
     return evaluator.on(prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
 
@@ -194,7 +193,7 @@ def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake
 def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
-    """What each take was and is. fitted: the model with its effects; None: nothing was found."""
+    """Each take before and after. fitted: the model with its effects; None: nothing was found."""
     was = [e.take.observed(nominal[e.name]) for e in evaluator.evidence]
     now = was if fitted is None else evaluator.observed(fitted, evaluator.config)
     out = []

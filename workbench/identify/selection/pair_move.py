@@ -90,7 +90,7 @@ class _Around:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
     def predictions(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
-        """Predicted residual of each pair, and its sizes. left: residuals of this fit; answers: those of all questions."""
+        """Predicted residual of each pair, and its sizes. left: residuals of this fit; answers: those of every question."""
         plain = next(answers)
         slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
         moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]
