@@ -248,7 +248,7 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
              "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
-             "Tried in its place", "dead band at flm takes 900 off", "Before and after, on unseen stretches",
+             "Tried in its place", "dead band at flm reduces chi squared", "Before and after, on unseen stretches",
              "Residuals", "a &lt;take&gt;", "What else was tried", "its response does not match the residuals",
              "What to record next", "next_experiment.csv", "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]

@@ -73,7 +73,7 @@ def test_what_cannot_be_meant_is_refused() -> None:
         Estimate(3.0, 3.1, 3.5, "deg")
     with pytest.raises(ValueError, match="finite"):
         Estimate(inf, 0.0, inf, "N m")
-    with pytest.raises(ValueError, match="alike"):
+    with pytest.raises(ValueError, match="the same shape"):
         Estimate((0.0, 0.0, 0.0), 0.0, 1.0, "m")
     with pytest.raises(ValueError, match="verdict"):
         replace(DIAGNOSIS, verdict="perhaps")  # type: ignore[arg-type]
