@@ -78,6 +78,35 @@ def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel
         warn(verb, [str(e)])
 
 
+def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None:
+    """The same of a binary table, which names no maker: a certificate beside it has to be its own, and without one its limits are
+    checked as those of any motion are. InputError, unless `force`, which warns."""
+    from dataclasses import replace
+    from pathlib import Path
+
+    from workbench.device.tables.limits import refuse_broken_limits
+    from workbench.device.tables.table_file import read_table_file
+    from workbench.files import InputError
+    from workbench.gait.certificate import NAME, check_certificate
+    from workbench.motion import Motion
+    from workbench.robot import bus_ids
+
+    table = read_table_file(path, {i: joint for joint, i in bus_ids(model).items()}).table
+    known = [table.joints.index(j) for j in model.joints if j in table.joints]
+    if len(known) == len(table.joints):  # a controller's table is in order of names, a motion in the model's
+        table = replace(table, joints=tuple(table.joints[k] for k in known), goals=table.goals[:, known],
+                        speeds=table.speeds[:, known])
+    if not Path(path).with_name(NAME).is_file():
+        warn(verb, [str(v) for v in refuse_broken_limits(table, model, force, None, "not loaded")])
+        return
+    try:
+        check_certificate(path, Motion.from_table(table), model)
+    except InputError as e:
+        if not force:
+            raise InputError(e.source, f"{e.problem}; --force goes on all the same") from None
+        warn(verb, [str(e)])
+
+
 def check_files(verb: str, files: Iterable[str], model: RobotModel, cycles: int | None = None, yes: bool = True) -> None:
     """Warns of the problems of a robot, and of motions and recordings of it."""
     from workbench.inspect.problems import recording_problems, serious, summed_up

@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from workbench.cli.check import check_certificate_of
+from workbench.cli.check import check_certificate_of, check_table_of
 from workbench.cli.options import add_model, load_model, positive
 
 
@@ -50,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
     with Progress("flash") as progress:
         progress("building")
         model = load_model(args.model, args.packages)
-        if Path(args.motion).suffix != ".table":
+        if Path(args.motion).suffix == ".table":
+            check_table_of("flash", args.motion, model, args.force)
+        else:
             check_certificate_of("flash", args.motion, load_motion(args.motion, model), model, args.force)
         program = build_program(args.motion, model, profile, args.out, args.cycles, args.force, args.endless)
     for violation in program.violations:

@@ -17,10 +17,10 @@ SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
 """Of the simulation [s]: a walk of 10 s takes a million of the one, and feet sink in with the other."""
 
 
-def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy") -> None:
-    """--model: which robot; PUPPY by default. default: description of the default."""
+def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy", unless: str | None = PUPPY) -> None:
+    """--model: which robot; `unless` where the user names none. default: description of that default."""
     parser.add_argument(
-        "--model", metavar="FILE", default=PUPPY,
+        "--model", metavar="FILE", default=unless,
         help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos "
         f"and ground are taken (default: {default})")
     add_packages(parser)

@@ -115,10 +115,12 @@ class Progress:
                     self._show(again=True)
 
     def _show(self, again: bool = False) -> None:
-        """Writes the line, not too often; `again`: whatever was written."""
+        """Writes the line: at once where something else is being done (the text up to its first comma), else not too often.
+        `again`: whatever was written."""
         what, done = self._now
         now = time.monotonic()
-        if not again and what == self._shown and now - self._last < (0.1 if self._tty else 5.0):
+        same = what.partition(",")[0] == self._shown.partition(",")[0]
+        if not again and same and now - self._last < (0.1 if self._tty else 5.0):
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"

@@ -42,9 +42,13 @@ def run(args: argparse.Namespace) -> int:
             journal = Path(args.finish)
             capture = finish(journal, args.out / f"{journal.stem}.csv", ended="the recording was cut short")
         else:
-            recorder = Recorder(UdpLink(args.host, args.interface, args.port))
+            link = UdpLink(args.host, args.interface, args.port)
+            recorder = Recorder(link)
             with stop_on_signals() as stop:
                 capture = record_take(recorder, args.out / f"{args.name}.csv", stop, args.seconds, not args.no_motive, progress)
+            for other in sorted(link.others):
+                print(f"workbench record: warning: {other} streams to the same multicast group; its frames were left out",
+                      file=sys.stderr)
     for problem in capture.problems:
         print(f"workbench record: warning: {problem}", file=sys.stderr)
     counts = capture.counts

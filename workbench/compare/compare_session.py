@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -27,7 +27,7 @@ from workbench.types import Array, Progress, no_progress
 
 @dataclass(frozen=True)
 class Rollouts:
-    """One take simulated: as configured, with the step halved and quartered, with the other contact model."""
+    """One take simulated: as configured, with the step halved and then quartered, with the other contact model."""
 
     nominal: Take
     finer: tuple[Take, ...] = ()
@@ -87,9 +87,8 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
         jobs += [(i, kind, _job(run, c, _instants(run, own) if kind == "finer" else None))
                  for kind, configs in variants.items() for c in configs]
-    jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     progress("simulating", 0.0)
-    done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
+    done = _longest_first([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
     out = []
     for i in range(len(runs)):
         mine: dict[str, list[Take]] = {"nominal": [], "finer": [], "other_contact": []}
@@ -112,11 +111,17 @@ def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: 
     judged = {i for i, take in takes if _apart(take, done[i].nominal) < COMPARE.engines_apart}
     jobs = [(i, _job(run, c, _instants(run, c))) for i, run in enumerate(runs)
             for c in _finer(replace(config, base=run.base, engine="auto" if i in judged else config.engine))]
-    jobs.sort(key=lambda job: -_cost(job[1]))
     finer: dict[int, list[Take]] = {}
-    for (i, _), take in zip(jobs, simulate_batch([job for _, job in jobs], n_jobs)):
+    for (i, _), take in zip(jobs, _longest_first([job for _, job in jobs], n_jobs)):
         finer.setdefault(i, []).append(take)
     return [replace(r, finer=tuple(finer.get(i, ()))) for i, r in enumerate(done)]
+
+
+def _longest_first(jobs: Sequence[Job], n_jobs: int, progress: Callable[[int, int], None] | None = None) -> list[Take]:
+    """The takes in the order of the jobs, of which the longest begin first, so that no core waits for one at the end."""
+    order = sorted(range(len(jobs)), key=lambda k: -_cost(jobs[k]))
+    done = dict(zip(order, simulate_batch([jobs[k] for k in order], n_jobs, progress)))
+    return [done[k] for k in range(len(jobs))]
 
 
 def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:

@@ -51,8 +51,9 @@ class ReadOff(Protocol):
         """Of that mean."""
 
 
-def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The verdict's word in docs/formats.md; a finding that is less probable than not explains nothing."""
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -> Verdict:
+    """The verdict's word in docs/formats.md; a finding that is less probable than not explains nothing. left: unexplained
+    residuals."""
     if not gap:
         return "no_gap"
     if not findings:

@@ -2,7 +2,8 @@
 
 from workbench.servo.bank import AddServos, SetServoPhysics
 from workbench.servo.law import ServoLaw
-from workbench.servo.load_friction import LoadFrictionTerm, nominal_terms
+from workbench.servo.load_friction import LoadFrictionTerm
+from workbench.servo.nominal import nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers

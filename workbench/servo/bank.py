@@ -14,7 +14,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 from workbench.files import InputError
 from workbench.robot import RobotModel
 from workbench.servo.law import ServoLaw
-from workbench.servo.load_friction import nominal_terms
+from workbench.servo.nominal import nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import ServoTerm, most_friction

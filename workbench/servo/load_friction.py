@@ -38,11 +38,3 @@ class LoadFrictionTerm(ServoTerm):
         """All of it."""
         return TermNumbers(rubbing=self.coefficient, rubbing_still=self.static, rubbing_speed=self.speed,
                            rubbing_backwards=self.backdrive)
-
-
-def nominal_terms(law: ServoLaw) -> tuple[ServoTerm, ...]:
-    """What servos do by the nominal law beyond motor, Coulomb and viscous friction: none, or load friction."""
-    if not law.load_friction.any():
-        return ()
-    none = np.zeros_like(law.load_friction)
-    return (LoadFrictionTerm(law.load_friction, none, 1.0, none),)

@@ -26,6 +26,7 @@ class LoadFriction(Effect):
     places = ("joint",)
     family = "friction"
     under_load = True
+    needs_steady_load = True
     # 0.17 and 0.3 by fits to an XL-330 and an STS3215; from about half on a gear holds by itself what hangs on it
     parameters = (
         Parameter("coefficient", "", 0.0, 1.0, 0.15, seldom_beyond=0.6),

@@ -18,7 +18,9 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.identify.results.ties import Tie
+from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.search_result import Problem
 from workbench.identify.selection.acceptance import idle, too_little_left
@@ -70,6 +72,11 @@ class Selected:
         """None: the nominal law is taken as it is."""
         return ()
 
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """None: cameras and floors see more than angles."""
+        return ()
+
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
         return evaluator.on(with_commands_of(evaluator.evidence, self.search.evaluator.evidence))
@@ -89,6 +96,10 @@ class Selected:
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The effects, in the order in which they were found."""
         return tuple(finding(evidence, self.fit, i, self.posteriors[i], before, after) for i in range(len(self.fit.effects)))
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """None: of filmed takes no unnamed torque is looked for."""
+        return ()
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
