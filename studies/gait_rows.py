@@ -1,4 +1,4 @@
-"""The gaits that ship in data/gaits (motion, certificate, command): what they do when they are played; their table in the docs.
+"""Plays the gaits in data/gaits (motion, certificate, command) and tabulates the results in the docs.
 
 Every motion is played from power-on to standstill as its certificate says: by `simulate`, by `run` on the emulated robot, and in
 MuJoCo. The rows of the table are written between its marks in docs/gaits.md.
@@ -51,8 +51,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Did:
-    """What a motion did from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt [deg], torque
-    [N m], that lasts 10 ms: the largest of the whole. how: by what it was played."""
+    """One run of a motion from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt [deg],
+    torque [N m], that lasts 10 ms: the largest of the whole. how: by which player."""
 
     how: str
     speed: float
@@ -72,7 +72,7 @@ def rows(model: RobotModel, folder: Path = GAITS) -> list[Row]:
 
 
 def certified(certificate: Certificate) -> Did:
-    """What the certificate says."""
+    """The values in the certificate."""
     n = certificate.nominal
     return Did("certificate", n.forward, n.heading, n.tilt, certificate.ways.torque)
 
