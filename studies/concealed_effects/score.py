@@ -229,7 +229,7 @@ def _share(true: Sequence[str], said: Sequence[str]) -> float:
 
 
 def _instead(e: Mapping[str, Any], found: Sequence[Mapping[str, Any]], used: set[int]) -> str:
-    """Name given to a missed effect: that of a finding at its place that matches no other; else abstained."""
+    """Name given to a missed effect: that of a finding at the same place that matches no other; else abstained."""
     for i, f in enumerate(found):
         if i not in used and _share(e["where"], f["where"]) > 0:
             return str(f["effect"])
