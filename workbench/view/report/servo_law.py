@@ -6,11 +6,12 @@ import math
 from collections.abc import Sequence
 
 from workbench.identify.results.recalibrated import Recalibrated
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.view.figures.unknown_torque import unknown_torque
 from workbench.view.report.page import Part, Picture, Section, Table, Text
 from workbench.view.report.tables import folded
-from workbench.view.report.words import capital, change, listed, probable, unbroken
+from workbench.view.report.words import capital, change, listed, probable, title_of, unbroken
 
 
 def unknown_torque_section(unknown: UnknownTorque) -> Section:
@@ -26,6 +27,13 @@ def unknown_torque_section(unknown: UnknownTorque) -> Section:
     return Section(f"Unknown torque at {unknown.joint}", parts)
 
 
+def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
+    """Gravity over torque, and each effect that would explain it alone."""
+    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
+    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
+        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
+
+
 def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     """Adjusted constants of the nominal law."""
     shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
@@ -34,3 +42,10 @@ def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
     return Section("Recalibrated constants", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
+
+
+def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
+    """Gravity over torque, and each effect that would explain it alone."""
+    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
+    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
+        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
