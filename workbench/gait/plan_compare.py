@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
@@ -14,8 +13,7 @@ from workbench.gait.table import GaitTable
 from workbench.gait.trajopt import Planned
 from workbench.recording import quaternions as quat
 from workbench.recording.take import Take
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

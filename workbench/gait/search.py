@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import cma
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.gait.evaluate import Candidate, Evaluator
@@ -19,9 +18,7 @@ from workbench.gait.request import Request
 from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
-from workbench.types import Progress
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress
 
 STEERED = 2
 """How often a gait is steered before the next generation."""

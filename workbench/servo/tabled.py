@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TURNING = 0.15
 """Speed [rad/s] at which a torque that follows the direction of motion has 1/sqrt(2) of its size: above creep and a sensor's

@@ -79,7 +79,7 @@ class CycleController(LeafSystem):
         return x[at.ALONG] + m.ahead, left, x[at.HEADING] + m.turned(x[at.NEXT], x[at.PLAYED]) + x[at.BIAS]
 
     def _planned(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
-        ahead = along + m.ahead * np.arange(self.options.horizon + 1)
+        ahead = np.asarray(along + m.ahead * np.arange(self.options.horizon + 1), float)
         targets = np.array([self.path.heading(s) for s in ahead])
         bounds = corridor(self.path, ahead, left, self.discs, self.options.clearance) if self.discs else None
         return plan(left, heading, x[at.NEXT], x[at.BIAS], targets, m, self.options, bounds)

@@ -18,12 +18,12 @@ from workbench.identify.evidence.options import LawOptions
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo import Instant
 from workbench.servo.tabled import Tabled
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.robot import RobotModel
 
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -21,12 +21,12 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.torque_law import TorqueLaw
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.search import Found
     from workbench.identify.parameters import Candidate
 
-Array = NDArray[np.float64]
 Scales = Mapping[str, float]
 
 

@@ -102,7 +102,7 @@ class Selected:
         return ()
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-        """What is still beyond noise and numerics, and what casts doubt on what was fitted."""
+        """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
         drifting = (d.left(evidence) for d in self.drifts)
         return (*unexplained(evidence, after, floors), *drifting, *downward_pulls(self.fit))
 
@@ -111,12 +111,12 @@ class Selected:
         return too_little_left(self.search, self.fit, self.search.fitted, (), everywhere=False)
 
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
-        """Rivals that lost, and what was tried and not taken."""
+        """Rivals that lost, and effects that were tried and not accepted."""
         cropped = {i: before[i][:len(e.recorded)] for i, e in enumerate(self.looked_at)}
         return rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
-        """Of all numbers of the effects."""
+        """The joint posterior of the effects' parameters."""
         return posterior(self.fit, read_off)
 
     def ties(self) -> tuple[Tie, ...]:

@@ -42,10 +42,3 @@ def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
     said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
     return Section("Recalibrated constants", [Text(said), *folded(
         ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
-
-
-def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
-    """Gravity over torque, and each effect that would explain it alone."""
-    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
-    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
-        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
