@@ -76,7 +76,7 @@ def test_lines_between_knots_and_constant_beyond():
     none = np.zeros(2)
 
     def at(v, duty):
-        return term.torque(Instant(0.0, np.array([v, v]), np.array([0.0, duty]), none, none, none, none))
+        return term.more_torque(Instant(0.0, np.array([v, v]), np.array([0.0, duty]), none, none, none, none))
     assert at(slow, 0.0)[0] == pytest.approx(4.5)
     assert at(fast, 0.0)[0] == 0.0
     assert at(-fast, 0.0)[0] == 3.0

@@ -12,6 +12,7 @@ from workbench.cli.options import add_engine, add_out, positive
 
 if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
+    from workbench.identify.results.unknown_torque import UnknownTorque
 
 
 STAGES = ("reading", "simulating", "looking again", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
@@ -77,8 +78,17 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
+    for unknown in diagnosis.unknown_torques:
+        print(f"  {unknown_line(unknown)}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
     return 0
+
+
+def unknown_line(unknown: UnknownTorque) -> str:
+    """One line of the terminal: a torque that no effect describes, how surely, and what it takes off errors."""
+    error = unknown.validation
+    return f"{unknown.evidence} (confidence {unknown.confidence:.2f}; error on unseen stretches " \
+           f"{error.before:.2f} -> {error.after:.2f} {error.unit})"
 
 
 def finding_line(finding: Finding) -> str:

@@ -51,8 +51,9 @@ class ReadOff(Protocol):
         """Of that mean."""
 
 
-def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it."""
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -> Verdict:
+    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it. left: what has
+    none."""
     if not gap:
         return "no_gap"
     if not findings:

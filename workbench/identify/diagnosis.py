@@ -156,22 +156,25 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
+    unknown = found.unknown_torques(evidence, nominal.residuals, after)
     left = found.unexplained(evidence, after, floors) if gap else ()
 
     # 6. Conclusions
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and found.is_slight()
+    slight = not findings and not unknown and not left and found.is_slight()
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
-        verdict=verdict_of(bool(gap) and not slight, findings, left),
+        verdict=verdict_of(bool(gap) and not slight, findings, (*left, *unknown)),
         model=found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
-        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated)
-    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings or found.recalibrated else None)
+        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
+        unknown_torques=unknown)
+    changed = bool(findings or unknown or found.recalibrated)
+    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if changed else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
     from workbench.identify.results.ties import Tie
+    from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
     from workbench.robot import Posterior, RobotModel
 
@@ -72,6 +73,9 @@ class Explained(Protocol):
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The model's effects. before, after: residuals of the nominal model and of this one."""
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """Torques in the model that no effect describes; before, after as in `findings`."""
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """What is beyond noise and numerics, and what casts doubt on what was fitted."""

@@ -19,7 +19,8 @@ class ServoLaw:
     """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m] and that per
     volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]; derivative gain
     [duty per rad/s], speed of the goal's ramp [rad/s] (infinite: none), time constant of the goal's lag [s], and friction as a
-    share of the load; tables: torques beyond all that, each with the number of its servo. A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
+    share of the load; tables: torques beyond all that, each with the number of its servo.
+    A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
 
     gain: Array
     margin: Array

@@ -27,7 +27,7 @@ class Tabled(ServoTerm):
         self.tables, self.n = tuple(tables), n
         self.servo, self.depends_on, self.at, self.by = arrays_of(self.tables)
 
-    def torque(self, now: Instant) -> Array:
+    def more_torque(self, now: Instant) -> Array:
         """Of all tables [N m]."""
         out = np.zeros(self.n)
         for t, i in enumerate(self.servo.tolist()):

@@ -73,7 +73,7 @@ class TermBank(ServoBank):
             self._ceiling = np.minimum(self._ceiling, term.ceiling())
             self._bend = self._bend + 1.0 / np.asarray(term.saturation())
         self._cuts = bool(np.isfinite(self._ceiling).any() or self._bend.any())
-        self._tabled = tuple(t for t in terms if type(t).torque is not ServoTerm.torque)
+        self._tabled = tuple(t for t in terms if type(t).more_torque is not ServoTerm.more_torque)
         self._discrete = plant.time_step() > 0
         self._smoothing = period / (period + LOAD_SMOOTHING)
         self._inertia_rate = law.inertia / period
@@ -127,7 +127,7 @@ class TermBank(ServoBank):
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
         for term in self._tabled:
-            push = push + term.torque(now)
+            push = push + term.more_torque(now)
         if not self._varies:
             return _Parts(push, motor, law.coulomb, self._none)
         now = replace(now, motor=motor, direction=_limited(v / MOVING))

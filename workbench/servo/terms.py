@@ -14,9 +14,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Instant:
-    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) of the joints [rad/s]; duty (n,), 0 with
-    torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it. angle (n,) of the joints [rad]. Known where friction is
-    asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or would but for friction."""
+    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) and angle (n,) of the joints [rad/s,
+    rad]; duty (n,), 0 with torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it.
+    Known where friction is asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or
+    would but for friction."""
 
     elapsed: float
     velocity: Array
@@ -68,7 +69,7 @@ class ServoTerm:
         """Torque s [N m] by which the motor's, x, acts as x / (1 + |x|/s)."""
         return np.inf
 
-    def torque(self, now: Instant) -> Array | float:
+    def more_torque(self, now: Instant) -> Array | float:
         """Torque on the joint beyond the motor's and friction [N m]."""
         return 0.0
 

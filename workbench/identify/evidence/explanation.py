@@ -11,6 +11,7 @@ import numpy as np
 
 from workbench.compare.metrics import rms
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
+from workbench.identify.evidence.fit import weights_covariance
 from workbench.identify.evidence.leftover import left_over
 from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
 from workbench.identify.evidence.recalibration import what_changed
@@ -21,6 +22,7 @@ from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
+from workbench.identify.results.unknown_torque import UnknownTorque, said
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
     from workbench.identify.fitting.constancy import Drift
+    from workbench.identify.parameters import Candidate
 
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
@@ -99,9 +102,29 @@ class Explanation:
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
                     estimates(c, x, covariance[s, s] if tie is None else tie.covariance(covariance[s, s], x)), fit, validation,
                     tuple(others[:1]),
-                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence),
+                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
                     family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
+
+    def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:
+        """What a finding's sentence says of an unnamed torque in its place."""
+        depends_on, probability = p.unnamed_instead((c.name, c.where))
+        if probability < CONCLUSIONS.worth_an_experiment:
+            return ""
+        return f" Or ({probability:.2f}) a torque that depends on {said(depends_on)}, which no known effect describes."
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """Torques of the likeliest model that no effect describes, by joint."""
+        out = []
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            law = p.best.hypothesis.law
+            if law is None or p.best.beside is None:
+                continue
+            spread = law.spread(CONCLUSIONS.wider**2 * weights_covariance(p.best, region, self.options))
+            fit, validation = (change(evidence, (law.joint,), before, after, use) for use in ("fit", "validate"))
+            out.append(UnknownTorque(law.joint, CONCLUSIONS.surest * p.unnamed, law.rms(evidence, self.nominal), law.tables(),
+                                     spread, fit, validation))
+        return tuple(sorted(out, key=lambda u: -u.confidence))
 
     def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:
         """What acts in all joints at once."""

@@ -18,10 +18,13 @@ from workbench.robot import EffectSpec
 from workbench.types import Array
 
 if TYPE_CHECKING:
+    from workbench.identify.evidence.torque_law import TorqueLaw
     from workbench.identify.parameters import Candidate
 
 FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
+UNNAMED = "unknown torque"
+"""Stands for a torque law among the terms of a hypothesis."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -64,16 +67,18 @@ def labels_of(c: Candidate) -> list[Label]:
 @dataclass(frozen=True)
 class Hypothesis:
     """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the
-    effects' sizes (`Candidate`)."""
+    effects' sizes (`Candidate`). law: a torque beside them that nobody has named."""
 
     numbers: tuple[Uncertain, ...]
     effects: tuple[Candidate, ...]
     theta: Array = field(repr=False)
+    law: TorqueLaw | None = None
 
     @property
     def key(self) -> frozenset[Term]:
-        """Which effects there are, whatever their sizes."""
-        return frozenset(term_of(c) for c in self.effects)
+        """Which effects there are, whatever their sizes, and on what an unnamed torque depends."""
+        unnamed = () if self.law is None else [(UNNAMED, (self.law.joint,), tuple(sorted(self.law.scales)))]
+        return frozenset([*(term_of(c) for c in self.effects), *unnamed])
 
     @property
     def z(self) -> Array:

@@ -56,6 +56,8 @@ class Rollouts:
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
         model = recalibrated(self.nominal, z)
+        for law in (h.law for h in hypotheses if h.law is not None):
+            model = law.added_to(model)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
     def around_here(self, step: float, horizon: float | None = None) -> Rollouts:

@@ -20,6 +20,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.ties import Tie
+from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
@@ -89,6 +90,10 @@ class Selected:
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The effects, in the order in which they were found."""
         return tuple(finding(evidence, self.fit, i, self.posteriors[i], before, after) for i in range(len(self.fit.effects)))
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """None: of filmed takes no unnamed torque is looked for."""
+        return ()
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """What is still beyond noise and numerics, and what casts doubt on what was fitted."""

@@ -81,8 +81,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,
         still=_array([t.rubbing_still for t in still]).reshape(len(still), n),
         still_speed=_array([t.rubbing_speed for t in still]),
-        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n), table_servo=table_servo, table_of=table_of, table_at=table_at,
-        table_torque=table_torque)
+        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n),
+        table_servo=table_servo, table_of=table_of, table_at=table_at, table_torque=table_torque)
 
 
 def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool, apart: bool) -> Shapes:

@@ -151,7 +151,7 @@ def _tabled(servos: Servos, t: int, angle: float, v: float, duty: float) -> floa
     else:
         share = (x - servos.table_at[t, low - 1]) / (servos.table_at[t, low] - servos.table_at[t, low - 1])
         value = servos.table_torque[t, low - 1] + share * (servos.table_torque[t, low] - servos.table_torque[t, low - 1])
-    if kind == _ANGLE_DIRECTION or kind == _DUTY_DIRECTION:
+    if kind in (_ANGLE_DIRECTION, _DUTY_DIRECTION):
         value *= v / math.sqrt(v * v + _TURNING * _TURNING)
     return value
 
