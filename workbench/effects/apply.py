@@ -82,8 +82,9 @@ def physics_of(model: RobotModel) -> Physics:
     for effect, spec, values in resolved(model):
         columns = _columns(model, spec)
         law = effect.law(law, columns, values)
-        term = effect.servo_term(np.isin(model.joints, spec.where), values)
-        terms += [] if term is None else [term]
+        if type(effect).servo_term is not Effect.servo_term:
+            term = effect.servo_term(np.isin(model.joints, spec.where), values)
+            terms += [] if term is None else [term]
         ground = effect.ground(ground, values)
         gravity = effect.gravity(gravity, values)
         zero[columns] += effect.zero(values)

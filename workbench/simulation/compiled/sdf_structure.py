@@ -6,8 +6,6 @@ longer than the rollout.
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
@@ -17,11 +15,11 @@ MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 @dataclass(frozen=True)
 class Split:
-    """structure: digest of everything but the numbers below and what is only looked at. joints: by joint, the texts of LIMITS
+    """structure: everything but the numbers below. joints: by joint, the texts of LIMITS
     and of DYNAMICS, None where there is none. weights: by link, the texts of its mass, its centre's pose and its MOMENTS.
     inertials: by link, where these were read."""
 
-    structure: bytes
+    structure: tuple[object, ...]
     joints: dict[str, tuple[str | None, ...]]
     weights: dict[str, tuple[str | None, ...]]
     inertials: dict[str, Element] = field(compare=False)
@@ -46,8 +44,11 @@ def split(root: Element) -> Split:
         else:
             continue
         taken |= {id(c) for c in own if c is not None}
-    digest = hashlib.sha256(repr(list(_said(root, taken))).encode()).digest()
-    return Split(digest, joints, weights, inertials)
+    told: list[object] = []
+    for e in root.iter():
+        if id(e) not in taken:  # with how many children each has, the order says all
+            told += (e.tag, len(e), e.text, *e.attrib.items())
+    return Split(tuple(told), joints, weights, inertials)
 
 
 def _children(e: Element | None, tags: tuple[str, ...]) -> list[Element | None]:
@@ -62,11 +63,3 @@ def _plain_inertial(link: Element) -> Element | None:
     pose = found[0].find("pose")
     return None if pose is not None and pose.get("relative_to") else found[0]
 
-
-def _said(e: Element, taken: set[int]) -> Iterator[object]:
-    """Everything that an element says, in order, without the elements that are taken and what is only looked at."""
-    if id(e) in taken or e.tag == "visual":
-        return
-    yield e.tag, len(e), sorted(e.attrib.items()), (e.text or "").strip()
-    for child in e:
-        yield from _said(child, taken)

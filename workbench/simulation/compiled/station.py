@@ -98,6 +98,7 @@ class CompiledJob:
         self.tables: Tables = tables_of(self.model, self.physics.build, self.free)
         self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step, apart)
         self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
+        self._work: list[Work] = []  # likewise: they are not played at the same time
         self.plan = self._plan()
 
     def _plan(self) -> _Plan:
@@ -133,9 +134,10 @@ class CompiledJob:
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
         config, plan = self.config, self.plan
-        work = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
         if not self._settled:
-            self._settled.append(self._at_rest(work))
+            self._work.append(work_for(self.machine.tree, self.machine.servos, self.machine.shapes))
+            self._settled.append(self._at_rest(self._work[0]))
+        work = self._work[0]
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._put(Start(*self.job.start), state)

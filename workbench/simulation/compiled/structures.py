@@ -18,7 +18,7 @@ from workbench.simulation.compiled.tables import Array, Tables, carried, read_ta
 KEPT = 64
 ENDLESS = 1e15
 """Limits that are no smaller [rad] are left to Drake, which takes such for none."""
-_known: OrderedDict[tuple[bytes, str, bool], tuple[Split | None, Tables]] = OrderedDict()
+_known: OrderedDict[tuple[object, str, bool], tuple[Split | None, Tables]] = OrderedDict()
 
 
 def tables_of(model: RobotModel, build: SdfRobot | None, free: bool) -> Tables:
