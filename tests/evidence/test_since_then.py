@@ -36,7 +36,7 @@ def test_what_a_diagnosis_knew_is_kept_in_its_model(tmp_path):
 
 
 def test_what_was_known_together_stays_known_together(tmp_path):
-    """Torque and friction each to a half, but what they leave of each other to a hundredth: so it is tomorrow, but for drift."""
+    """Torque and friction each to a half, but their difference to a hundredth: so it is tomorrow, but for drift."""
     def only_together(numbers):
         torque, friction = ([n.name for n in numbers].index(name) for name in ("torque_at_full_duty", "coulomb_friction"))
         C = np.diag([1e-4 / n.sd**2 for n in numbers])

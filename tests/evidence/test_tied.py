@@ -17,7 +17,7 @@ N = 1600
 
 
 def fitted(sd, size, alike=1.0):
-    """A tilt that does what torque does, but for what is at right angles to it; a unit of it as much as 0.1 of the logarithm."""
+    """A tilt that acts as torque, apart from a part at right angles to it; a unit of it equals 0.1 of the logarithm."""
     tilt = candidate("ground_tilt")
     here = replace(region([tilt]), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(1)

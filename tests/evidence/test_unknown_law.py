@@ -1,4 +1,4 @@
-"""A torque that nobody has named beside the names, on a robot that is linear in all its numbers."""
+"""A torque that nobody has named against the names, on a robot that is linear in all its numbers."""
 
 from dataclasses import dataclass, field
 
@@ -22,7 +22,7 @@ PEAKS = np.exp(-0.5 * np.square((AT[:, None] - np.array([-60.0, -30.0, 0.0, 30.0
 
 @dataclass(frozen=True)
 class LinearLaw(Linear):
-    """by_weight (n, M): what a newton metre of each weight takes off the residuals."""
+    """by_weight (n, M): how much a newton metre of each weight reduces the residuals."""
 
     by_weight: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -36,8 +36,8 @@ def torque_law():
     return TorqueLaw("j", functions, np.zeros(9), tried=len(OPTIONS.law.shares))
 
 
-def robot(true, weights=None, vocabulary=NAMES, alike=0.0, noise=2e-3, seed=0):
-    """alike: share of the first unnamed function that the effect backlash does as well."""
+def robot(true, weights=None, vocabulary=NAMES, overlap=0.0, noise=2e-3, seed=0):
+    """overlap: share of the first unnamed function that the effect backlash contains."""
     of = region([candidate(n) for n in vocabulary], noise=noise)
     n = len(of.likelihood.known)
     signals = waves(seed, n, len(NAMES) + 10)
@@ -46,7 +46,7 @@ def robot(true, weights=None, vocabulary=NAMES, alike=0.0, noise=2e-3, seed=0):
     truth = np.random.default_rng(seed + 1).normal(size=n) * noise
     truth = truth if weights is None else truth + by_weight @ weights
     for name, signal in zip(NAMES, signals):
-        signal = signal + (alike * by_weight[:, 0] * 0.03 if name == "backlash" else 0.0)
+        signal = signal + (overlap * by_weight[:, 0] * 0.03 if name == "backlash" else 0.0)
         does |= {f"{name}.{p.name}": signal for p in candidate(name).parameters}
         truth = truth + true.get(name, 0.0) * signal
     return LinearLaw(None, None, (of,), (start(of.numbers),), None, None, truth=truth, does=does, by_weight=by_weight)
@@ -63,7 +63,7 @@ WEIGHTS = 0.03 * np.array([1.5, -1.0, 1.2, -0.8, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_a_law_without_a_name_takes_the_place_of_the_name_nearest_to_it():
-    before, found, p = weighed(robot({}, WEIGHTS, alike=1.5))
+    before, found, p = weighed(robot({}, WEIGHTS, overlap=1.5))
     assert before.named["backlash", ("j",)] > 0.9
     assert p.named.get(("backlash", ("j",)), 0.0) < 0.05
     assert p.unnamed > 0.95
@@ -95,7 +95,7 @@ def test_quiet_recordings_ask_for_no_law():
 
 def test_a_name_that_the_law_could_stand_for_is_less_well_known():
     """The covariance of a name's size is over all weights."""
-    _, found, p = weighed(robot({"backlash": 2.0}, WEIGHTS, alike=0.7))
+    _, found, p = weighed(robot({"backlash": 2.0}, WEIGHTS, overlap=0.7))
     best = next(f for f, _ in p.weights if f.hypothesis.law is not None and f.hypothesis.effects)
     alone = np.linalg.inv((best.J.T * found.region.likelihood.precision(best.r, best.discrepancy)) @ best.J
                           + np.eye(len(best.hypothesis.theta)))

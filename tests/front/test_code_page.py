@@ -13,7 +13,7 @@ QUESTIONS = {
     "how is a walk cut into windows": ("identify/shooting.py", "def edges"),
     "where is a stop read off": ("identify/estimators/stops_and_mounts.py", "def stops"),
     "how do two names tie": ("identify/results/findings.py", "def tie"),
-    "what is the numerical floor": ("identify/preparation.py", "floor = _apart"),
+    "where is the numerical floor computed": ("identify/preparation.py", "floor = _apart"),
     "where does a new recording format go": ("recording/formats/", "FORMAT"),
     "where are rollouts remembered": ("identify/rollouts/memory.py", "def keep"),
     "where are the report's sentences made": ("view/report/words.py", "def in_words"),

@@ -1,4 +1,4 @@
-"""Inverse dynamics of what a file holds: a take of a session, a rollout, a motion."""
+"""Inverse dynamics of a file: a take of a session, a rollout, a motion."""
 
 from __future__ import annotations
 

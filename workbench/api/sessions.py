@@ -28,15 +28,15 @@ from workbench.view.report.comparison import write_comparison
 from workbench.view.report.diagnosis import write_diagnosis
 from workbench.view.report.notebook import comparison_html, diagnosis_html, prediction_html
 
-"""Called with what is being done and the share done (0 to 1; None where it is not known)."""
+"""Called with the current stage and the share done (0 to 1; None where it is not known)."""
 
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """A session's takes beside their simulation.
+    """A session's takes compared with their simulation.
 
     comparison: errors by take and joint, in SI units and radians (`Comparison.to_json` gives degrees); its `takes` hold the
-    recorded and the simulated trajectories, its `left_out` the damaged takes. session: what was compared.
+    recorded and the simulated trajectories, its `left_out` the damaged takes. session: the session that was compared.
     """
 
     comparison: Comparison
@@ -85,12 +85,12 @@ class DiagnoseOptions:
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """Which physics the model left out.
+    """The physics that the model left out.
 
     diagnosis: verdict, findings with their parameters (units of docs/formats.md, section 7: degrees, N m, s), errors in deg or m,
-    what stays unexplained, damaged takes that were left out. session: what was diagnosed. takes: recorded and simulated
-    trajectories and residuals, for figures (SI, radians). next_motion: to record next, where the data cannot separate two
-    effects; else None.
+    unexplained residuals, damaged takes that were left out. session: the session that was diagnosed. takes: recorded and
+    simulated trajectories and residuals, for figures (SI, radians). next_motion: to record next, where the data cannot separate
+    two effects; else None.
     """
 
     diagnosis: Diagnosis
@@ -127,11 +127,11 @@ class DiagnosisResult:
 
 @dataclass(frozen=True)
 class PredictionResult:
-    """What a model predicts of takes that it was not fitted to; the files are written already.
+    """Predictions of a model for takes that it was not fitted to; the files are already written.
 
     takes: the simulated takes, in SI units and radians, time zero at the first command. paths: the file of each take, in the same
-    order. left_out: name of each damaged take of the session, and why it was left out (from the others the capture's yaw is
-    found).
+    order. left_out: name of each damaged take of the session, and why it was left out (the capture's yaw is found from the
+    others).
     """
 
     takes: tuple[Take, ...]

@@ -78,6 +78,8 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
+    for tied in diagnosis.tied:
+        print(f"  {tied.said()}")
     for unknown in diagnosis.unknown_torques:
         print(f"  {unknown_line(unknown)}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")

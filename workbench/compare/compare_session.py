@@ -36,7 +36,7 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class Run:
-    """What is to be simulated. start: where it begins other than at rest in neutral; steadied: where its base is put back to."""
+    """One simulation. start: initial state, if not at rest in neutral; steadied: states to which its base is reset."""
 
     name: str
     model: RobotModel
@@ -130,14 +130,14 @@ def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:
 
 
 def _finer(config: SimulationConfig) -> list[SimulationConfig]:
-    """Half and a quarter of a step; what is written down stays on the same times."""
+    """The run at half and at a quarter of the step, with the same output times."""
     if config.time_step <= 0:
         return []
     return [replace(config, time_step=config.time_step / k, log_period=config.logged_every) for k in (2, 4)]
 
 
 def _apart(one: Take, other: Take) -> float:
-    """The largest difference of two rollouts' angles and base positions [rad, m]; infinite where they are not alike."""
+    """The largest difference of two rollouts' angles and base positions [rad, m]; infinite where their shapes differ."""
     pairs = [(one.q, other.q), *([] if one.p_WB is None or other.p_WB is None else [(one.p_WB, other.p_WB)])]
     if any(a.shape != b.shape for a, b in pairs):
         return np.inf
@@ -170,7 +170,7 @@ def _cost(job: Job) -> float:
 
 
 def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
-    """What is to be simulated for a take, on a base that goes on from `steadied` states where given."""
+    """The simulation of a take, with the base reset to the `steadied` states where given."""
     return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
 
 

@@ -73,9 +73,9 @@ def noise_of(takes: Sequence[Take]) -> Noise:
 
 
 def aligned(take: Take, reference: Take) -> Take:
-    """`take` at the times of `reference`, both counted from their first commands, and zeroed where the reference is.
+    """`take` at the times of `reference`, both counted from their first commands, with zeros defined as in the reference.
 
-    Without a known first command a take's first frame stands for it.
+    Without a known first command, time is counted from a take's first frame.
     """
     if reference.zeroed and not take.zeroed:
         take = _zeroed(take)

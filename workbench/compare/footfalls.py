@@ -1,4 +1,4 @@
-"""Which foot stands when: from where the feet are, recorded and simulated alike, or from contact forces."""
+"""Which foot is on the ground when: from the feet's positions, recorded or simulated, or from contact forces."""
 
 from __future__ import annotations
 

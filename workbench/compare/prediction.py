@@ -32,7 +32,7 @@ from workbench.types import Array, Progress, no_progress
 
 @dataclass(frozen=True)
 class Predicted:
-    """What was predicted. paths: files, as a recording would look. takes: the simulated take (SI, radians) behind each file, in
+    """The predictions. paths: files, in the format of a recording. takes: the simulated take (SI, radians) behind each file, in
     the same order. left_out: name of each damaged take of the session, and why it was left out."""
 
     paths: tuple[Path, ...]

@@ -64,12 +64,6 @@ class InverseDynamicsResult:
         """Index of a joint's column."""
         return self.joints.index(joint)
 
-    @property
-    def residual_over_noise(self) -> Array:
-        """Residual (N, 6) in standard deviations; NaN where no noise was given."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.residual_sigma > 0, self.base_wrench_residual / self.residual_sigma, np.nan)
-
 
 def save_inverse_dynamics(result: InverseDynamicsResult, path: str | Path) -> Path:
     """Writes the result as CSV under three comment lines: format, what it is (JSON), units.

@@ -54,7 +54,7 @@ class Physics:
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
-    """Each effect of a model with its spec and its values in SI, checked; InputError names what is wrong."""
+    """Each effect of a model with its spec and its values in SI, checked; InputError names the problem."""
     for spec in model.effects:
         effect = effect_named(spec.effect)
         check_places(effect, spec, model)
@@ -107,7 +107,7 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:
-    """What the servos act on of commands that were sent: as late as the nominal law has it, and as effects change it."""
+    """The commands on which the servos act: those sent, delayed as in the nominal law, and changed by effects."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
         commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)

@@ -17,8 +17,8 @@ from workbench.robot.model_source import named
 from workbench.types import Array
 
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
-"""Of the link between servo and link [kg, kg m^2]: small beside any robot, large enough for the solver. What a gear weighs at the
-joint is the servo's reflected inertia, which stays on the servo's joint."""
+"""Mass and inertia of the link between servo and link [kg, kg m^2]: small compared with any robot, large enough for the solver.
+The gear's inertia at the joint is the servo's reflected inertia, which stays on the servo's joint."""
 SPRING_TIME = 1e-3
 """Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
 they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME.

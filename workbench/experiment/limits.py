@@ -1,4 +1,4 @@
-"""What a robot may be asked to do: joint ranges, speeds, and links that stay clear of each other."""
+"""Limits of the motions that a robot may be sent: joint ranges, speeds, and links that stay clear of each other."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Reach:
         )
 
     def allows(self, segment: Segment) -> bool:
-        """Whether a motion table (docs/formats.md, section 2), ranges and speeds hold what is asked."""
+        """Whether a motion table (docs/formats.md, section 2), ranges and speeds allow these segments."""
         try:
             table = Motion(segment.name, segment.times, self.model.joints, segment.angles, units=self.units).as_table()
         except InputError:

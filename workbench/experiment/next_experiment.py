@@ -16,8 +16,8 @@ MOTION = "next_experiment.csv"
 
 def with_next_experiment(result: DiagnosisResult, n_jobs: int = 2, progress: Progress = no_progress
                          ) -> tuple[Diagnosis, Motion | None]:
-    """The diagnosis with its next experiment, and that experiment's motion; as it was, and None, where nothing is tied or no
-    motion separates what is. progress: called with what is tried and the share done."""
+    """The diagnosis with its next experiment, and that experiment's motion; the unchanged diagnosis and None where nothing is
+    tied or no motion separates the tie. progress: called with the current stage and the share done."""
     if not result.ties:
         return result.diagnosis, None
     rivals = [(tie.found, tie.rival) for tie in result.ties]

@@ -1,4 +1,4 @@
-"""Two models that a session cannot tell apart, and what each may adapt."""
+"""Two models that a session cannot separate, and the parameters that each may adapt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rolls out what is tried, and sees whether the robot bears it."""
+"""Rolls out proposed segments, and checks that the robot can execute them."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Runs:
 
     def played(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
                time_step: float = EXPERIMENT.time_step) -> list[list[Take]]:
-        """For each motion, given as its segments, the takes of all models. A model's jobs follow each other, so that its station
-        is kept. Frames are at the same times within a segment whether it stands alone or among others."""
+        """For each motion, given as its segments, the takes of every model. A model's jobs are consecutive, so that its station
+        is reused. Frames are at the same times within a segment whether it is rolled out alone or among others."""
         config = replace(self.config, time_step=time_step, log_period=self.config.logged_every)
         jobs = []
         for model in models:

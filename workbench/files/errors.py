@@ -9,9 +9,9 @@ _LONGEST = 1000
 
 
 class InputError(ValueError):
-    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with 2.
+    """Bad input, in one readable line: file, place in it, expected value. The command line prints it and exits with 2.
 
-    source: the file, None where there is none. problem: the place in it, and what was expected.
+    source: the file, None where there is none. problem: the place in it, and the expected value.
     """
 
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:

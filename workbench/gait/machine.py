@@ -24,8 +24,6 @@ from workbench.types import Array
 CREEP = 0.3
 """Joint speed [rad/s] about which Coulomb friction changes sign in the inverse servo law, so that a pose at a turning point asks
 for none of it."""
-STANDING_KNEES = 1
-"""Which way knees point when the robot folds up, where a robot's neutral does not tell: back."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.explained import Explained, Problem
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -36,6 +35,7 @@ from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.ties import ObservationModel, Tie, observation_models
 from workbench.identify.rollouts.evaluator import RolloutEvaluator
+from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
 from workbench.recording.take import Take
@@ -141,7 +141,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], Explained] = explained_by_selection
+    search: Callable[[Problem], SearchResult] = explained_by_selection
     if gap and is_by_logs(evidence):
         search = explained_by_evidence
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
@@ -172,7 +172,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
         stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
-        unknown_torques=unknown)
+        unknown_torques=unknown, tied=found.tied)
     changed = bool(findings or unknown or found.recalibrated)
     reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if changed else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))

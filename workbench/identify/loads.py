@@ -1,11 +1,10 @@
-"""Which joints carry a load in the recordings: what only a load shows cannot be told where there is none."""
+"""Joints that carry a load in the recordings: effects that only a load shows cannot be identified at others."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.machine import Machine
 from workbench.dynamics.trajectory import RobotTrajectory
@@ -13,8 +12,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts.servo_logs import is_log
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def unloaded_joints(model: RobotModel, evidence: Sequence[TakeEvidence]) -> set[str]:

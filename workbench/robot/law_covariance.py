@@ -1,4 +1,4 @@
-"""What an earlier diagnosis knew of a servo's law: the covariance of its numbers, as servo.yaml and model.yaml keep it."""
+"""Covariance of the numbers of a servo's law, as an earlier diagnosis estimated it and servo.yaml and model.yaml keep it."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,8 @@ class LawCovariance:
 
 
 def law_covariance(content: Any, path: Path, at: str, known: Sequence[str]) -> LawCovariance:
-    """Read from a file, where it stands at `at`; InputError names file, place and what was expected. known: possible names."""
+    """Reads it from a file. at: its place there, for messages; known: possible names. InputError names file, place and the
+    expected form."""
     if not isinstance(content, Mapping) or set(content) != {"names", "rows"}:
         raise InputError(path, f"{at}expected {{names: [...], rows: [[...], ...]}}")
     names, rows = content["names"], content["rows"]

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from workbench.files import InputError
 
 DependsOn = Literal["angle", "angle and direction", "duty", "duty and direction", "speed"]
-"""What the torque is a function of. With direction: the torque changes sign with the motion, smoothly through rest."""
+"""The argument of the torque. With direction: the torque changes sign with the motion, smoothly through rest."""
 UNITS: Mapping[DependsOn, str] = {
     "angle": "deg", "angle and direction": "deg", "duty": "1", "duty and direction": "1", "speed": "deg/s"}
 """Of the values at which the torque is given."""
@@ -23,7 +23,7 @@ class TorqueTable:
     """A torque at the joint, linear between knots and constant beyond the ends.
 
     depends_on: the joint's angle, its speed, or the servo's duty (-1 to 1; with direction, the size of the duty). at (K,):
-    increasing, in UNITS; torque (K,) [N m]. InputError says what was expected.
+    increasing, in UNITS; torque (K,) [N m]. InputError names the expected value.
     """
 
     depends_on: DependsOn
@@ -55,7 +55,7 @@ class TorqueTable:
 
 
 def torque_tables(content: Any) -> tuple[TorqueTable, ...]:
-    """The value of the key `torque_tables` of servo.yaml; InputError says what was expected."""
+    """The value of the key `torque_tables` of servo.yaml; InputError names the expected value."""
     if not isinstance(content, Sequence) or isinstance(content, str):
         raise InputError(None, f"torque_tables: expected a list of tables, got {content!r}")
     out = []

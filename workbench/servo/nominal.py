@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from workbench.servo.law import ServoLaw
-from workbench.servo.rubbing import Rubbing
+from workbench.servo.load_friction import LoadFrictionTerm
 from workbench.servo.tabled import Tabled
 from workbench.servo.terms import ServoTerm
 
@@ -15,7 +15,7 @@ def nominal_terms(law: ServoLaw) -> tuple[ServoTerm, ...]:
     out: list[ServoTerm] = []
     if law.load_friction.any():
         none = np.zeros_like(law.load_friction)
-        out.append(Rubbing(law.load_friction, none, 1.0, none))
+        out.append(LoadFrictionTerm(law.load_friction, none, 1.0, none))
     if law.tables:
         out.append(Tabled(law.tables, len(law.gain)))
     return tuple(out)

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TURNING = 0.15
 """Speed [rad/s] at which a torque that follows the direction of motion has 1/sqrt(2) of its size: above creep and a sensor's
 quantum, below the speeds at which servos move."""
 ANGLE, ANGLE_DIRECTION, DUTY, DUTY_DIRECTION, SPEED = range(5)
-"""Numbers of what a torque depends on, in the order of `DependsOn`."""
+"""The arguments of a torque as numbers, in the order of `DependsOn`."""
 
 
 class Tabled(ServoTerm):
@@ -28,7 +27,7 @@ class Tabled(ServoTerm):
         self.servo, self.depends_on, self.at, self.by = arrays_of(self.tables)
 
     def more_torque(self, now: Instant) -> Array:
-        """Of all tables [N m]."""
+        """Sum of the tables, by servo [N m]."""
         out = np.zeros(self.n)
         for t, i in enumerate(self.servo.tolist()):
             out[i] += self._one(t, float(now.angle[i]), float(now.velocity[i]), float(now.duty[i]))
@@ -56,8 +55,8 @@ class Tabled(ServoTerm):
 
 
 def arrays_of(tables: Sequence[tuple[int, TorqueTable]]) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, Array]:
-    """Number of the servo (t,), what each depends on (t,), the knots (t, K) in SI and the torques there (t, K); shorter tables go
-    on with their last torque, as a table is constant beyond its end."""
+    """Number of the servo (t,), number of the argument (t,), the knots (t, K) in SI and the torques there (t, K). Shorter tables
+    are filled up with their last torque, as a table is constant beyond its end."""
     longest = max((len(table.at) for _, table in tables), default=1)
     servo = np.array([i for i, _ in tables], dtype=np.int64)
     kinds = np.array([get_args(DependsOn).index(table.depends_on) for _, table in tables], dtype=np.int64)

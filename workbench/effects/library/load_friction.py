@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import Rubbing, ServoTerm
+from workbench.servo import LoadFrictionTerm, ServoTerm
 
 
 class LoadFriction(Effect):
@@ -46,7 +46,7 @@ class LoadFriction(Effect):
 
     def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
         at = here.astype(float)
-        return Rubbing(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
+        return LoadFrictionTerm(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
 
 
 EFFECT = LoadFriction()

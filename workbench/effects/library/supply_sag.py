@@ -34,7 +34,7 @@ class _Sagging(ServoTerm):
 
 
 class SupplySag(Effect):
-    """The supply's voltage drops in proportion to the sum of all servos' duties, for all servos alike."""
+    """The supply's voltage drops in proportion to the summed duties of the servos, by the same amount for every servo."""
 
     name = "supply_sag"
     layer = "actuator"

@@ -54,6 +54,13 @@ class WayPath:
         """Of the tangent at `s` [m along the path], continuous [rad]."""
         return float(np.interp(s, self.s, self._heading))
 
+    def point(self, s: float, left: float = 0.0) -> Array:
+        """The point (2,) [m] so far along the path and to its left; beyond the end straight on."""
+        angle, beyond = self.heading(s), max(s - self.length, 0.0)
+        on = np.array([np.interp(s, self.s, c) for c in self.p.T])
+        ahead, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+        return np.asarray(on + beyond * ahead + left * aside)
+
     def _frame(self, k: int, xy: Array) -> tuple[float, float]:
         c, n, d = np.cos(self._heading[k]), np.sin(self._heading[k]), xy - self.p[k]
         return float(c * d[0] + n * d[1]), float(-n * d[0] + c * d[1])

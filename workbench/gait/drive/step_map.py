@@ -1,4 +1,4 @@
-"""The step-to-step map: what one cycle of the gait does to heading and position, given how much it was asked to turn.
+"""The step-to-step map: heading change and displacement of one cycle of the gait as functions of the requested turn.
 
     heading(k+1) = heading(k) + bias + gain · turn(k) + memory · turn(k-1)
     ahead, aside of one cycle, in the body's frame at its beginning: means, and aside changes with turn

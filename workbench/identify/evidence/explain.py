@@ -22,12 +22,13 @@ from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
+from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
-from workbench.identify.explained import Problem
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
+from workbench.identify.search_result import Problem
 from workbench.robot import RobotModel
 from workbench.types import Progress
 
@@ -61,6 +62,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = gone_on(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
+    progress("names that are tied", None)
+    names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
     progress("an unnamed torque", None)
     rollouts, found = _beside_unnamed(rollouts, found, options)
     progress("numbers at a finer step", None)
@@ -77,7 +80,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
     return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
-                       tuple(rejected), options, problem.played.missed, drifting, stopped)
+                       tuple(rejected), options, problem.played.missed, drifting, stopped,
+                       tuple(names[k] for k in range(len(found))))
 
 
 def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,

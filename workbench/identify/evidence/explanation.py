@@ -17,6 +17,7 @@ from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turne
 from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
+from workbench.identify.evidence.tied_names import gravity_over_torque
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
@@ -30,6 +31,7 @@ from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.fit import Fitted
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
     from workbench.identify.evidence.search import Found
     from workbench.identify.fitting.constancy import Drift
     from workbench.identify.parameters import Candidate
+    from workbench.identify.results.tied_names import GravityOverTorque
 
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
@@ -44,9 +47,10 @@ WORTH_SAYING = 0.01
 
 @dataclass(frozen=True)
 class Explanation:
-    """The likeliest model, and all that was believed beside it (`workbench.identify.explained.Explained`). found, posteriors: one
-    a region; robot: what acts in all of them; refuted: by registers or by takes kept back; missed: commands that never arrived;
-    drifts: parameters that drift within a take; stopped: by the limit of work."""
+    """The most probable model, with all alternatives (a `workbench.identify.search_result.SearchResult`). found, posteriors: one
+    for each region; robot: effects that act on all joints; refuted: effects rejected by registers or by held-out takes; missed:
+    commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work was reached;
+    tied_names: by region, each effect fitted that could be the whole change of gravity over torque."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -58,6 +62,14 @@ class Explanation:
     missed: tuple[DroppedCommands, ...] = ()
     drifts: tuple[Drift, ...] = ()
     stopped: bool = False
+    tied_names: tuple[list[Fitted], ...] = ()
+
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """Gravity over torque where it is not as told, with the effects that could be it."""
+        said = (gravity_over_torque(region, self.options, p, fits)
+                for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.tied_names))
+        return tuple(s for s in said if s is not None)
 
     @property
     def model(self) -> RobotModel:

@@ -7,15 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
 from workbench.robot.law_covariance import LawCovariance
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)
@@ -36,7 +34,7 @@ apart."""
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
     """The same of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they drift.
 
-    Torque, friction and load friction are known much better together than one by one: what lifts an arm is their difference. Each
+    Torque, friction and load friction are known much better together than one by one: their difference lifts an arm. Each
     number returned moves those after it, so that all are independent (Cholesky's factor of the covariance)."""
     servo = model.servo(joint)
     names = [name for name in UNITS if name != ZERO and nominal_value(servo, name) > 0] + ([] if zeroed else [ZERO])
@@ -131,7 +129,7 @@ def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Arra
 
 def widened(covariance: Array, by: float) -> Array:
     """A covariance (k, k) of numbers whose variance was 1 before any data, with the data's information as if errors were `by`
-    times as large: what the data say nothing of is known no worse than before."""
+    times as large. Directions of which the data hold no information keep their variance."""
     variances, axes = np.linalg.eigh(covariance)
     told = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
     return np.asarray((axes / (1.0 + told / by**2)) @ axes.T)

@@ -88,10 +88,11 @@ class EvidenceOptions:
     law: the torque that nobody has named, beside the effects.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
-    factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
-    effect to take it out, odds of twenty. alike: share of what an effect does from which on other torques that do as much stand
-    for it. sure: standard errors by which a servo's own register must refute a name, and refuted: the share of an effect's
-    typical size that it then rules out, which no recording would show.
+    factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
+    less likely with it by this much, odds of twenty. alike: an effect is tied to torque if a change of all torques does at least
+    this share of the same. apart: gravity over torque is reported where it differs from the nominal by so many standard
+    deviations, its variation between days included. sure: standard errors by which a servo's own register must refute a name, and
+    refuted: the share of an effect's typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -119,6 +120,7 @@ class EvidenceOptions:
     occam: float = 7.0
     veto: float = 3.0
     alike: float = 0.5
+    apart: float = 2.0
     drift: SinceThen | None = None
     formal: float = 3.0
     law: LawOptions = field(default_factory=LawOptions)

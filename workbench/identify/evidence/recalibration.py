@@ -1,4 +1,4 @@
-"""What of the nominal law was recalibrated, for the report."""
+"""Recalibrated numbers of the nominal law, for the report."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What a servo's own angles tell as one number: gravity against torque.
+"""Gravity against torque: servo logs determine their ratio only.
 
-Angles do not change if all torques and inertias grow alike. A load, a centre of mass elsewhere, another supply and a stronger
-motor are therefore told apart by what was known before alone, however small the errors that a fit claims: stick and slip answer
+Angles do not change if all torques and inertias grow by one factor. A load, a moved centre of mass, another supply and a stronger
+motor can therefore be separated by prior knowledge alone, however small the errors that a fit claims: stick and slip answer
 small changes with noise, which differences take for information. So an effect that does what other torques would do is believed
 by no more than the prior odds of both.
 """
@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Fitted
 from workbench.identify.evidence.hypothesis import Prior, Uncertain, log_odds
@@ -21,8 +20,8 @@ from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 GRAVITY = "gravity against torque"
 """The tie of what gravity does with what all torques do."""
 TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia")
@@ -31,9 +30,9 @@ TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_frict
 
 @dataclass(frozen=True)
 class AsTorque:
-    """An effect beside all torques of the servo. by: the change of their logarithm that resembles the effect most; alike: the
-    share of what the effect does that this change does; share: probability that it is the effect, where both explain the same;
-    known: standard deviation of the logarithm of all torques together, before any data."""
+    """An effect compared with a change of all torques of the servo. by: the change of their logarithm that resembles the effect
+    most; alike: the share of the effect's response that this change reproduces; share: probability that it is the effect, where
+    both explain the same; known: standard deviation of the logarithm of the servo's common torque scale, before any data."""
 
     by: float
     alike: float
@@ -57,7 +56,7 @@ class AsTorque:
 
 
 def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate) -> AsTorque | None:
-    """Of a fit's effect; None where it is no such, or no other torques do what it does."""
+    """Of a fit's effect; None where it is not of this tie, or no change of torque resembles it."""
     h, prior = f.hypothesis, Prior.of(f.hypothesis, options)
     more = all_torques(h.numbers)
     if c.effect.tied != GRAVITY or not more.any() or not c.size:

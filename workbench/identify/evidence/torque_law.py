@@ -1,7 +1,7 @@
 """A repeatable torque that nobody has named: smooth functions of angle, duty or speed, with one normal prior for each group.
 
 The torque is the sum of weighted radial functions, so the weights are linear parameters of a joint's torque. A group's weights
-have one standard deviation, which stands for how strong such a law is; `EvidenceOptions.law` says which are tried.
+have one standard deviation, the strength of such a law; `EvidenceOptions.law` lists those that are tried.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from workbench.identify.evidence.options import LawOptions
 from workbench.robot.torque_table import DependsOn, TorqueTable
 from workbench.servo import Instant
 from workbench.servo.tabled import Tabled
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.robot import RobotModel
 
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Functions:
 
 @dataclass(frozen=True)
 class TorqueLaw:
-    """An unnamed torque at one joint. weights (M,) [N m]: of all functions, 0 of groups that are not there; scales [N m]:
-    standard deviation of the weights of each group that is there; tried: how many scales were tried for each."""
+    """An unnamed torque at one joint. weights (M,) [N m]: one for each function, 0 in absent groups; scales [N m]:
+    standard deviation of the weights of each group present; tried: how many scales were tried for each."""
 
     joint: str
     functions: tuple[Functions, ...]
@@ -109,7 +109,7 @@ class TorqueLaw:
         return tuple(out)
 
     def rms(self, evidence: Sequence[TakeEvidence], model: RobotModel) -> float:
-        """Over what the joint did in some takes [N m]."""
+        """RMS over the joint's motion in some takes [N m]."""
         angle, speed, duty = _course(self.joint, evidence, model)
         if not len(angle):
             return 0.0
@@ -127,7 +127,7 @@ class TorqueLaw:
 
 
 def torque_law(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel, options: LawOptions) -> TorqueLaw | None:
-    """A law of weight 0 whose functions cover what a joint did in some takes; None where it did not move."""
+    """A law of weight 0 whose functions cover a joint's motion in some takes; None if it did not move."""
     angle, speed, duty = _course(joint, evidence, model)
     if not len(angle) or np.ptp(np.quantile(angle, options.covered)) < options.least_travel:
         return None
@@ -157,7 +157,7 @@ def _radial(group: str, depends_on: DependsOn, x: Array, n: int, options: LawOpt
 
 
 def _course(joint: str, evidence: Sequence[TakeEvidence], model: RobotModel) -> tuple[Array, Array, Array]:
-    """What a joint did over all takes: angle [rad], speed [rad/s], and duty of the nominal law without its ramp."""
+    """A joint's motion in some takes: angle [rad], speed [rad/s], and duty of the nominal law without its ramp."""
     out = []
     for e in evidence:
         if joint not in e.channels:

@@ -1,10 +1,10 @@
 """An unnamed torque as a competitor of the named effects, judged by the same evidence.
 
 The vocabulary of effects is closed: physics that none of them describes is given the nearest name, and confidently, as all the
-other names are worse. So beside the models of the search stand the same with a torque that nobody has named (`torque_law`), and
-the same with fewer names. Its weights are linear parameters of the torque with a normal prior; over windows residuals answer to
+other names are worse. Each model of the search is therefore also tried with a torque that nobody has named (`torque_law`), and
+with fewer names. Its weights are linear parameters of the torque with a normal prior; over windows residuals answer to
 them nearly linearly, so that groups and their scales are chosen by linear algebra on one set of slopes, and few rollouts follow.
-The probability of a name is then what it is where such a law is allowed.
+The probability of a name is then conditional on such a law being allowed.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds, 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.torque_law import TorqueLaw
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.search import Found
     from workbench.identify.parameters import Candidate
 
-Array = NDArray[np.float64]
 Scales = Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class _State:
-    """A hypothesis with a law, and what was measured there or near: r (n,), J (n, k) by theta, B (n, M) by all weights."""
+    """A hypothesis with a law, and measurements there or near: r (n,), J (n, k) by theta, B (n, M) by all weights."""
 
     h: Hypothesis
     r: Array = field(repr=False)
@@ -54,7 +54,7 @@ class _Predicted:
 
 
 def with_unknown_law(found: Found, options: EvidenceOptions, law: TorqueLaw, full_torque: float) -> Asks[Found]:
-    """What was found in a region, with models that have an unnamed torque beside: none, where none is predicted to be as likely.
+    """The models of a region, with those that have an unnamed torque, unless none is predicted to be competitive.
     law: of weight 0; full_torque [N m]: of the joint's servo."""
     region, best = found.region, found.best
     scales = tuple(share * full_torque for share in options.law.shares)
@@ -108,7 +108,7 @@ def _without(region: Region, options: EvidenceOptions, at: _State, gone: Candida
 
 
 def _fitted(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float], iterations: int) -> Asks[_State]:
-    """Gauss and Newton's steps, each followed by slopes measured anew where it led."""
+    """Gauss and Newton's steps; after each the slopes are measured again."""
     for _ in range(iterations):
         before = at
         at = yield from _stepped(region, options, at, scales, 1)
@@ -178,7 +178,7 @@ def _by_weights(h: Hypothesis, r: Array, weight: float, which: NDArray[np.bool_]
 
 
 def slopes_by_law(f: Fitted) -> Asks[Array | None]:
-    """Slopes (n, m) of what a fit leaves by the weights of its unnamed torque; None where it has none."""
+    """Slopes (n, m) of a fit's residuals by the weights of its unnamed torque; None without one."""
     law = f.hypothesis.law
     if law is None:
         return None
@@ -191,8 +191,8 @@ def _as_fit(region: Region, options: EvidenceOptions, at: _State) -> Fitted:
 
 
 def _predicted(region: Region, options: EvidenceOptions, at: _State, scales: Sequence[float]) -> _Predicted:
-    """The likeliest groups and scales of a law beside a state's effects, at least one of them, by linear algebra: added one by
-    one as long as that pays, each at its best scale beside the others."""
+    """The most probable groups (at least one) and scales of a law together with a state's effects, by linear algebra. Groups are
+    added one by one while that pays, each at its best scale given the others."""
     best, chosen = _solved(region, options, at, {}), dict[str, float]()
     first: _Predicted | None = None
     while True:

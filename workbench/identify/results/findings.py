@@ -18,6 +18,7 @@ from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import model_text
 
 if TYPE_CHECKING:
+    from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.identify.results.unknown_torque import UnknownTorque
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
@@ -216,9 +217,9 @@ class Diagnosis:
     verdict: docs/formats.md, section 6. nominal: the session's robot; model: the same with the findings' effects; posterior: of
     their parameters, in the units of section 7. gap: where, when and by how much recordings differ from the nominal model.
     findings, rejected: effects that were kept, and not kept. unexplained: what the fitted model leaves. recalibrated: servo
-    constants adjusted within their tolerance. left_out: damaged takes, (name, reason). stopped: whether the search reached its
-    limit of work. unknown_torques: of the model, which no effect describes.
-    provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
+    constants adjusted within their tolerance. tied: gravity over torque, which angles tell as one number. left_out: damaged
+    takes, (name, reason). stopped: whether the search reached its limit of work. unknown_torques: of the model, which no effect
+    describes. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
     """
 
     verdict: Verdict
@@ -234,6 +235,7 @@ class Diagnosis:
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
     recalibrated: tuple[Recalibrated, ...] = ()
+    tied: tuple[GravityOverTorque, ...] = ()
     unknown_torques: tuple[UnknownTorque, ...] = ()
 
     def __post_init__(self) -> None:
@@ -253,6 +255,8 @@ class Diagnosis:
             out["unknown_torques"] = [u.to_json() for u in self.unknown_torques]
         if self.recalibrated:
             out["recalibrated"] = [r.to_json() for r in self.recalibrated]
+        if self.tied:
+            out["tied"] = [t.to_json() for t in self.tied]
         if self.stopped:
             out["stopped"] = True
         if self.left_out:

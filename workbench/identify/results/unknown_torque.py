@@ -31,7 +31,7 @@ class UnknownTorque:
 
     @property
     def depends_on(self) -> tuple[str, ...]:
-        """What the torque is a function of."""
+        """The arguments of the torque."""
         return tuple(t.depends_on for t in self.tables)
 
     @property
@@ -48,5 +48,5 @@ class UnknownTorque:
 
 
 def said(names: Sequence[str]) -> str:
-    """What a torque depends on, as a sentence has it: "angle, and on duty and direction"."""
+    """The arguments of a torque in a sentence: "angle, and on duty and direction"."""
     return ", and on ".join(names)

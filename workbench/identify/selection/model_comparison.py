@@ -1,4 +1,4 @@
-"""How sure each effect is: its rivals put in its place, with all other effects in theirs, on all takes."""
+"""Probability of each effect: compared with rivals that replace it, with all other effects refitted, on all takes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A torque that no effect describes, over what it depends on."""
+"""A torque that no effect describes, over its arguments."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
-from workbench.view.report.servo_law import recalibrated_section, unknown_torque_section
+from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
     capital,
@@ -95,6 +95,8 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
         report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
+    if diagnosis.tied:
+        report.add(tied_section(diagnosis.tied))
     for unknown in diagnosis.unknown_torques:
         report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:

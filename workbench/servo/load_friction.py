@@ -15,7 +15,7 @@ MOST_LOAD = 2.0
 
 
 @dataclass(frozen=True)
-class Rubbing(ServoTerm):
+class LoadFrictionTerm(ServoTerm):
     """Shares of the load (n,): coefficient always, static more at rest, which fades as exp(-(w / speed)^2), speed [rad/s],
     backdrive more where the load drives the motor."""
 

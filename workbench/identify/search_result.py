@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+    from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.identify.results.ties import Tie
     from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
@@ -38,7 +39,7 @@ class Problem:
     options: EvidenceOptions
 
 
-class Explained(Protocol):
+class SearchResult(Protocol):
     """What a search found."""
 
     @property
@@ -64,6 +65,10 @@ class Explained(Protocol):
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
+
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """What angles tell as one number, with all effects that could be it."""
 
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
