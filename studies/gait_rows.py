@@ -1,4 +1,4 @@
-"""The gaits that ship in data/gaits (motion, certificate, command): what they do when they are played; their table in the docs.
+"""Plays the gaits that ship in data/gaits (motion, certificate, command) and writes their table in the docs.
 
 Every motion is played from power-on to standstill as its certificate says: by `simulate`, by `run` on the emulated robot, and in
 MuJoCo. The rows of the table are written between its marks in docs/gaits.md.
@@ -37,7 +37,7 @@ GAITS = ROOT / "data/gaits"
 COMMAND = "command.txt"
 """Of each folder: what found the gait, as it was typed."""
 SEEDS = "seeds.csv"
-"""Of each folder: what each seed came to, by `studies.gait_row_seeds`."""
+"""Of each folder: the result of each seed, by `studies.gait_row_seeds`."""
 PAGE = ROOT / "docs/gaits.md"
 BEGIN, END = "<!-- rows of data/gaits: python -m studies.gait_rows -->", "<!-- end of rows -->"
 AFTER = 0.3
@@ -62,8 +62,8 @@ class Row:
 
 @dataclass(frozen=True)
 class Did:
-    """What a motion did from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt [deg], torque
-    [N m], that lasts 10 ms: the largest of the whole. how: by what it was played."""
+    """Result of playing a motion from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt
+    [deg], and torque [N m] that lasts 10 ms: the largest from beginning to end. how: name of the player."""
 
     how: str
     speed: float
@@ -85,7 +85,7 @@ def rows(model: RobotModel, folder: Path = GAITS) -> list[Row]:
 
 
 def certified(certificate: Certificate) -> Did:
-    """What the certificate says."""
+    """The same numbers from the certificate."""
     n = certificate.nominal
     return Did("certificate", n.forward, n.heading, n.tilt, certificate.ways.torque)
 

@@ -1,4 +1,4 @@
-"""What a programme planned beside what its table does in simulation: base, feet, joints and every tracked body."""
+"""A planned gait compared with its simulated table: base, feet, joints and every tracked body."""
 
 from __future__ import annotations
 
