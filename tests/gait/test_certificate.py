@@ -128,7 +128,7 @@ def test_export_refuses_what_has_no_valid_certificate_unless_forced(made, tmp_pa
 def test_no_verb_moves_a_robot_by_what_lacks_its_certificate(made, tmp_path, capsys, verb):
     path = tampered(made[0], tmp_path, lambda f: (f / NAME).unlink())
     said = refused(capsys, verb[0], str(path), *verb[1:], "--out", str(tmp_path / "out"))
-    assert "the certificate is missing; --force overrides this" in said
+    assert "the certificate is missing; use --force to override" in said
     assert not (tmp_path / "out").exists()
 
 

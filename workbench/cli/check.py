@@ -1,4 +1,4 @@
-"""What every verb says of its files before the long work: their problems, on stderr, and whether so much work is meant."""
+"""Checks of every verb before the long work: problems of its files, on stderr, and whether very long simulations are intended."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 def add_yes(parser: argparse.ArgumentParser) -> None:
-    """--yes: long work is meant."""
+    """--yes: long simulations are intended."""
     parser.add_argument("--yes", action="store_true",
                         help="allow simulations longer than ten minutes of robot time")
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
-    """Warns of a session's problems, and returns the names of the takes of which it said that they are left out; InputError where
-    its takes cannot be used (together), or where one lasts so long that it is mostly a slip, unless `yes`."""
+    """Warns of a session's problems and returns the names of the takes that are left out. InputError where its takes cannot be
+    used, or cannot be used together, or where one is so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import session_check
 
@@ -32,11 +32,11 @@ def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[st
     if found.refused:
         raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
-    return frozenset(t.name for t in session.takes if f"take '{t.name}'" in found.damaged)
+    return found.damaged_takes
 
 
 def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:
-    """Names the takes that were left out and why, but for those of which it was `told` before the work."""
+    """Names the takes that were left out and why, except those already reported (`told`) before the work."""
     for name, reason in left_out:
         if name not in told:
             print(f"workbench {verb}: warning: take '{name}' left out: {reason}", file=sys.stderr)
@@ -51,20 +51,20 @@ def check_model(verb: str, model: RobotModel) -> None:
 
 
 def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
-    """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
+    """Warns of a motion's problems; InputError where it lasts so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import motion_problems, slow_poses, summed_up
 
     problems = motion_problems(motion, cycles)
     warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
-        raise InputError(motion.source, f"{text} Say --yes if it is meant")
+        raise InputError(motion.source, f"{text} Add --yes if this is intended")
     _ask(motion.source, motion.seconds(cycles), yes)
 
 
 def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
-    """Checks that a motion made by `optimize` has a valid certificate for this robot. InputError where it has not, unless
-    `force`, which warns. Every verb that moves a robot, or writes its tables, calls this first."""
+    """Checks that the certificate of a motion made by `optimize` is valid for this robot; InputError where it is not, unless
+    `force`, which only warns. Every verb that moves a robot, or writes tables that move one, calls this first."""
     from workbench.files import InputError
     from workbench.gait.certificate import check_certificate, has_mark
 
@@ -74,7 +74,7 @@ def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel
         check_certificate(path, motion, model)
     except InputError as e:
         if not force:
-            raise InputError(e.source, f"{e.problem}; --force overrides this") from None
+            raise InputError(e.source, f"{e.problem}; use --force to override") from None
         warn(verb, [str(e)])
 
 
@@ -103,7 +103,7 @@ def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None
         check_certificate(path, Motion.from_table(table), model)
     except InputError as e:
         if not force:
-            raise InputError(e.source, f"{e.problem}; --force overrides this") from None
+            raise InputError(e.source, f"{e.problem}; use --force to override") from None
         warn(verb, [str(e)])
 
 
@@ -132,4 +132,4 @@ def _ask(what: str, seconds: float, yes: bool) -> None:
 
     text = long_work(seconds)
     if text and not yes:
-        raise InputError(None, f"{what}: {text} Say --yes if it is meant")
+        raise InputError(None, f"{what}: {text} Add --yes if this is intended")

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
@@ -35,11 +34,10 @@ from workbench.gait.table import GaitTable
 from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel, data_file
+from workbench.types import Progress
 
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """What it is, in words, and what is called with what."""
 

@@ -26,8 +26,8 @@ from workbench.motion import Commands, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 OtherEngine = Callable[[RobotModel, Commands, float], Take]
 """Plays commands for so many seconds on a robot, in an engine that shares no simulation code with this one."""
 Measured = tuple[GaitMeasure, FeetMeasure]

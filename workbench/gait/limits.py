@@ -104,7 +104,7 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
             k = int(np.argmax(np.where(angles[:, i] > 0, angles[:, i] / r.upper, angles[:, i] / r.lower)))
             bound = r.upper if angles[k, i] > 0 else r.lower
             out.append(_of("range", joint, np.degrees(angles[k, i]), np.degrees(bound), "deg", float(angles[k, i] / bound)))
-    no_load = machine.law.full_torque / machine.law.back_emf
+    no_load = machine.law.line.no_load_speed
     for i, joint in enumerate(model.joints):
         asked = float(table.cycle.rates()[:, i].max())
         out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))

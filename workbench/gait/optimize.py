@@ -15,10 +15,11 @@ from workbench.files import InputError
 from workbench.files.option_checks import check_choice, check_whole
 from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
+from workbench.gait.feasibility import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
@@ -26,7 +27,6 @@ from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.plan_compare import PlanComparison, compare_plan
 from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
 from workbench.gait.planned import planned_seeds
-from workbench.gait.possible import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -35,6 +35,7 @@ from workbench.motion import Motion, load_motion
 from workbench.motion.files import motion_text
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Progress
 
 WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
@@ -14,8 +13,7 @@ from workbench.gait.table import GaitTable
 from workbench.gait.trajopt import Planned
 from workbench.recording import quaternions as quat
 from workbench.recording.take import Take
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,8 @@ def compare_plan(machine: GaitMachine, planned: Planned, table: GaitTable, take:
     ours = _planned_motion(machine, planned)
     every = [_simulated(machine, planned, take, table.start_seconds + c * table.period, table.period, K, ours)
              for c in range(1, cycles)]
-    theirs = Motion(*(np.mean([getattr(m, name) for m in every], axis=0) for name in ("p", "R", "q", "feet")),
+    mean = {name: np.mean([getattr(m, name) for m in every], axis=0) for name in ("p", "R", "q", "feet")}
+    theirs = Motion(mean["p"], mean["R"], mean["q"], mean["feet"],
                     {a: (np.mean([m.bodies[a][0] for m in every], axis=0), np.mean([m.bodies[a][1] for m in every], axis=0))
                      for a in ours.bodies})
     errors = {a: BodyError(_rms(np.concatenate([m.bodies[a][0] - ours.bodies[a][0] for m in every])),

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cma
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files.option_checks import check_positive, check_whole
 from workbench.gait.evaluate import Candidate, Evaluator
@@ -19,8 +18,7 @@ from workbench.gait.request import Request
 from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress
 
 STEERED = 2
 """How often a gait is steered before the next generation."""
@@ -33,7 +31,6 @@ ALIKE = 4
 """How many seeds of one family and one way of the knees are tried on the ensemble's robots."""
 IN_TURN = 3
 """Generations of each start before the best of them goes on alone."""
-Progress = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from workbench.files import InputError
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 WAYS = (600, 150)
 """Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.6 s are 1.2 rad/s, a fifth of

@@ -20,8 +20,7 @@ from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape, foot_path
 from workbench.robot import GRAVITY
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 KNOTS = 16
 TORQUE_SHARE = 0.8
@@ -31,7 +30,6 @@ FRICTION_SHARE = 0.9
 LARGEST_TILT = 0.25
 """[rad] up to which the programme's small rotations are right to 1 %."""
 MOST_ITERATIONS = 300
-
 
 
 @dataclass(frozen=True)

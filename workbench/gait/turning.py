@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 MOST_TRIM = 0.15
 """Largest change of `turn` [rad in a stance] by which a gait is straightened: beyond it feet leave their reach."""

@@ -40,7 +40,8 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
-        motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS)
+        motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS,
+                                            model.mountings if model else None)
     else:
         motion = _parse(path, plain_text(path), model)
     return motion if model is None else replace(motion, units=units_of(model, motion.joints))

@@ -17,6 +17,7 @@ from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
 from workbench.robot.model_source import ModelSource, model_problems, prepared
+from workbench.robot.mounting import Mounting
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import ServoConstants
 
@@ -59,10 +60,10 @@ class RobotModel:
 
     description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
     constants by joint (AX-12A where none are given). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID
-    by joint. feet: links that stand on the ground; None: the last link with a collision shape on each branch (robot/feet.py).
-    packages: folder of each ROS package that the description's meshes name. held: its base was held in all its takes, and
-    is where a simulation is not told otherwise. InputError where the description is wanted for the base's default, and cannot be
-    read.
+    by joint. mountings: how servos sit on their joints, where the two angles differ. feet: links that stand on the ground; None:
+    the last link with a collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the
+    description's meshes name. held: its base was held in all its takes, and is where a simulation is not told otherwise.
+    InputError where the description is wanted for the base's default, and cannot be read.
     """
 
     description: str
@@ -75,6 +76,7 @@ class RobotModel:
     feet: tuple[str, ...] | None = None
     packages: Mapping[str, str] = field(default_factory=dict)
     held: bool = False
+    mountings: Mapping[str, Mounting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.base:
@@ -176,6 +178,7 @@ class RobotModel:
             "ground": asdict(self.ground),
             "rigid_bodies": dict(self.rigid_bodies),
             "bus_ids": dict(self.bus_ids),
+            **({"mountings": {j: asdict(m) for j, m in self.mountings.items()}} if self.mountings else {}),
             "feet": None if self.feet is None else list(self.feet),
             "effects": [
                 {"effect": e.effect, "where": list(e.where),

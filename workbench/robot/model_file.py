@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
+from workbench.robot.mounting import written_mountings
 from workbench.robot.robot_section import read_model, read_servos
-
-Array = NDArray[np.float64]
+from workbench.robot.servo_profile_file import servo_profile
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
         "model": _description(model, folder.resolve()), "base": model.base,
         "servos": next(iter(servos.values())) if len({repr(s) for s in servos.values()}) == 1 else servos,
         "rigid_bodies": dict(model.rigid_bodies), "bus_ids": dict(model.bus_ids)}
+    robot |= written_mountings(model.mountings, {j: servo_profile(model.servo(j).model) for j in model.mountings})
     if model.packages:
         robot["packages"] = {name: str(Path(place).resolve()) for name, place in model.packages.items()}
     if model.feet is not None:

@@ -13,6 +13,7 @@ from workbench.device.bus.group import answer_length
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
 from workbench.motion.lead_in import SLOW
+from workbench.robot.mounting import JointServo
 
 STATE = ("present_position", "present_load", "present_voltage", "present_temperature")
 POSITION = ("present_position",)
@@ -40,15 +41,15 @@ LIMP_EVERY = 5
 @dataclass
 class Rig:
     """ids: by joint. Reads in turn whenever there is time, and writes down everything. torque_limits: of each joint's servo, in
-    counts, as it was found. readings: of each joint's position, so far. repaired: goals that
-    had to be sent again. missed: goals
-    that had not arrived when the next one was sent."""
+    counts, as it was found. servos: what turns each joint's angles into counts. readings: of each joint's position, so far.
+    repaired: goals that had to be sent again. missed: goals that had not arrived when the next one was sent."""
 
     bus: Bus
     ids: Mapping[str, int]
     watch: Watch
     journal: PlayJournal
     torque_limits: Mapping[str, int]
+    servos: Mapping[str, JointServo]
 
     def __post_init__(self) -> None:
         self._joints = list(self.ids)
@@ -83,7 +84,7 @@ class Rig:
             if not agreed:
                 raise BusError("two readings in a row never agree; does it move, or is its sensor bad?", servo, joint,
                                "present_position")
-            out[joint] = self.angles[joint] = profile.angle(last)
+            out[joint] = self.angles[joint] = self.servos[joint].angle(last)
         return out
 
     def send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
@@ -100,7 +101,7 @@ class Rig:
         time = "goal_time" in profile.registers
         packet = {}
         for joint, goal in goals.items():
-            count, kept = profile.position(goal), self._told.get(joint, (-1, 0))
+            count, kept = self.servos[joint].position(goal), self._told.get(joint, (-1, 0))
             speed = profile.speed(speeds[joint]) if speeds[joint] else kept[1] if kept[0] == count else profile.speed(SLOW)
             self._told[joint], self._goals[joint] = (count, speed), goal
             packet[self.ids[joint]] = {"goal_position": count, "moving_speed": speed, **({"goal_time": 0} if time else {})}
@@ -240,7 +241,7 @@ class Rig:
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
         if "present_position" not in values:
             return
-        angle = bus.profile.angle(values["present_position"])
+        angle = self.servos[joint].angle(values["present_position"])
         self.angles[joint] = angle
         if GOAL in values and joint in self._told:
             if values[GOAL] == self._told[joint][0]:

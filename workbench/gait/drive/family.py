@@ -21,8 +21,8 @@ RESOLUTION = 0.005
 class GaitFamily:
     """Cycles of one gait that differ in `turn` alone [rad per stance, to the left].
 
-    The shape's own turn (its trim) is added to what is asked. InputError where a table of the family cannot be made, because a
-    goal is beyond the registers.
+    The shape's own turn (its trim) is added to the requested turn. InputError where a table of the family cannot be made, because
+    a goal is beyond the registers.
     """
 
     def __init__(self, machine: GaitMachine, shape: GaitShape) -> None:
@@ -61,8 +61,8 @@ class GaitFamily:
 
 
 def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
-    """The family of a gait that `optimize` wrote: its shape stands in the certificate beside `motion`. InputError where there is
-    none, or it is of another robot."""
+    """The family of a gait that `optimize` wrote: its shape is read from the certificate in the folder of `motion`. InputError
+    where there is none, or it is of another robot."""
     at = Path(motion).parent / NAME
     certificate = read_certificate(at)
     if certificate.model_sha256 != model.sha256:
