@@ -139,10 +139,9 @@ class Bus:
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
         heard = self._guarded(lambda: self._collect(packet, len(servos) * group.answer_length(kind, count)))
         out = {}
-        for servo, (error, data) in group.answers(kind, heard, count).items():
-            if servo in servos:
-                self._look(servo, error)
-                out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        for servo, (error, data) in group.answers(kind, heard, count, servos).items():
+            self._look(servo, error)
+            out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
         return out
 
     def _collect(self, packet: bytes, most: int) -> bytes:
