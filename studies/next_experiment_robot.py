@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from studies.concealed_effects.robots import quadruped
@@ -25,8 +24,8 @@ from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FLOOR = float(np.deg2rad(0.05))
 """By which two engines differ anyway [rad]."""
 TOGETHER = 6.0

@@ -16,15 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.files import InputError
 from workbench.files.reading import read_text
 from workbench.recording import read_recording
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NEUTRAL = frozenset({"soft_ground"})
 COUNTS = 0.5
 """Confidence from which a finding counts."""

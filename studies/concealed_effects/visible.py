@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.concealed_effects.takes import LOG_COUNT, LOG_NOISE, LogPlan, play_log
@@ -15,8 +14,8 @@ from studies.other_engine.hidden import turned_frames
 from studies.other_engine.make_session import TakePlan
 from studies.other_engine.player import Rollout, play
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 COARSE, FINE = 1e-3, 5e-4
 """Steps [s]: of the search, and of what is recorded."""
 ROTATION_NOISE = float(np.deg2rad(0.12) * np.sqrt(6))

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.concealed_effects.robots import quadruped
@@ -26,8 +25,8 @@ from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 RATE = 200.0
 BASE_SCALE = 10.0
 """What a metre of the base's path counts for, in radians: a millimetre as half a degree."""

@@ -21,8 +21,8 @@ from studies.other_engine.player import play
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 SETTLE = 2.0
 
 

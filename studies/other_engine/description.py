@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Box, Role, SceneGraph, SceneGraphInspector, Sphere
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -16,8 +15,7 @@ from pydrake.multibody.tree import RigidBody
 
 from workbench.files import InputError
 from workbench.robot import ConfigureParser, Ground, Kinematics
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,10 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _DEG_PER_COUNT = 300 / 1023
 _RPM_PER_TABLE_COUNT = 114 / 1023
 """What the conversion takes a count of speed to be."""

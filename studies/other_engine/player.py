@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.other_engine.description import describe
 from studies.other_engine.hidden import Hidden, hide
@@ -15,8 +14,7 @@ from studies.other_engine.mjcf import compile_model
 from studies.other_engine.servo import Reference
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _COUNT = np.deg2rad(300 / 1023)
 
 

@@ -26,15 +26,14 @@ from mujoco.sysid import (
     create_initial_state,
     optimize,
 )
-from numpy.typing import NDArray
 
 from studies.other_engine.description import Surroundings, describe
 from studies.other_engine.mjcf import to_mjcf
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 HIGHEST = 1.5, 2.0
 """Coulomb friction [N m] and viscous friction [N m s/rad] are sought from zero to here."""
 

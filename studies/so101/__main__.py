@@ -17,7 +17,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.common import ROOT, publish
 from studies.so101 import page
@@ -36,9 +35,9 @@ from workbench.files import InputError
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
 from workbench.robot.model_file import load_model
+from workbench.types import Array
 from workbench.view.report.page import Picture, Provenance, Report, Section
 
-Array = NDArray[np.float64]
 Say = Callable[[str, float | None], None]
 BESIDE = ROOT.parent / "shared/data/so101"
 SLOW = "friction_gravity"

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Programme
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DELAYS = np.arange(0.0, 0.2501, 0.005)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Clock, Programme
 from studies.so101.response import Response
@@ -13,9 +12,9 @@ from studies.so101.rest import Current, Fastest, NamePosterior
 from studies.so101.zero import Zero
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.report.page import Table, Text
 
-Array = NDArray[np.float64]
 DEGREES = float(np.degrees(1))
 WHAT = (
     "A six-joint SO-101 arm of Feetech STS3215 servos, 28 named programmes (isaac-sim2real/sage). Fourteen are for training, "

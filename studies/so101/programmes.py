@@ -18,8 +18,8 @@ from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.sage import JOINTS, sage_programmes
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FILE = "so101_programmes.npz"
 TRAINING = (
     "frequency_sweep", "backlash_detection", "coupled_joints", "friction_gravity", "step_response", "hover_positions",

@@ -14,13 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.robot import ARMATURE, DUTY_PER_RADIAN, KT, RESISTANCE, VOLTAGE
 from studies.so101.rows import LOADED, Rows
 from workbench.recording.formats.sage import JOINTS
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DELAYS = np.arange(-0.040, 0.0601, 0.002)
 DRAWS = 400
 INERTIA = ARMATURE / (DUTY_PER_RADIAN * KT * VOLTAGE / RESISTANCE)

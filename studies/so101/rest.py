@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import Rows
 from workbench.recording.formats.sage import JOINTS
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LEAST_HOLDS = 5
 
 

@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import LOADED, Rows, gravity
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import Kinematics
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 OFFSETS = np.radians(np.arange(-60, 61, 5))
 
 

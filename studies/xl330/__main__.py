@@ -10,7 +10,6 @@ M6 as published and refitted on the same two. Quick: one gain left out, M1 alone
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,11 +24,11 @@ from studies.xl330.station import played
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
+from workbench.types import Progress
 
 DATA = ROOT.parent / "shared/data/xl330"
 MODELS = ("m1", "m3", "m4", "m6")
 GAINS = (100, 200, 400)
-Progress = Callable[[str, float | None], None]
 
 
 def xl330(out: Path, quick: bool, progress: Progress) -> str:

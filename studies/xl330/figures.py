@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.xl330.rig import Log
 from studies.xl330.station import Played
 from workbench.robot import GRAVITY
+from workbench.types import Array
 from workbench.view.figures import style
 
-Array = NDArray[np.float64]
 SLOW = 1.0
 """[rad/s] below which the arm's weight and the motor's torque nearly balance, but for friction."""
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
+
 SIGMA = 0.02
 """Error [rad] beyond which a row counts by its size, no longer by its square: what stick and slip leave, 13 ticks; a fit by the
 sensor's own 0.0015 rad would follow a few rows in which the arm happened to stick."""

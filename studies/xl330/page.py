@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.xl330.bam import Logs
 from studies.xl330.station import Played, mean_error
 from workbench.identify.results.findings import Diagnosis
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 from workbench.view.report.words import interval, probable, title_of
 
-Array = NDArray[np.float64]
 DIAGNOSED = "`workbench diagnose`"
 
 

@@ -13,14 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.recording import read_recording, write_joint_log
 from workbench.recording.recording import Recording
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 DUTY_PER_UNIT = 4096 / (2 * np.pi) / 256 / 885
 """Duty per radian of position error, for each unit of the firmware's position gain."""

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from workbench.files import InputError
-from workbench.gait.drive.controller import CycleController, DriveOptions, limited, observed, plan
+from workbench.gait.drive.controller import CycleController, limited
+from workbench.gait.drive.observer import BIAS, P11, first_state, observed
+from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
+from workbench.gait.drive.plan import Disc, corridor, plan
 from workbench.gait.drive.step_map import StepMap, increments
 
-MAP = StepMap(bias=0.0, gain=1.0, memory=0.4, ahead=0.12, aside=0.0, aside_gain=0.0, scatter=(0.01, 0.001), most=0.15)
+MAP = StepMap(bias=0.0, gain=1.0, memory=0.4, ahead=0.12, aside=0.0, aside_gain=0.03, scatter=(0.01, 0.001), most=0.15)
 PERIOD = 0.4
 
 
@@ -54,23 +58,44 @@ def test_without_binding_limits_the_plan_is_the_least_squares_solution() -> None
         y, e, last, rows = left, heading - targets[0], before, []
         for j in range(N):
             rows += [y / o.aside, e / o.turned, (u[j] - last) / o.change]
-            y, e = y + MAP.ahead * e + MAP.aside, e + MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - np.diff(targets)[j]
+            turned = MAP.bias + bias + MAP.gain * u[j] + MAP.memory * last - np.diff(targets)[j]
+            y, e = y + MAP.ahead * e + MAP.aside + MAP.aside_gain * u[j], e + turned
             last = u[j]
         return np.array([*rows, y / o.aside, e / o.turned])
 
     base = rolled(np.zeros(N))
     J = np.column_stack([rolled(np.eye(N)[j]) - base for j in range(N)])
     best = -np.linalg.solve(J.T @ J, J.T @ base)
-    assert plan(left, heading, before, bias, targets, MAP, o) == pytest.approx(best, abs=1e-5)
+    assert plan(left, heading, before, bias, targets, MAP, o).turns == pytest.approx(best, abs=1e-5)
 
 
 def test_the_plan_keeps_its_limits_where_they_bind() -> None:
     o = DriveOptions()
-    u = plan(0.5, 1.0, 0.0, 0.1, np.zeros(o.horizon + 1), MAP, o)
+    u = plan(0.5, 1.0, 0.0, 0.1, np.zeros(o.horizon + 1), MAP, o).turns
     assert np.abs(u).max() <= o.most + 1e-6
     assert np.abs(np.diff(np.concatenate([[0.0], u]))).max() <= o.most_change + 1e-6
     assert u[0] == pytest.approx(-o.most_change, abs=1e-5)
     assert limited(-1.0, 0.1, o) == pytest.approx(0.1 - o.most_change)
+
+
+def test_a_disc_is_passed_on_its_free_side_and_a_robot_inside_one_gets_out() -> None:
+    o, path = DriveOptions(), WayPath([(3.0, 0.0)])
+    along = MAP.ahead * np.arange(o.horizon + 1)
+    low, high = corridor(path, along, 0.0, [Disc(0.8, -0.05, 0.08)], o.clearance)
+    assert np.isinf(high).all()
+    assert low.max() == pytest.approx(0.15, abs=0.01)
+    planned = plan(0.0, 0.0, 0.0, 0.0, np.zeros(o.horizon + 1), MAP, o, (low, high))
+    assert (planned.left - low).min() > -0.005
+    inside = plan(0.0, 0.0, 0.0, 0.0, np.zeros(o.horizon + 1), MAP, o, (np.full(o.horizon + 1, 0.1), high))
+    assert inside.turns[0] == pytest.approx(o.most_change, abs=1e-4)
+    assert inside.left[-1] > 0.09
+
+
+def test_the_controller_walks_around_a_disc_and_comes_back() -> None:
+    disc = Disc(1.5, 0.02, 0.1)
+    poses = _drive(DriveOptions(), 0.02, 0.0, discs=[disc])
+    assert np.hypot(poses[:, 0] - disc.x, poses[:, 1] - disc.y).min() > disc.radius + DriveOptions().clearance - 0.03
+    assert abs(poses[-1, 1]) < 0.03
 
 
 @pytest.mark.parametrize("law", ["mpc", "proportional"])
@@ -83,14 +108,14 @@ def test_a_robot_that_turns_by_itself_is_brought_onto_the_line(law: str, bias: f
 
 
 def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
-    o, x = DriveOptions(drift=1e-6), np.zeros(13)
-    x[6] = o.first_bias**2
+    o = DriveOptions(drift=1e-6)
+    x = first_state(MAP, o)
     heading = 0.0
     for _ in range(40):
         heading += 0.03
         x = observed(x, np.array([0.0, 0.0, heading]), 0.0, replace(MAP, scatter=(1e-4, 0.0)), o)
-    assert x[3] == pytest.approx(0.03, abs=1e-4)
-    assert np.sqrt(x[6]) < 1e-3
+    assert x[BIAS] == pytest.approx(0.03, abs=1e-4)
+    assert np.sqrt(x[P11]) < 1e-3
 
 
 def test_a_robot_that_the_cameras_lost_is_stopped() -> None:
@@ -104,10 +129,10 @@ def test_a_robot_that_the_cameras_lost_is_stopped() -> None:
     assert stops == [0, 0, 1, 1]
 
 
-def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40) -> np.ndarray:
+def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40, discs: Sequence[Disc] = ()) -> np.ndarray:
     """A robot that obeys MAP, plus its own bias and the map's scatter. Poses (cycles, 3)."""
     rng = np.random.default_rng(3)
-    controller = CycleController(WayPath([(10.0, 0.0)]), MAP, PERIOD, options)
+    controller = CycleController(WayPath([(10.0, 0.0)]), MAP, PERIOD, options, discs)
     context = controller.CreateDefaultContext()
     pose, played, committed, poses = np.zeros(3), 0.0, 0.0, []
     for _ in range(cycles):
@@ -116,7 +141,8 @@ def _drive(options: DriveOptions, bias: float, lost: float, cycles: int = 40) ->
         context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
         after = float(controller.GetOutputPort("turn").Eval(context)[0])
         turned = MAP.turned(committed, played) + bias + rng.normal() * MAP.scatter[0]
-        pose = pose + np.array([MAP.ahead * np.cos(pose[2]), MAP.ahead * np.sin(pose[2]), turned])
+        c, s, side = np.cos(pose[2]), np.sin(pose[2]), MAP.aside_gain * committed
+        pose = pose + np.array([MAP.ahead * c - side * s, MAP.ahead * s + side * c, turned])
         played, committed = committed, after
         poses.append(pose)
     return np.array(poses)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 
 from workbench.effects.apply import physics_of
@@ -19,8 +18,7 @@ from workbench.simulation.compiled.machine import Machine, machine_of
 from workbench.simulation.compiled.run import DONE, TOUCHED, run
 from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.tables import tables_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

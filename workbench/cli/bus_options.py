@@ -1,4 +1,4 @@
-"""Arguments of the verbs that talk to servos, and the bus that they stand for."""
+"""Arguments of the verbs that talk to servos, and the bus that they select."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("points", metavar="X,Y", nargs="+", type=_point,
                         help="way-points [m]: x forward, y left of where the robot stands (put -- before a negative x)")
     parser.add_argument("--gait", metavar="MOTION", required=True,
-                        help="gait.csv of `workbench optimize`, with its certificate beside it")
+                        help="gait.csv written by `workbench optimize`, in the same folder as its certificate")
     add_model(parser)
     truth = parser.add_mutually_exclusive_group()
     truth.add_argument("--robot", metavar="MODEL", help="ground truth of the simulated robot, a model.yaml (default: the model)")
@@ -42,11 +42,13 @@ def run(args: argparse.Namespace) -> int:
     """Fits the map, drives with and without steering, and writes the page."""
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
-    from workbench.gait.drive.controller import CycleController, DriveOptions
+    from workbench.gait.drive.controller import CycleController
     from workbench.gait.drive.family import load_family
-    from workbench.gait.drive.loop import Cameras, drive
+    from workbench.gait.drive.loop import drive
+    from workbench.gait.drive.options import DriveOptions
     from workbench.gait.drive.path import WayPath
     from workbench.gait.drive.step_map import fit_step_map
+    from workbench.gait.drive.walk import Cameras, SimulatedWalk
     from workbench.view.report.drive import write_drive
 
     path = WayPath(args.points)
@@ -60,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
         for steer, name in ((True, "driving"), (False, "without steering")):
             progress(name)
             controller = CycleController(path, step_map, family.period, options)
-            runs.append(drive(family, robot, path, controller, Cameras(lost=args.lost), args.seed, args.cycles, steer))
+            walk = SimulatedWalk(family, robot, Cameras(lost=args.lost), args.seed)
+            runs.append(drive(walk, path, controller, args.cycles, steer))
         closed, straight = runs
         progress("drawing")
         write_drive(folder, model, step_map, closed, straight, options.most)

@@ -36,7 +36,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Surveys, writes what is asked for, and says what there is; 2 where something has to be fixed."""
+    """Surveys the bus, writes the requested files, and prints the servos found; 2 where something has to be fixed."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"wider than the model: {line}; --write narrows it")
     if args.out is not None:
         path = save_registers(registers, args.out / "registers.yaml")
-        print(f"wrote {path}; beside a session.yaml that says `registers: {path.name}`, `diagnose` begins with what differs")
+        print(f"wrote {path}; with `registers: {path.name}` in a session.yaml, `diagnose` starts from these registers")
     if slow_adapter(found.latency):
         print(f"workbench servos: warning: {slow_adapter(found.latency)}", file=sys.stderr)
     for problem in found.problems():
@@ -95,7 +95,7 @@ def _list(args: argparse.Namespace) -> int:
 
 
 def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
-    """Moves joints a little and asks what was seen; 2 where something is wrong."""
+    """Moves each joint a little and asks the person what moved; 2 where something is wrong."""
     from workbench.device.play.wiggle import Answers, wiggle
     from workbench.files import InputError
     from workbench.robot import bus_ids

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 STICKING = 0.02
 """Slip [m/s] about which friction turns from any direction to against the slip."""

@@ -21,8 +21,8 @@ from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
 from workbench.robot import GRAVITY, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Stance = Mapping[str, NDArray[np.bool_]]
 
 RECORDED_WINDOW, SIMULATED_WINDOW = 0.1, 0.02

@@ -21,8 +21,7 @@ from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, RobotModel
 from workbench.robot.kinematics import cross, rotation_about
 from workbench.robot.model_source.checks import quiet_drake
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 DEFAULT_FRICTION = 0.5
 """Where neither the model's ground nor the SDF says one: the thesis's kinetic coefficient (section 6.9)."""

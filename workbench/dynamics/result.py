@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
 from workbench.files import InputError
 from workbench.files.reading import read_text, write_whole
 from workbench.recording.formats.numbers import number_columns
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 HEADER = "# workbench inverse dynamics, format 1"
 _WRENCH = tuple(f"{kind}.{axis}" for kind in ("moment", "force") for axis in "xyz")
@@ -65,12 +63,6 @@ class InverseDynamicsResult:
     def column(self, joint: str) -> int:
         """Index of a joint's column."""
         return self.joints.index(joint)
-
-    @property
-    def residual_over_noise(self) -> Array:
-        """Residual (N, 6) in standard deviations; NaN where no noise was given."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.residual_sigma > 0, self.base_wrench_residual / self.residual_sigma, np.nan)
 
 
 def save_inverse_dynamics(result: InverseDynamicsResult, path: str | Path) -> Path:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.dynamics.machine import FootPoints
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TOUCH = 3e-3
 """Points up to this far above the floor may carry load [m]."""

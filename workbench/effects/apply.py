@@ -16,8 +16,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm, nominal_terms
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Physics:
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
-    """Each effect of a model with its spec and its values in SI, checked; InputError names what is wrong."""
+    """Each effect of a model with its spec and its values in SI, checked; InputError names the problem."""
     for spec in model.effects:
         effect = effect_named(spec.effect)
         check_places(effect, spec, model)
@@ -97,7 +96,7 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:
-    """What the servos act on of commands that were sent: as late as the nominal law has it, and as effects change it."""
+    """The commands on which the servos act: those sent, delayed as in the nominal law, and changed by effects."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
         commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)

@@ -8,17 +8,16 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
 from workbench.files import InputError
 from workbench.robot import JointFrame, Kinematics
 from workbench.robot.model_source import named
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
-"""Of the link between servo and link [kg, kg m^2]: small beside any robot, large enough for the solver. What a gear weighs at the
-joint is the servo's reflected inertia, which stays on the servo's joint."""
+"""Mass and inertia of the link between servo and link [kg, kg m^2]: small compared with any robot, large enough for the solver.
+The gear's inertia at the joint is the servo's reflected inertia, which stays on the servo's joint."""
 SPRING_TIME = 1e-3
 """Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
 they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME.

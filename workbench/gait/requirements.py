@@ -54,9 +54,12 @@ def excess_turning(request: Request, m: GaitMeasure) -> float:
     """Rate of turning beyond what the request requires [rad/s], to the left; of a turn, 0."""
     if request.way == "turn":
         return 0.0
-    if request.radius is None:
-        return m.turn_rate
-    return m.turn_rate - request.side * max(abs(request.progress(m)), SLOWEST) / request.radius
+    return m.turn_rate - curvature(request) * max(abs(request.progress(m)), SLOWEST)
+
+
+def curvature(request: Request) -> float:
+    """Change of heading by distance that the request requires of the nominal robot [rad/m], to the left."""
+    return (0.0 if request.radius is None else request.side / request.radius) - request.bias
 
 
 def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:
@@ -70,7 +73,7 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
             out.append(least("speed of the worse half of draws", "robot", worse_half([request.progress(m) for m in draws]),
                               ROBUST * request.speed, request.unit, "speed"))
         if request.way != "turn":
-            spread = float(np.sqrt(np.mean([min(drift(request, m), 10.0) ** 2 for m in draws])))
+            spread = float(np.sqrt(np.mean([min(abs(drift(request, m)), 10.0) ** 2 for m in draws])))
             out.append(_margin("drift over draws", np.degrees(spread), np.degrees(request.limits.spread), "deg/m RMS"))
     return out
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 FAMILIES = MappingProxyType({
     "trot": (0.0, 0.5, 0.5, 0.0), "walk": (0.0, 0.5, 0.75, 0.25), "crawl": (0.0, 0.5, 0.75, 0.25), "bound": (0.0, 0.0, 0.5, 0.5),
@@ -33,7 +33,8 @@ class GaitShape:
     the front stands higher than the hind [m]. front, hind: where the feet's paths are centred, forward of neutral. spread: feet
     apart, outwards. sway: of the body to the side, with `sway_phase` of the cycle. apex: early or late swing. push: of the
     foot into the ground in mid stance. difference: stride of front feet more than hind. lag: of the hind feet's phase.
-    lead: share of what the inverse servo law asks beyond the angles. hurry: moving speed over travel by dwell.
+    lead: share of what the inverse servo law asks beyond the angles. hurry: moving speed over travel by dwell. offsets: angles
+    [rad] added to those of the foot path, a row of all the model's joints for each pose; empty: none.
     """
 
     family: str = "trot"
@@ -58,6 +59,7 @@ class GaitShape:
     lag: float = 0.0
     lead: float = 0.0
     hurry: float = 1.0
+    offsets: tuple[tuple[float, ...], ...] = ()
 
     @property
     def phases(self) -> Array:
@@ -68,6 +70,15 @@ class GaitShape:
     def period(self) -> float:
         """Of a cycle [s]."""
         return 1 / self.frequency
+
+    @staticmethod
+    def from_plain(content: Mapping[str, Any]) -> GaitShape:
+        """The shape that a certificate holds. KeyError, TypeError or ValueError where it holds another thing."""
+        known = {f.name for f in fields(GaitShape)}
+        if "family" not in content or not set(content) <= known:
+            raise KeyError("family")
+        rows = tuple(tuple(float(a) for a in row) for row in content.get("offsets", ()))
+        return GaitShape(**{**content, "knees": tuple(content["knees"]), "offsets": rows})
 
 
 @dataclass(frozen=True)

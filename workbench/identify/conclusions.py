@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit
@@ -28,13 +27,13 @@ from workbench.identify.results.reasons import Dependence, Outdone, Reason, Scre
 from workbench.identify.results.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.selection.candidate_fit import CandidateFit
     from workbench.identify.selection.model_comparison import NamePosterior, Rival
     from workbench.identify.selection.record import SelectionStep
 
-Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 
 
@@ -52,8 +51,9 @@ class ReadOff(Protocol):
         """Of that mean."""
 
 
-def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it."""
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -> Verdict:
+    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it. left: what has
+    none."""
     if not gap:
         return "no_gap"
     if not findings:

@@ -14,7 +14,7 @@ from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
 from workbench.compare.logged import how_logged
 from workbench.compare.session import Base, Session
-from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
+from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
 from workbench.identify.conclusions import Residuals, change, verdict_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed
@@ -23,7 +23,6 @@ from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.explained import Explained, Problem
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -36,11 +35,13 @@ from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.ties import ObservationModel, Tie, observation_models
 from workbench.identify.rollouts.evaluator import RolloutEvaluator
+from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 
 BESIDE_DRAKE = "{} model apart from Drake [sigma]"
 
@@ -140,7 +141,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], Explained] = explained_by_selection
+    search: Callable[[Problem], SearchResult] = explained_by_selection
     if gap and is_by_logs(evidence):
         search = explained_by_evidence
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
@@ -155,22 +156,25 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
+    unknown = found.unknown_torques(evidence, nominal.residuals, after)
     left = found.unexplained(evidence, after, floors) if gap else ()
 
     # 6. Conclusions
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and found.is_slight()
+    slight = not findings and not unknown and not left and found.is_slight()
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
-        verdict=verdict_of(bool(gap) and not slight, findings, left),
+        verdict=verdict_of(bool(gap) and not slight, findings, (*left, *unknown)),
         model=found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
-        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated)
-    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings or found.recalibrated else None)
+        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
+        unknown_torques=unknown, tied=found.tied)
+    changed = bool(findings or unknown or found.recalibrated)
+    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if changed else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
@@ -13,8 +12,7 @@ from workbench.effects.base import Layer
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, smoothed
 from workbench.identify.results.findings import GapEntry
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:

@@ -38,6 +38,11 @@ class ProblemOptions:
     """Of the polynomial through them: over so long a servo's acceleration changes."""
     states_kept: int = 256
     """Takes and horizons of which states are kept, as they are played again and again."""
+    loaded: float = 1.0
+    """Torque of gravity, in dry frictions, from which on a joint is loaded: friction holds against less, so that nothing moves in
+    its gear."""
+    poses_sampled: int = 50
+    """Poses of a log from which its load is read: it changes with the angle alone."""
     block: float = 0.4
     """Length of a stretch [s]."""
     uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from workbench.effects.base import Effect, Parameter
 from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
 """What an effect is, and where."""
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS, BODY, channel_names, channels_of
 from workbench.compare.compare_session import Rollouts, roll_out, run_of
@@ -14,7 +13,7 @@ from workbench.compare.comparison import noise_of
 from workbench.compare.metrics import rms
 from workbench.compare.options import COMPARE
 from workbench.compare.session import Session
-from workbench.compare.session_takes import LeftOut, Progress, ReadTake, RegisteredTake, register_takes
+from workbench.compare.session_takes import LeftOut, ReadTake, RegisteredTake, register_takes
 from workbench.files import InputError
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, part_of, running_sum
@@ -22,9 +21,7 @@ from workbench.identify.shooting import base_states, unsettled
 from workbench.recording.take import Take
 from workbench.simulation import SimulationConfig
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask, Progress
 
 
 @dataclass(frozen=True)

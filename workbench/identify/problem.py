@@ -18,9 +18,7 @@ from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)

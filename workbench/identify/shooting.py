@@ -7,15 +7,12 @@ says nothing.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.identify.options import PROBLEM
 from workbench.recording.take import Take
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 def edges(since: Array) -> Array:

@@ -6,13 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps, part_of
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

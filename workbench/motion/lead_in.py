@@ -6,11 +6,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 SLOW = 0.6
 """Speed of the fastest joint on a way that no table paces [rad/s]: a tenth of what an AX-12A can do."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.table import SECTIONS, PoseTable, Section
 from workbench.robot.servo_units import ServoUnits
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,7 @@ from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT
 from workbench.robot.mounting import Mounting
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)

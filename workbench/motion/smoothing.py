@@ -8,11 +8,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import NDArray
 
 from workbench.motion.motion import Motion
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Knots = Literal["smooth", "rest"]
 
 

@@ -13,8 +13,8 @@ from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.lead_in import paced
 from workbench.robot.servo_units import AX12A, ServoUnits
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Section = Literal["start", "loop", "stop"]
 SECTIONS: tuple[Section, ...] = ("start", "loop", "stop")

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
@@ -21,8 +20,7 @@ from workbench.robot.model import EffectSpec, RobotModel
 from workbench.robot.mounting import written_mountings
 from workbench.robot.robot_section import read_model, read_servos
 from workbench.robot.servo_profile_file import servo_profile
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,9 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
+from workbench.robot.law_covariance import LawCovariance, law_covariance
+from workbench.robot.torque_speed import TorqueSpeedLine
+from workbench.robot.torque_table import TorqueTable, torque_tables
 
 COUNT = math.radians(300 / 1023)
 """One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""
@@ -28,10 +31,12 @@ class ServoConstants:
 
     What more real servos do, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which the
     servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
-    rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tolerance,
+    rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tables: repeatable
+    torques that nobody has named, added to all that. torque_tolerance,
     back_emf_tolerance: standard deviation of the natural logarithm of torque at full duty and of back-EMF; None: what stall
-    torque, supply and no-load speed say. sd: standard deviation of a constant, by key, in its unit; of others the share in
-    SHARES_KNOWN. InputError names the key and what was expected.
+    torque, supply and no-load speed say. covariance: what an earlier diagnosis knew of the law's numbers together. sd: standard
+    deviation of a constant, by key, in its unit; of others the share in SHARES_KNOWN. InputError names the key and what was
+    expected.
     """
 
     model: str = "AX-12A"
@@ -53,8 +58,10 @@ class ServoConstants:
     command_filter: float = 0.0
     derivative_gain: float = 0.0
     load_friction: float = 0.0
+    torque_tables: tuple[TorqueTable, ...] = ()
     torque_tolerance: float | None = None
     back_emf_tolerance: float | None = None
+    covariance: LawCovariance | None = None
     sd: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -67,9 +74,10 @@ class ServoConstants:
                     raise InputError(None, f"{name} goes with proportional_gain; beside compliance_slope expected {instead}")
         elif any(v is not None for v in compliance):
             raise InputError(None, "proportional_gain excludes compliance_slope, compliance_margin and punch")
+        object.__setattr__(self, "torque_tables", torque_tables(self.torque_tables))
         for f in fields(self):
             v = getattr(self, f.name)
-            if f.name == "sd":
+            if f.name in ("sd", "covariance", "torque_tables"):
                 continue
             if f.name == "model":
                 if not isinstance(v, str):
@@ -119,6 +127,11 @@ class ServoConstants:
         """Torque lost per joint speed by the motor's back-EMF [N m s/rad]."""
         return self.stall_torque / self.no_load_speed
 
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """What the servo can give at full duty and its supply voltage."""
+        return TorqueSpeedLine(self.torque_at_full_duty, self.back_emf, self.viscous_friction, self.coulomb_friction)
+
     def share_known(self, key: str) -> float:
         """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0. Besides the keys
         "torque_at_full_duty" and "back_emf", of which a tolerance is the standard deviation of the natural logarithm."""
@@ -135,12 +148,16 @@ class ServoConstants:
 
     def constants(self) -> dict[str, Any]:
         """By key, None where the other position law's; what only some servos do is left out where this one does not."""
-        return {key: getattr(self, key) for key in KEYS if key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key]}
+        out = {key: getattr(self, key) for key in KEYS
+               if key != "covariance" and (key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key])}
+        return out | ({"torque_tables": [t.written() for t in self.torque_tables]} if self.torque_tables else {})
 
     def written(self) -> dict[str, Any]:
         """As servo.yaml has it."""
         known = dict(self.sd)
-        return {k: {"value": v, "sd": known[k]} if k in known else v for k, v in self.constants().items() if v is not None}
+        together = {} if self.covariance is None else {"covariance": self.covariance.written()}
+        return {k: {"value": v, "sd": known[k]} if k in known else v
+                for k, v in self.constants().items() if v is not None} | together
 
     def updated(self, changes: dict[str, Any]) -> ServoConstants:
         """With some keys replaced; a switch between the two position laws drops the other's keys."""
@@ -183,7 +200,8 @@ KEYS = tuple(f.name for f in fields(ServoConstants) if f.name != "sd")
 TOLERANCES = ("torque_tolerance", "back_emf_tolerance")
 _TOLERANCE_OF = {"torque_at_full_duty": "torque_tolerance", "back_emf": "back_emf_tolerance"}
 _OPTIONAL = {f.name: f.default for f in fields(ServoConstants) if f.name in (
-    "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", *TOLERANCES)}
+    "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", "covariance",
+    "torque_tables", *TOLERANCES)}
 _LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
 _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
            "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
@@ -228,7 +246,9 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
         raise InputError(path, f"{at}{empty[0]}: is empty; expected a value, or no such key")
     values, sd = dict(content), []
     for key, value in content.items():
-        if isinstance(value, Mapping):
+        if key == "covariance":
+            values[key] = law_covariance(value, path, f"{at}{key}: ", (*KEYS, *_TOLERANCE_OF, "zero"))
+        elif isinstance(value, Mapping):
             values[key], known = _value_and_sd(value, path, f"{at}{key}: ")
             sd.append((key, known))
     try:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointActuator, PdControllerGains, RevoluteJoint
 from pydrake.systems.framework import DiagramBuilder
@@ -15,12 +14,11 @@ from pydrake.systems.primitives import ConstantVectorSource
 from workbench.files import InputError
 from workbench.robot import RobotModel
 from workbench.servo.law import ServoLaw
-from workbench.servo.rubbing import nominal_terms
+from workbench.servo.nominal import nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import ServoTerm, most_friction
 
-Array = NDArray[np.float64]
 Friction = Literal["implicit", "bristle"]
 
 HOLDING_DAMPING = 1e3

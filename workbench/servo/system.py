@@ -20,8 +20,7 @@ from pydrake.systems.framework import (
 )
 
 from workbench.servo.law import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 BRISTLE_SLIP = 5e-4
 """Deflection [rad] at which a bristle of a continuous plant yields; a tenth of a count, so that no sensor sees it."""

@@ -15,8 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, DependencyTicket, Di
 from workbench.servo.law import ServoLaw
 from workbench.servo.system import BRISTLE_SHARPNESS, BRISTLE_SLIP, ServoBank
 from workbench.servo.terms import Instant, ServoTerm, most_friction, wanted_friction
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 LOAD_SMOOTHING = 2e-3
 """Time constant [s] of the load that friction sees: following at once, friction and load would feed on each other from step to
@@ -46,6 +45,8 @@ class TermBank(ServoBank):
     Back-EMF is damping of the plant, implicit in a discrete one, so that a motor torque that is saturated, cut, or off gets it
     back, at the velocity to expect at the end of the step.
 
+    Torques of tables are added to what the motor pushes, whether torque is enabled or not.
+
     Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank
     pushes along the motion, at rest along the motion that friction prevents, with that less the friction wanted. A held joint
     stays exactly held, as the actuator takes up what the bank pushes. Direction and load are those of the last step; a joint
@@ -72,6 +73,7 @@ class TermBank(ServoBank):
             self._ceiling = np.minimum(self._ceiling, term.ceiling())
             self._bend = self._bend + 1.0 / np.asarray(term.saturation())
         self._cuts = bool(np.isfinite(self._ceiling).any() or self._bend.any())
+        self._tabled = tuple(t for t in terms if type(t).more_torque is not ServoTerm.more_torque)
         self._discrete = plant.time_step() > 0
         self._smoothing = period / (period + LOAD_SMOOTHING)
         self._inertia_rate = law.inertia / period
@@ -113,7 +115,7 @@ class TermBank(ServoBank):
         duty = duty if on is None else duty * on
         (last_v, _, load, held), stepped = self._remembered(context)
         begin = context.get_numeric_parameter(self._first_command).value()[0]
-        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none)
+        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none, x[self._q])
         torque = duty * law.full_torque
         for term in self.terms:
             torque = torque * term.strength(law, now)
@@ -124,6 +126,8 @@ class TermBank(ServoBank):
             motor = motor - self._lost(motor)
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
+        for term in self._tabled:
+            push = push + term.more_torque(now)
         if not self._varies:
             return _Parts(push, motor, law.coulomb, self._none)
         now = replace(now, motor=motor, direction=_limited(v / MOVING))

@@ -1,27 +1,25 @@
-"""A run that goes on in pieces: what a controller or a learner drives."""
+"""A run advanced piece by piece, for a controller or a learner."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.apply import played
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
+from workbench.types import Array
 
 if TYPE_CHECKING:
-    from workbench.simulation.rollout import Simulation, Start
-
-Array = NDArray[np.float64]
+    from workbench.simulation.rollout import BaseState, Simulation, Start
 
 
 class SteppedRun:
     """One run of a simulation, advanced piece by piece. Time 0 is where it starts.
 
-    Commands that are sent reach the servos as in one long run of all of them (late ones, where the model says so, in a later
+    Commands that are sent reach the servos as in one long run (delayed ones, if the model has a delay, in a later
     piece), so that the same commands in pieces or at once give the same take to the bit.
     """
 
@@ -39,11 +37,11 @@ class SteppedRun:
     def send(self, commands: Commands) -> None:
         """Commands whose time 0 is now; those sent before that were due later are withdrawn."""
         self._check_alive()
-        self._sent = _followed(self._sent, commands.reordered(self._simulation.joints), self.time)
+        self._sent = followed(self._sent, commands.reordered(self._simulation.joints), self.time)
         self._played = played(self._sent, self._simulation.model)
 
     def advance(self, seconds: float) -> None:
-        """Goes on for so long, in whole steps of the log."""
+        """Advances the run by `seconds`, rounded to whole steps of the log."""
         self._check_alive()
         end = self._simulation._whole_steps(self.time + seconds)
         sampled, forces = self._simulation._advance(self._played, 0.0, self.time, end)
@@ -57,8 +55,13 @@ class SteppedRun:
         self._check_alive()
         return self._simulation._present_state()
 
+    @property
+    def base(self) -> BaseState | None:
+        """Pose and velocity of the free base now; None of a held one."""
+        return self.state.base
+
     def take(self, name: str = "simulation") -> Take:
-        """What has been written down so far, from the start of the run."""
+        """The take logged so far, from the start of the run."""
         self._check_alive()
         sampled = np.concatenate([*self._sampled, np.empty(0)])
         unique, rows = np.unique(sampled, return_index=True)
@@ -71,8 +74,8 @@ class SteppedRun:
             raise RuntimeError("another run of the same simulation has ended this one")
 
 
-def _followed(before: Commands | None, after: Commands, now: float) -> Commands:
-    """A schedule on the run's clock: what was sent before `now` [s], then `after`."""
+def followed(before: Commands | None, after: Commands, now: float) -> Commands:
+    """A schedule on the run's clock: the commands sent before `now` [s], then `after`."""
     if before is None:
         return Commands(after.times + now, after.joints, after.goals, after.speeds, after.enabled, after.end + now, after.poses,
                         after.begun)

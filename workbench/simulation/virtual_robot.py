@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.device.bus.survey import family_of
 from workbench.device.capture.virtual_motive import Pose, Scene
@@ -33,8 +32,8 @@ from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
 """Families of which there is a virtual servo, by the name of their profile."""
 PIVOT = 0.012

@@ -16,8 +16,8 @@ from studies.other_engine.hidden.values import vector
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 MEASURED = ("marker_frame",)
 VOCABULARY = (*COMMANDS, *ROBOT, *AROUND, *CONSTANTS, *STEP, *MEASURED)
 """The contract's effects."""

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.other_engine.description import Description, LinkPart, SeriesJoint, Surroundings
 from studies.other_engine.hidden.values import angle, number, vector
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LOSS = 1e-3
 """Damping of a compliant gear over its stiffness [s]: a twentieth of critical at 100 rad/s. The contract leaves it open."""
 RATTLE = 1e-4

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from studies.other_engine.hidden.values import angle, number, optional
 from studies.other_engine.servo import ServoBank
 from workbench.robot import EffectSpec
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

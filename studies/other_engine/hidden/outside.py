@@ -26,8 +26,8 @@ from studies.other_engine.hidden.body import Around, Build
 from studies.other_engine.hidden.drive import Instant, StepEffect
 from studies.other_engine.hidden.values import angle, number, vector
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.int_]
 
 

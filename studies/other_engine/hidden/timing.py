@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.other_engine.hidden.values import number
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Change = Callable[[Commands, EffectSpec, RobotModel, np.random.Generator], Commands]
 
 

@@ -16,7 +16,6 @@ from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.ports import GONE, StripEcho, gone
 from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, ping
 from workbench.robot.servo_profile import Register, ServoProfile
-from workbench.robot.servo_profile_file import model_name
 
 T = TypeVar("T")
 LONGEST = 200
@@ -288,12 +287,6 @@ class Bus:
         if self.profile.protocol == 1:
             return bytes(answer[5:answer[3] + 3])
         return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
-
-    def wrong_model(self, servo: int, number: int) -> BusError:
-        """The error of a servo that is of another kind than the profile's."""
-        found = model_name(number, self.profile.protocol)
-        expected = " or ".join(sorted(self.profile.models.values()))
-        return BusError(f"is {found} ({number}); expected {expected}", servo, self.joints.get(servo))
 
 
 def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:

@@ -29,8 +29,8 @@ from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 KEPT = 20
 """Broken packets whose bytes are kept, for whoever wants to know why."""
 DRIFT_AFTER = 10.0

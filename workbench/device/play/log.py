@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.device.play.journal import read_play_journal
 from workbench.files import InputError
 from workbench.recording.formats.joint_log import write_joint_log
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NEAR = 0.002
 """A row holds what was read within so long of it [s], moved to the row's time along the line between two readings: at 200 deg/s
 and a corner in between that is wrong by 0.4 deg at worst."""

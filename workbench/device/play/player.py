@@ -17,8 +17,8 @@ from workbench.device.play.watch import Reaction, StopError, Watch, WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.robot.mounting import JointServo
+from workbench.types import Progress
 
-Progress = Callable[[str, float | None], None]
 HOLDING = "the servos could not be told to let go and may hold their last goal: switch the robot's power off"
 
 

@@ -81,7 +81,7 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
         low, high = min(low, CENTRE, int(table.goals[:, i].min())), max(high, CENTRE, int(table.goals[:, i].max()))
         sign, zero = model.mountings.get(joint, Mounting()).direction, neutral[i]
         ends = sorted(min(max(zero + sign * (end - CENTRE), 0), LARGEST) for end in (low, high))
-        no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
+        no_load = float(servo.line.no_load_speed)
         bounds.append(JointBounds(
             ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
             low=ends[0], high=ends[1],

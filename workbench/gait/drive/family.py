@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 from workbench.files import InputError
@@ -21,8 +21,8 @@ RESOLUTION = 0.005
 class GaitFamily:
     """Cycles of one gait that differ in `turn` alone [rad per stance, to the left].
 
-    The shape's own turn (its trim) is added to what is asked. InputError where a table of the family cannot be made, because a
-    goal is beyond the registers.
+    The shape's own turn (its trim) is added to the requested turn. InputError where a table of the family cannot be made, because
+    a goal is beyond the registers.
     """
 
     def __init__(self, machine: GaitMachine, shape: GaitShape) -> None:
@@ -61,14 +61,14 @@ class GaitFamily:
 
 
 def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
-    """The family of a gait that `optimize` wrote: its shape stands in the certificate beside `motion`. InputError where there is
-    none, or it is of another robot."""
+    """The family of a gait that `optimize` wrote: its shape is read from the certificate in the folder of `motion`. InputError
+    where there is none, or it is of another robot."""
     at = Path(motion).parent / NAME
     certificate = read_certificate(at)
     if certificate.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
-    known = {f.name for f in fields(GaitShape)}
-    if not set(certificate.shape) <= known or "family" not in certificate.shape:
-        raise InputError(at, "shape: expected the shape of a gait that was searched for; this one cannot be steered")
-    shape = dict(certificate.shape)
-    return GaitFamily(GaitMachine(model), GaitShape(**{**shape, "knees": tuple(shape["knees"])}))
+    try:
+        shape = GaitShape.from_plain(certificate.shape)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(at, "shape: expected the shape of a gait that was searched for; this one cannot be steered") from None
+    return GaitFamily(GaitMachine(model), shape)

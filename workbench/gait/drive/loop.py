@@ -1,4 +1,4 @@
-"""The closed loop in simulation: a robot that is not the model, cameras with noise and lost frames, one decision a cycle."""
+"""The closed loop: a robot that is not the model, cameras with noise and lost frames, one decision a cycle."""
 
 from __future__ import annotations
 
@@ -12,29 +12,16 @@ from pydrake.systems.framework import Context
 
 from workbench.compare.metrics import heading
 from workbench.gait.drive.controller import CycleController
-from workbench.gait.drive.family import GaitFamily
 from workbench.gait.drive.path import WayPath
+from workbench.gait.drive.walk import Seen, Walk
 from workbench.recording.take import Take
-from workbench.robot import RobotModel
-from workbench.simulation import Simulation, SimulationConfig
-from workbench.simulation.stepped import SteppedRun
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
-FALLEN = math.cos(math.radians(45))
-"""Upward component of the base's z axis below which the robot lies."""
+Watch = Callable[[Seen, Array], None]
+"""Called at the end of each cycle with the robot's pose and the planned positions (N, 2) [m]."""
 SETTLED = 0.8
 """Distance along the path [m] from which errors are judged: with two cycles of delay and an unknown bias the first part is open
 loop."""
-
-
-@dataclass(frozen=True)
-class Cameras:
-    """Noise of a captured heading [rad] and position [m], and the share of cycles without a pose."""
-
-    heading: float = 0.0021
-    position: float = 1e-4
-    lost: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,69 +52,73 @@ class Driven:
         xy = self.take.p_WB[:, :2]
         return np.array([np.hypot(*(xy - p).T).min() for p in self.path.points])
 
+    def mean_off(self, period: float) -> Array:
+        """Heading error (K,) [rad], mean over the `period` [s] that ends with each cycle; NaN for the start. A gait's heading
+        sways within a cycle, which no decision once a cycle can change."""
+        assert self.take.quat_WB is not None
+        assert self.take.p_WB is not None
+        yaw = np.unwrap(heading(self.take.quat_WB))
+        begin = self.take.time[0] + self._first_end(period)
+        out = np.full(len(self.poses), np.nan)
+        for k in range(1, len(self.poses)):
+            inside = (self.take.time > begin + (k - 1) * period + 1e-9) & (self.take.time <= begin + k * period + 1e-9)
+            near = self.along[k - 1]
+            errors = []
+            for xy, angle in zip(self.take.p_WB[inside][::5, :2], yaw[inside][::5]):
+                near, _ = self.path.project(xy, near)
+                errors.append(_wrapped(angle - self.path.heading(near)))
+            out[k] = np.mean(errors)
+        return out
 
-def drive(family: GaitFamily, robot: RobotModel, path: WayPath, controller: CycleController, cameras: Cameras | None = None,
-          seed: int = 0, most_cycles: int = 200, steer: bool = True, progress: Progress = lambda what, done: None) -> Driven:
-    """Walks `robot` along `path`. steer: False plays the straight gait instead (open loop), for comparison.
+    def _first_end(self, period: float) -> float:
+        """When the start section ends [s after the take's first row]: the row whose pose is the first one judged."""
+        assert self.take.p_WB is not None
+        far = np.hypot(*(self.take.p_WB[:, :2] - self.poses[0, :2]).T)
+        return float(self.take.time[np.argmin(far)] - self.take.time[0])
+
+
+def drive(walk: Walk, path: WayPath, controller: CycleController, most_cycles: int = 200, steer: bool = True,
+          progress: Progress = lambda what, done: None, watch: Watch | None = None) -> Driven:
+    """Walks along `path`. steer: False plays the straight gait instead (open loop), for comparison.
 
     The robot starts from rest at the origin, heading along x. It stops at the end of the path, after `most_cycles`, when it
     falls, or when the cameras have lost it; the gait's stop section is played unless it fell.
     """
-    cameras, rng = cameras or Cameras(), np.random.default_rng(seed)
-    period_ms, start_ms = round(1000 * family.period), round(1000 * family.table(0.0).start_seconds)
-    config = SimulationConfig(time_step=1e-3, contact_period=0.0, log_period=math.gcd(period_ms, start_ms, 10) / 1000)
-    run = Simulation(robot, config).stepped()
-    run.send(family.start)
-    run.advance(start_ms / 1000)
     context = controller.CreateDefaultContext()
     rows: list[list[float]] = []
     played = committed = near = 0.0  # turns of the cycle that has ended and of the next, which is on the controller already
-    reason = f"{most_cycles} cycles"
+    reason, seen = f"{most_cycles} cycles", walk.begin()
     for k in range(most_cycles):
-        pose = _pose(run)
-        if not np.isfinite(pose).all():
+        if not np.isfinite(seen.pose).all():
             reason = "fell"
             break
-        seen = _captured(pose, cameras, rng)
-        near, left = path.project(pose[:2], near)
-        after, bias, ends = _decided(controller, context, seen) if steer else (0.0, math.nan, False)
-        rows.append([*pose, *seen, played, left, _wrapped(pose[2] - path.heading(near)), near, bias])
+        near, left = path.project(seen.pose[:2], near)
+        after, bias, ends = _decided(controller, context, seen.captured) if steer else (0.0, math.nan, "")
+        rows.append([*seen.pose, *seen.captured, played, left, _wrapped(seen.pose[2] - path.heading(near)), near, bias])
         progress(f"cycle {k + 1}", min(near / path.length, 1.0))
-        if ends if steer else near + controller.map.ahead / 2 >= path.length:
-            reason = "end of the path" if near + controller.map.ahead >= path.length else "lost by the cameras"
+        if watch is not None:
+            watch(seen, controller.planned_points(context) if steer else np.empty((0, 2)))
+        if not steer and near + controller.map.ahead / 2 >= path.length:
+            ends = "end of the path"
+        if ends:
+            reason = ends
             break
-        run.send(family.cycle(committed))
-        run.advance(period_ms / 1000)
+        seen = walk.cycle(committed, after)
         played, committed = committed, after
     if reason != "fell":
-        run.send(family.stop)
-        run.advance(family.stop.end)
-    columns = np.array(rows).T
-    turns, left, off, along, bias = columns[6:]
-    return Driven(path, columns[:3].T, columns[3:6].T, turns, left, off, along, bias, reason, run.take("driven"))
+        walk.end()
+    columns = np.array(rows).reshape(-1, 11).T
+    turns, left_, off, along, biases = columns[6:]
+    return Driven(path, columns[:3].T, columns[3:6].T, turns, left_, off, along, biases, reason, walk.take())
 
 
-def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[float, float, bool]:
-    """One update: the turn of the cycle after next [rad], the estimated bias [rad per cycle], and whether to stop now."""
+def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[float, float, str]:
+    """One update: the turn of the cycle after next [rad], the estimated bias [rad per cycle], and the reason to stop or ""."""
     controller.GetInputPort("pose").FixValue(context, seen)
     context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
-    turn, state, stop = (np.asarray(controller.GetOutputPort(name).Eval(context)) for name in ("turn", "state", "stop"))
-    return float(turn[0]), float(state[3]), bool(stop[0])
-
-
-def _pose(run: SteppedRun) -> Array:
-    """x, y [m] and heading [rad]; NaN where the robot lies."""
-    base = run.state.base
-    assert base is not None
-    _, x, y, _ = base.quat_WB
-    if 1 - 2 * (x**2 + y**2) < FALLEN:
-        return np.full(3, np.nan)
-    return np.array([*base.p_WB[:2], float(heading(base.quat_WB[None])[0])])
-
-
-def _captured(pose: Array, cameras: Cameras, rng: np.random.Generator) -> Array:
-    noise = rng.normal(size=3) * [cameras.position, cameras.position, cameras.heading]
-    return np.full(3, np.nan) if rng.random() < cameras.lost else pose + noise
+    turn, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context)) for n in ("turn", "state", "stop", "lost"))
+    why = "lost by the cameras" if lost[0] else "end of the path"
+    return float(turn[0]), float(state[3]), why if stop[0] else ""
 
 
 def _wrapped(angle: float) -> float:

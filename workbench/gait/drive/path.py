@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 SPACING = 0.005
 """Of the samples along a path [m]."""
@@ -55,6 +53,13 @@ class WayPath:
     def heading(self, s: float) -> float:
         """Of the tangent at `s` [m along the path], continuous [rad]."""
         return float(np.interp(s, self.s, self._heading))
+
+    def point(self, s: float, left: float = 0.0) -> Array:
+        """The point (2,) [m] so far along the path and to its left; beyond the end straight on."""
+        angle, beyond = self.heading(s), max(s - self.length, 0.0)
+        on = np.array([np.interp(s, self.s, c) for c in self.p.T])
+        ahead, aside = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+        return np.asarray(on + beyond * ahead + left * aside)
 
     def _frame(self, k: int, xy: Array) -> tuple[float, float]:
         c, n, d = np.cos(self._heading[k]), np.sin(self._heading[k]), xy - self.p[k]

@@ -1,4 +1,4 @@
-"""The step-to-step map: what one cycle of the gait does to heading and position, given how much it was asked to turn.
+"""The step-to-step map: heading change and displacement of one cycle of the gait as functions of the requested turn.
 
     heading(k+1) = heading(k) + bias + gain · turn(k) + memory · turn(k-1)
     ahead, aside of one cycle, in the body's frame at its beginning: means, and aside changes with turn
@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import heading
 from workbench.files import InputError
@@ -20,8 +19,7 @@ from workbench.gait.drive.family import GaitFamily
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

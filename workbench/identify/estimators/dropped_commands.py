@@ -16,9 +16,7 @@ from workbench.identify.problem import TakeEvidence, joint_error
 from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

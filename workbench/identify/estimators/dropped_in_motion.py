@@ -10,15 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DroppedPoses = dict[tuple[int, str], tuple[int, ...]]
 """Poses by take and joint."""
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import effect_named, estimated_by
@@ -26,8 +25,8 @@ from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import seen_joints, tracks_of, turned
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
 
 

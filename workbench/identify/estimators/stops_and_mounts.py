@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.channels import ACROSS
@@ -16,8 +15,7 @@ from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, channel_gaps, smoothed
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:

@@ -13,6 +13,7 @@ from workbench.identify.options import FIT
 from workbench.identify.problem import in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import ParameterDrift
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.fitting.fit import Fit, Slopes
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from workbench.identify.fitting.levenberg_marquardt import Solved
 from workbench.identify.options import FIT
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, take_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def covariance_of(

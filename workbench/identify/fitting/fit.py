@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Sizes = list[tuple[Candidate, Array]]
 """Effects, each with its sizes."""
 

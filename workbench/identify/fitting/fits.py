@@ -18,10 +18,9 @@ from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-Report = Callable[[str, float | None], None]
 
 
 class Search:

@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.options import FIT
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Point = list[Array]
 """Sizes, by block."""
 Left = list[Array]

@@ -8,14 +8,13 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts.evaluator import RolloutRequest
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
 """What a part of a search asks, is answered, and returns."""

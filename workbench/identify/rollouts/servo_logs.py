@@ -16,11 +16,11 @@ from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
 
-Array = NDArray[np.float64]
 SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
 REST = 0.1

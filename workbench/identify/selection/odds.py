@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search, gained
@@ -13,8 +12,6 @@ from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ODDS
-
-Array = NDArray[np.float64]
 
 
 def is_equivalent(search: Search, fit: Fit, i: int, rival: Fit) -> bool:

@@ -19,8 +19,7 @@ from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.logged import as_logged
 from workbench.recording.servo_log.started import ramp_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

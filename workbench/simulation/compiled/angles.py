@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.simulation.compiled.arrays import Schedule
@@ -16,8 +15,8 @@ from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.station import CompiledJob
 from workbench.simulation.job import Job
 from workbench.simulation.steady import JointStates
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 KEPT = 256
 """Schedules of commands that are kept, as a session's takes are played again and again."""
 _schedules: OrderedDict[Any, tuple[Commands, JointStates | None, Schedule]] = OrderedDict()

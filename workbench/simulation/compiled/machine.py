@@ -12,6 +12,7 @@ from workbench.effects.apply import Physics
 from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import RobotModel
 from workbench.servo.bank import HOLDING_DAMPING, MOST_CREEP
+from workbench.servo.tabled import arrays_of
 from workbench.servo.terms import TermNumbers, most_friction
 from workbench.simulation.compiled.arrays import OTHER, Array, Ints, Servos, Shapes, Tree
 from workbench.simulation.compiled.tables import NotCoveredError, ShapeTable, Tables
@@ -69,6 +70,7 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
     lopsided = [t.lopsided for t in numbers if t.lopsided is not None]
     sticking = [t for t in numbers if t.sticking is not None]
     most = most_friction(physics.servo_terms, law)
+    table_servo, table_of, table_at, table_torque = arrays_of([t for said in numbers for t in said.tables])
     return Servos(
         joint=joint, zero=_array(physics.zero), gain=_array(law.gain), margin=_array(law.margin), punch=_array(law.punch),
         full_torque=_array(law.full_torque), back_emf=_array(law.back_emf), viscous=_array(law.viscous),
@@ -79,7 +81,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,
         still=_array([t.rubbing_still for t in still]).reshape(len(still), n),
         still_speed=_array([t.rubbing_speed for t in still]),
-        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n))
+        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n),
+        table_servo=table_servo, table_of=table_of, table_at=table_at, table_torque=table_torque)
 
 
 def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool, apart: bool) -> Shapes:

@@ -134,24 +134,25 @@ class CompiledJob:
         config, plan = self.config, self.plan
         work = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
         if not self._settled:
-            self._settled.append(self._at_rest(work))
+            self._settled.append(self.at_rest(work))
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._put(Start(*self.job.start), state)
         log = self._log(rows_of(config, plan.lead + plan.duration))
-        self._play(schedule, state, log, work)
+        self.play(schedule, state, log, work)
         return log
 
-    def _at_rest(self, work: Work) -> State:
-        """The robot as it stands in neutral before the first command."""
+    def at_rest(self, work: Work) -> State:
+        """The robot at rest in neutral, before the first command."""
         state = self._rest()
         stand(*self.machine, state, work)
-        self._play(settling(self.config, len(self.model.joints)), state, self._log(0), work)
+        self.play(settling(self.config, len(self.model.joints)), state, self._log(0), work)
         if self.free:
             _centre(state)
         return state
 
-    def _play(self, schedule: Schedule, state: State, log: Log, work: Work) -> None:
+    def play(self, schedule: Schedule, state: State, log: Log, work: Work) -> None:
+        """Plays a schedule from `state` on, which it changes, into `log`; NotCoveredError as in `take`."""
         how = run(*self.machine, schedule, state, log, work)
         if how != DONE:
             raise NotCoveredError(ENDED.get(how, "the step's problem was not solved"))

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from workbench.types import Progress
+
 if TYPE_CHECKING:
-    from workbench.compare.session_takes import Progress
     from workbench.identify.conclusions import ReadOff, Residuals
     from workbench.identify.estimators.dropped_again import TakesAsPlayed
     from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+    from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.identify.results.ties import Tie
+    from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
     from workbench.robot import Posterior, RobotModel
 
@@ -36,7 +39,7 @@ class Problem:
     options: EvidenceOptions
 
 
-class Explained(Protocol):
+class SearchResult(Protocol):
     """What a search found."""
 
     @property
@@ -63,6 +66,10 @@ class Explained(Protocol):
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
 
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """What angles tell as one number, with all effects that could be it."""
+
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
 
@@ -71,6 +78,9 @@ class Explained(Protocol):
 
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The model's effects. before, after: residuals of the nominal model and of this one."""
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """Torques in the model that no effect describes; before, after as in `findings`."""
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
         """What is beyond noise and numerics, and what casts doubt on what was fitted."""

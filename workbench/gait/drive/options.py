@@ -1,0 +1,50 @@
+"""Weights and limits of the controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from workbench.files.option_checks import check_choice, check_positive, check_whole
+
+Law = Literal["mpc", "proportional"]
+
+
+@dataclass(frozen=True)
+class DriveOptions:
+    """How the controller weighs and limits.
+
+    law: "mpc", or "proportional" with the same observer. horizon: cycles looked ahead; a robot that walks 5 cm a cycle needs
+    0.6 m to move 10 cm aside. most: largest turn [rad per stance]. most_change: from one cycle to the next [rad]; beyond it the
+    feet of two tables no longer meet. aside, turned: errors that weigh the same [m], [rad]: 3 cm and 6 deg. change: change of
+    turn that weighs as much [rad]. reach: distance over which the proportional law removes a lateral error [m]; below 0.5 m the
+    two cycles of delay make it oscillate. drift: how fast the robot's own bias may change [rad per cycle], with voltage and
+    floor. first_bias: standard deviation of the bias before the first observation [rad per cycle]. noise: of a captured heading
+    [rad]. stride_gain: share of the difference between a measured step and its estimate by which the estimate changes; at 0.2
+    the scatter of a step, about 3 mm, leaves an estimate within 1 mm. lost: cycles without a pose after which the robot stops;
+    it walks 20 cm in four. clearance: from a disc to the robot's origin beyond the disc's radius [m]: half of the puppy's width
+    with its feet, 12 cm. inside: weight of 1 m inside a disc's clearance, as a multiple of the cost of the error weights;
+    large, so that a disc is entered only where the limits leave no other way.
+    """
+
+    law: Law = "mpc"
+    horizon: int = 12
+    most: float = 0.15
+    most_change: float = 0.08
+    aside: float = 0.03
+    turned: float = 0.1
+    change: float = 0.1
+    reach: float = 0.6
+    drift: float = 0.002
+    first_bias: float = 0.05
+    noise: float = 0.0021
+    stride_gain: float = 0.2
+    lost: int = 4
+    clearance: float = 0.12
+    inside: float = 1000.0
+
+    def __post_init__(self) -> None:
+        check_choice("law", self.law, ("mpc", "proportional"))
+        check_whole(self, horizon=2, lost=1)
+        check_positive(self, "most", "most_change", "aside", "turned", "change", "reach", "drift", "first_bias", "noise",
+                       "stride_gain", "clearance", "inside")

@@ -1,0 +1,124 @@
+"""Who walks: the simulated robot with its cameras, one cycle at a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from workbench.compare.metrics import heading
+from workbench.gait.drive.family import GaitFamily
+from workbench.motion import Commands
+from workbench.recording.take import Take
+from workbench.robot import RobotModel
+from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation.compiled import CompiledSteppedRun, NotCoveredError
+from workbench.simulation.rollout import BaseState
+from workbench.simulation.stepped import SteppedRun
+from workbench.types import Array
+
+FALLEN = math.cos(math.radians(45))
+"""Upward component of the base's z axis below which the robot lies."""
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """Noise of a captured heading [rad] and position [m], and the share of cycles without a pose."""
+
+    heading: float = 0.0021
+    position: float = 1e-4
+    lost: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The end of a cycle. pose, captured (3,): x, y [m], heading [rad], true (of a real robot: as captured) and by the cameras;
+    captured is NaN where they lost it, pose where the robot lies."""
+
+    pose: Array
+    captured: Array
+
+
+class Walk(Protocol):
+    """A robot that plays a start, cycles and a stop; what plays after the next cycle is said one cycle ahead."""
+
+    def begin(self) -> Seen:
+        """Plays the start section."""
+        ...
+
+    def cycle(self, turn: float, after: float) -> Seen:
+        """Plays a cycle with `turn`, which was said before, while `after` is made ready [rad per stance]."""
+        ...
+
+    def end(self) -> None:
+        """Plays the stop section."""
+        ...
+
+    def take(self) -> Take:
+        """Everything from the start on."""
+        ...
+
+
+class SimulatedWalk:
+    """`robot` plays the family's cycles in simulation: by the compiled station, and by Drake where that gives up.
+
+    seed: of the cameras' noise.
+    """
+
+    def __init__(self, family: GaitFamily, robot: RobotModel, cameras: Cameras | None = None, seed: int = 0) -> None:
+        self.family, self.cameras, self._rng = family, cameras or Cameras(), np.random.default_rng(seed)
+        period_ms, start_ms = round(1000 * family.period), round(1000 * family.table(0.0).start_seconds)
+        self.config = SimulationConfig(time_step=1e-3, contact_period=0.0, log_period=math.gcd(period_ms, start_ms, 10) / 1000)
+        self._robot = robot
+        self._played: list[tuple[Commands, float]] = []
+        self._run: SteppedRun | CompiledSteppedRun
+        try:
+            self._run = CompiledSteppedRun(robot, self.config)
+        except NotCoveredError:
+            self._run = Simulation(robot, self.config).stepped()
+
+    def begin(self) -> Seen:
+        """Plays the start section."""
+        self._play(self.family.start, self.family.table(0.0).start_seconds)
+        return self._seen()
+
+    def cycle(self, turn: float, after: float) -> Seen:
+        """Plays a cycle; `after` needs no preparation here."""
+        self._play(self.family.cycle(turn), self.family.period)
+        return self._seen()
+
+    def end(self) -> None:
+        """Plays the stop section."""
+        self._play(self.family.stop, self.family.stop.end)
+
+    def take(self) -> Take:
+        """Everything from the start on."""
+        return self._run.take("driven")
+
+    def _play(self, commands: Commands, seconds: float) -> None:
+        self._played.append((commands, seconds))
+        try:
+            self._run.send(commands)
+            self._run.advance(seconds)
+        except NotCoveredError:  # something other than a foot touches: from the beginning in Drake
+            self._run = Simulation(self._robot, self.config).stepped()
+            for sent, lasted in self._played:
+                self._run.send(sent)
+                self._run.advance(lasted)
+
+    def _seen(self) -> Seen:
+        pose = pose_of(self._run.base)
+        noise = self._rng.normal(size=3) * [self.cameras.position, self.cameras.position, self.cameras.heading]
+        lost = self._rng.random() < self.cameras.lost
+        return Seen(pose, np.full(3, np.nan) if lost else pose + noise)
+
+
+def pose_of(base: BaseState | None) -> Array:
+    """x, y [m] and heading [rad] (3,) of a free base; NaN where the robot lies."""
+    assert base is not None, "the base is free"
+    _, x, y, _ = base.quat_WB
+    if 1 - 2 * (x**2 + y**2) < FALLEN:
+        return np.full(3, np.nan)
+    return np.array([*base.p_WB[:2], float(heading(base.quat_WB[None])[0])])
