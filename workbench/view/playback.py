@@ -14,7 +14,7 @@ from workbench.robot.model import RobotModel
 from workbench.types import Array
 
 STAND_CLEARANCE = 0.05
-"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; how high it hung says nothing."""
+"""Height of the lowest point above the floor at which a robot on a stand is shown [m]; its real height does not matter."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def since_start(take: Take) -> Array:
 
 
 def names_of(simulated: Take, recorded: Take | None) -> tuple[str, str]:
-    """What a legend calls the two takes: simulated and measured, or, of two simulations, by their own names."""
+    """Names of the two takes in a legend: simulated and measured, or, for two simulations, their own names."""
     if recorded is None or recorded.source != "simulation":
         return "simulated", "measured"
     a, b = simulated.name, recorded.name
@@ -135,8 +135,8 @@ def _on_a_stand(played: Playback, model: RobotModel) -> Playback:
 
 
 def _laid_over(p: Array, R: Array, other: Playback, zeroed: bool) -> tuple[Array, Array]:
-    """Turned about the vertical and moved so that both stand in the same place at rest. The attitude of a zeroed take is
-    a rotation away from how it stood, so it is given the other's tilt at rest."""
+    """Rotated about the vertical and moved so that both coincide at rest. The attitude of a zeroed take is relative to its rest
+    pose, so it is given the other's tilt at rest."""
     resting = other.time < 0 if (other.time < 0).any() else np.arange(len(other.time)) == 0
     R_rest, R_other = (Rotation.from_matrix(X[resting]).mean().as_matrix() for X in (R, other.base_R))
     turn = R_other @ R_rest.T

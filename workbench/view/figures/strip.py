@@ -15,7 +15,7 @@ from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, name
 from workbench.view.shapes import robot_shapes
 
 WIDEST = 2.5
-"""Most that a picture reaches, by how far the simulated robot itself does."""
+"""Limit of the pictured distance, relative to that of the simulated robot."""
 
 
 @styled
