@@ -1,4 +1,4 @@
-"""What the likeliest model leaves, said so that a person can act on it: on what it depends, and the event where it is worst."""
+"""Residuals of the most probable model, described so that a person can act: the signal they depend on, and the worst event."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from workbench.identify.results.reasons import Dependence
 from workbench.types import Array
 
 EVENT = 0.5
-"""Length of a stretch that is told as one event [s]."""
+"""Length of a stretch that is reported as one event [s]."""
 STANDS = 0.1
 """Speed below which a joint stands [rad/s], some counts in a frame."""
 FULL = 0.9
@@ -67,7 +67,7 @@ def _worst(e: TakeEvidence, residual: Array, joint: str) -> _Event | None:
 
 
 def _middle(x: Array) -> float:
-    """Median of what was seen, NaN where nothing was."""
+    """Median of the values that were seen, NaN where there are none."""
     seen = x[np.isfinite(x)]
     return float(np.median(seen)) if len(seen) else float("nan")
 
