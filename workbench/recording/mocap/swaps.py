@@ -22,8 +22,8 @@ _NEAR = 3  # frames over which a velocity still tells where a body goes
 
 
 def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
-    """Puts back labels that change places. A change is seen where each of two bodies goes on where the other was;
-    the frames between two changes are exchanged back. Of an odd number of changes either the start or the end is wrong:
+    """Restores labels that change places. A change is detected where each of two bodies continues where the other was;
+    the frames between two changes are exchanged back. For an odd number of changes either the start or the end is wrong:
     the robot's tree decides (joints keep their links together), or without a model the start is believed."""
     known = _Seen(tracks)
     step = [known.miss(i, i, known.anywhere) for i in range(len(tracks.assets))]
@@ -43,7 +43,8 @@ def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
 
 
 class _Seen:
-    """Each body's last samples before every frame and its first from there on, so that a gap beside a change does not hide it."""
+    """Each body's last samples before every frame and its first from there on, so that a gap next to a change does not hide
+    it."""
 
     def __init__(self, tracks: Tracks) -> None:
         n = len(tracks.time)

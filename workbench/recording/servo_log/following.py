@@ -28,7 +28,7 @@ FOLLOW = FollowChecks()
 @dataclass(frozen=True)
 class Followed:
     """position(t) = gain * goal(t - lag) + offset. lag [s], offset [rad]. explained: share of the position's variance that this
-    gives, at most 1; 0 where the goal says nothing of the position, or where its gain is negative."""
+    explains, at most 1; 0 where the goal does not predict the position, or where its gain is negative."""
 
     lag: float
     gain: float
