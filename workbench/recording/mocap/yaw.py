@@ -23,7 +23,7 @@ _CLEAR = 0.3
 
 @dataclass(frozen=True)
 class YawEstimate:
-    """yaw [rad], positive to the left, of the model's forward axis in the capture's axes; sigma [rad]; by_joint: what each
+    """yaw [rad], positive to the left, of the model's forward axis in the capture's axes; sigma [rad]; by_joint:
     estimate from each joint alone [rad]."""
 
     yaw: float
