@@ -20,7 +20,7 @@ from workbench.robot.servo_registers import ServoReading, ServoRegisters
 STATE = ("present_position", "present_voltage", "present_temperature")
 ALL_IDS = range(253)
 FIRST = 25.0
-"""Patience with a servo before any has answered [ms]: what an FTDI chip as it comes keeps answers for, and half as much."""
+"""Time-out for a servo before any has answered [ms]: the default latency of an FTDI chip, and half as much again."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Survey:
     latency: float = 0.0
 
     def problems(self) -> tuple[str, ...]:
-        """What has to be fixed before anything moves, a line each."""
+        """Problems that have to be fixed before anything moves, a line each."""
         out = [f"joint {joint} does not answer" for joint in self.missing]
         out += [f"servo {i}: two servos seem to have this ID, or its cable is bad" for i in self.doubled]
         out += self._supply()

@@ -48,7 +48,7 @@ class Sent:
 class VirtualMotive:
     """A server without sockets: `answer` takes a client's packet, `due` gives the frames up to a time.
 
-    scene: what the cameras see. started: time of its first mid-exposure on the caller's clock [s]. clock: its own clock at that
+    scene: the bodies in view. started: time of its first mid-exposure on the caller's clock [s]. clock: its own clock at that
     moment [s], which runs `clock_ratio` times as fast. group: multicast, or None. precision: whether frames from 4.1 on carry the
     precision time stamp.
     """
@@ -76,7 +76,7 @@ class VirtualMotive:
         return self.clock(self.started + (number - self.first_number) / self.rate)
 
     def answer(self, data: bytes, now: float) -> list[bytes]:
-        """What it answers to a packet at a time [s] of the caller's clock."""
+        """Its answer to a packet at a time [s] of the caller's clock."""
         kind, size = struct.unpack_from("<HH", data)
         payload = data[4:4 + size]
         if kind == Message.CONNECT:
