@@ -39,7 +39,7 @@ from workbench.types import Progress
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
 
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
-"""What it is, in words, and what is called with what."""
+"""A simulation, in words, and the function that runs it."""
 
 TOGETHER = 4
 """Draws that go to a process at once."""

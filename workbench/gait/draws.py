@@ -47,7 +47,7 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
     def line(m: GaitMeasure) -> Margin:
         j = int(np.argmax(m.torque_use))
         joint = machine.model.joints[j]
-        return _margin("torque-speed line", 100 * m.torque_use[j], 100 * limits.torque, "% of what it has", joint)
+        return _margin("torque-speed line", 100 * m.torque_use[j], 100 * limits.torque, "% of the torque available", joint)
 
     def slip(m: GaitMeasure) -> Margin:
         return slip_margin(machine, request, m, limits.slip_on_draws)
@@ -109,7 +109,7 @@ def _margin(name: str, value: float, limit: float, unit: str, where: str = "robo
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one robot of the ensemble did. robot: what it is, in words. measure, feet: of its run, by the compiled station, or
+    """One robot of the ensemble. robot: description. measure, feet: of its run, by the compiled station, or
     by Drake where that gave up; incident: what happened, where something did."""
 
     robot: str
@@ -140,8 +140,8 @@ def described(model: RobotModel) -> str:
 
 
 def summary(request: Request, robots: Sequence[Drawn]) -> dict[str, Any]:
-    """What a certificate says of draws: quantiles where there are FEWEST or more, else the extremes and the median alone; counts
-    with the bound that they leave; and what happened to which robot."""
+    """Summary of draws for a certificate: quantiles where there are FEWEST or more, else the extremes and the median alone;
+    counts with their confidence bound; and the incident of each robot that had one."""
     if not robots:
         return {"count": 0}
     measures = [d.measure for d in robots]

@@ -1,4 +1,4 @@
-"""What no gait can do, known before any search."""
+"""Limits that rule a request out before any search."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ as fast again as their feet."""
 
 
 def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
-    """What no gait can do: speed beyond what feet reach at the servos' no-load speed, or that no path of feet has within the
-    ranges and speeds of joints; a slope beyond friction; servos that may give less than standing takes. InputError for a limit on
-    torque above what the servos have."""
+    """The first limit that no gait can meet: a speed beyond the feet's at the servos' no-load speed, or that no path of feet has
+    within the ranges and speeds of joints; a slope beyond friction; a torque limit below the torque of standing. InputError for a
+    limit on torque above the torque of the servos."""
     most = float(machine.law.full_torque.max())
     if request.limits.rms is not None and request.limits.rms > most:
-        raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, what the servos give at full duty, "
+        raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, the servos' torque at full duty, "
                                f"got {request.limits.rms:g}")
     for margin in (_foot_speed(machine, request), _slope(machine, request), _standing(machine, request)):
         if margin is not None and margin.use > 1:
