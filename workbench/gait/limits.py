@@ -23,20 +23,21 @@ class GaitLimits:
     """Limits that a gait has to keep. Each field: unit and reason. InputError for a number that is not positive.
 
     rms: torque of each servo [N m], RMS over the gait; None: half the torque at full duty at standstill. ROBOTIS advises a fifth,
-    which its own walk of the puppy exceeds by far (the tail's 0.80 N m of 1.39); half is below the need of that walk and gives I²R
-    heat of a quarter of a stalled servo's, for minutes and not for hours. The fifth is reported as advice. torque: share of the
-    torque-speed line that may be used for 10 ms or longer; beyond it a servo stops following. fuse: supply current [A] (CM-530:
-    10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between links [m]: 2
-    mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm, twice what a
-    degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the ground of feet
-    that touch it, by the body's, on the nominal robot: 0.3; a gait that slides depends on friction, which is the least known.
-    slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.36 of the
-    speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where the
-    feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]:
-    3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and latency is seen
-    on its first metre, and another `turn` corrects it. trimmed: the residual after three recorded metres and three corrections,
-    RMS over draws [rad/m]: 10 deg; a tenth of a right angle in a metre is for a controller. aside: sideways speed by forward
-    speed. back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
+    which its own walk of the puppy exceeds by far (the tail's 0.80 N m of 1.39); half is below the need of that walk and gives
+    I²R heat of a quarter of a stalled servo's, for minutes and not for hours. The fifth is reported as advice. torque: share of
+    the torque-speed line that may be used for 10 ms or longer; beyond it a servo stops following. fuse: supply current [A]
+    (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
+    links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
+    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
+    ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides depends on friction, which is the
+    least known. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at
+    0.36 of the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg,
+    where the feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot
+    [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and
+    latency is seen on its first metre, and another `turn` corrects it. trimmed: the residual after three recorded metres and
+    three corrections, RMS over draws [rad/m]: 10 deg; a tenth of a right angle in a metre is for a controller. aside: sideways
+    speed by forward speed. back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two
+    to four seconds.
     """
 
     rms: float | None = None

@@ -82,12 +82,11 @@ def write_tables(
 ) -> list[Path]:
     """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where `file` holds it with its bounds, motion.table; all or none.
 
-    The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
-    line with the order of joints, the same in all files; where servos are not of the AX-12A's family, a second line names
-    the families, whose counts are used; where there are poses of a start or a stop, a line gives their number (SECTIONS), and
-    where a servo turns against its joint or has its zero elsewhere, a line lists it (MOUNTED). Goals are those of the servos.
-    InputError
-    for a joint without a bus ID.
+    The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first line with
+    the order of joints, the same in all files; where servos are not of the AX-12A's family, a second line names the families,
+    whose counts are used; where there are poses of a start or a stop, a line gives their number (SECTIONS), and where a servo
+    turns against its joint or has its zero elsewhere, a line lists it (MOUNTED). Goals are those of the servos. InputError for a
+    joint without a bus ID.
     """
     _check_ids(table.joints, ids, table.source)
     mounted = [(j, m.direction, zero) for j, u, zero in zip(table.joints, table.units, zeros(table, mountings or {}))
