@@ -67,7 +67,7 @@ def _reading(compiled: CompiledJob, rows: int) -> _Reading:
     times = job.times
 
     def made() -> _Reading:
-        time = np.arange(rows) * every - lead
+        time = np.asarray(np.arange(rows) * every - lead, float)
         row = np.clip(np.searchsorted(time, times, side="right") - 1, 0, rows - 1)
         following = np.minimum(row + 1, rows - 1)
         share = ((times - time[row]) / every)[:, None]

@@ -64,4 +64,5 @@ def _written(tables: Tables, first: Split, parts: Split) -> Tables | None:
     if not all((np.abs(columns[name][changed]) < ENDLESS).all() for name in columns
                if (changed := columns[name] != getattr(tree, name)).any()):
         return None
-    return replace(tables, tree=tree._replace(**columns, **weights), links=tuple(links))
+    changed_columns: dict[str, Any] = {**columns, **weights}
+    return replace(tables, tree=tree._replace(**changed_columns), links=tuple(links))
