@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
+from workbench.cli.check import check_table_of
+from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
@@ -184,3 +186,28 @@ def test_engines_that_disagree_anywhere_break_the_certificate(made):
     assert all(m.use <= 1 for m in good)
     assert broken[0].use > 1
     assert broken[0].where == "friction 0.3, in other"
+
+
+def test_a_binary_table_is_checked_against_the_certificate_beside_it(made, tmp_path, capsys):
+    folder, machine, _, _ = made
+    succeeds(capsys, "export", str(folder / "gait.csv"), "--out", str(tmp_path), "--cycles", "1", "--force")
+    table = str(tmp_path / "motion.table")
+    check_table_of("flash", table, machine.model, force=False)
+    (tmp_path / NAME).write_text((tmp_path / NAME).read_text().replace('"seed": 7', '"seed": 8'))
+    with pytest.raises(InputError, match="was changed after it was written; --force"):
+        check_table_of("flash", table, machine.model, force=False)
+    other = load_motion(folder / "gait.csv").as_table()
+    other = replace(other, dwells_ms=other.dwells_ms + 1)
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(other, machine.model)))
+    (tmp_path / NAME).write_text((folder / NAME).read_text())
+    with pytest.raises(InputError, match="another table's"):
+        check_table_of("flash", table, machine.model, force=False)
+
+
+def test_a_binary_table_without_a_certificate_has_its_limits_checked(made, tmp_path):
+    _, machine, table, _ = made
+    whole = table.whole
+    whole.goals[0, whole.joints.index("flm")] = 1000
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(whole, machine.model)))
+    with pytest.raises(InputError, match="beyond the joint's limit"):
+        check_table_of("flash", str(tmp_path / "motion.table"), machine.model, force=False)

@@ -61,8 +61,8 @@ def chosen(evaluator: Evaluator, plans: Plans, progress: Progress) -> Found | No
 
 
 def told_of_plan(c: Candidate, plans: Plans) -> dict[str, object]:
-    """What a certificate says of the programme behind a gait: its task, and the share of the planned speed that the nominal robot
-    has [m/s, for a turn in place rad/s]; nothing of a gait that was not planned."""
+    """The certificate's entry for the programme behind a gait: its task, planned speed [m/s, for a turn in place rad/s], and the
+    share of it that the nominal robot reaches; empty for a gait that was not planned."""
     planned = plans.of(c.shape)
     if planned is None or c.nominal is None:
         return {}

@@ -26,6 +26,7 @@ GRAVITY = 9.81
 """Of free fall [m/s^2], as Drake's plants have it."""
 FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """Writes the same text either way."""
+_AX_12A = ServoConstants()
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ class RobotModel:
 
     def servo(self, joint: str) -> ServoConstants:
         """Constants of one joint's servo (default AX-12A where none are given)."""
-        return self.servos.get(joint, ServoConstants())
+        return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
         """The same robot with one effect more."""

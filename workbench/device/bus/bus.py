@@ -92,20 +92,27 @@ class Bus:
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
 
     def write(self, servo: int, values: Mapping[str, int], check: bool = True) -> None:
-        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written.
+        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written. A servo
+        that answers reads only (status_return_level 1) is believed by what it reads.
 
         EEPROM of a family that locks it is unlocked before and locked after."""
         eeprom = any(self._register(name).address < self.profile.eeprom_below for name in values)
         switch = self.profile.unlock if eeprom else None
         if switch is not None:
-            self._write(servo, switch.register, switch.open)
+            self._switch(servo, switch.register, switch.open)
         for name, value in values.items():
-            self._write(servo, name, value)
+            with suppress(*([NoAnswerError] if check else [])):
+                self._write(servo, name, value)
             if check and self.read(servo, name)[name] != value:
                 found = self.read(servo, name)[name]
                 raise BusError(f"reads {found} after {value} was written", servo, self.joints.get(servo), name)
         if switch is not None and "id" not in values:
-            self._write(servo, switch.register, switch.closed)
+            self._switch(servo, switch.register, switch.closed)
+
+    def _switch(self, servo: int, name: str, value: int) -> None:
+        """Writes a register of which only the effect on others counts; whether it answered does not matter."""
+        with suppress(NoAnswerError):
+            self._write(servo, name, value)
 
     def exists(self, servo: int, tries: int | None = None) -> int | None:
         """Model number of a servo, None where none answers to so many questions (default: the options')."""
@@ -138,10 +145,9 @@ class Bus:
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
         heard = self._guarded(lambda: self._collect(packet, len(servos) * group.answer_length(kind, count)))
         out = {}
-        for servo, (error, data) in group.answers(kind, heard, count).items():
-            if servo in servos:
-                self._look(servo, error)
-                out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        for servo, (error, data) in group.answers(kind, heard, count, servos).items():
+            self._look(servo, error)
+            out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
         return out
 
     def _collect(self, packet: bytes, most: int) -> bytes:

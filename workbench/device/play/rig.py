@@ -18,7 +18,7 @@ from workbench.robot.mounting import JointServo
 STATE = ("present_position", "present_load", "present_voltage", "present_temperature")
 POSITION = ("present_position",)
 GOAL = "goal_position"
-"""Read back with every second reading of a servo: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
+"""Read back in turn with load, voltage and heat: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
 ROUND, ROUND_AT_ONCE = 0.018, 0.003
 """Shortest time in which all servos are read once [s], one after the other, and by one question: more would show nothing new of a
 joint that swings a few times a second."""
@@ -193,8 +193,10 @@ class Rig:
         if at_once:
             turn = self._turn % (4 * STATE_EVERY)
             return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
-        turn = self._turn // turns
-        return (*STATE, *self._limp) if turn % LIMP_EVERY == 0 else (GOAL, *STATE) if turn % 2 else STATE
+        turn = self._turn // turns % LIMP_EVERY
+        if turn == 0:
+            return (*self._limp, GOAL, *POSITION) if self._together else (*STATE, *self._limp)
+        return STATE if turn % 2 else (GOAL, *POSITION)
 
     def _read_all(self, names: tuple[str, ...]) -> None:
         """One question to all; whoever did not answer is asked alone first next time: it may keep others silent."""
