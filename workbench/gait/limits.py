@@ -28,7 +28,7 @@ class GaitLimits:
     the torque-speed line that may be used for 10 ms or longer; beyond it a servo stops following. fuse: supply current [A]
     (CM-530: 10 A). reach: distance of feet from their path [m]: a millimetre is within play and rounding. clearance: between
     links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
-    twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
+    twice the sag from a degree of play in a knee; where feet drag, the floor decides how they move. slip: speed over the
     ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides depends on friction, which is the
     least known. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at
     0.36 of the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg,

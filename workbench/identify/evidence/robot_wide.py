@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Together:
-    """Fits of all regions. shared: effects of the whole robot; fits: by region, with these; slopes (n, k): by region, of
+    """Fits of every region. shared: effects of the whole robot; fits: by region, with these; slopes (n, k): by region, of
     its residuals by the shared parameters; covariance (k, k) of these; log_posterior [nats] of the whole."""
 
     shared: Hypothesis

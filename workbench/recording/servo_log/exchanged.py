@@ -1,4 +1,4 @@
-"""Joints whose columns stand for each other: a position that follows another joint's goals, and not its own."""
+"""Joints whose columns are exchanged: a position that follows another joint's goals, and not its own."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ LINK_CONTACTS = 32
 
 class Tree(NamedTuple):
     """Kinematics, inertia and joint forces. parent (n,): body that carries each joint. path (nv,): the velocity before
-    each on the way to the root, -1 at its end; row (nv,): before each of all. group (nv,): the tree of Drake's forest that a
+    each on the way to the root, -1 at its end; row (nv,): before each of them. group (nv,): the tree of Drake's forest that a
     velocity belongs to. R (n, 3, 3), p (n, 3): the joint's frame in its carrier's. axis (n, 3). mass (n+1,), com (n+1, 3) and
     inertia (n+1, 6): of bodies in their joint's frame, inertia xx yy zz xy xz yz about the centre of mass. armature, damping,
     stiffness, rest, lower, upper (n,): of joints. brake (n,): most torque of its dry friction, brake_gain (n,) its damping while

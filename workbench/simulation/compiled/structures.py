@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import OrderedDict
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from pydrake.multibody.tree import RotationalInertia, SpatialInertia
