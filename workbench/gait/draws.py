@@ -60,7 +60,7 @@ def draw_margins(machine: GaitMachine, request: Request, draws: Sequence[GaitMea
         judges.append(clearance)
     out = [_ninth([judge(m) for m in standing]) for judge in judges]
     touched = sum(m.touched for m in standing)
-    allowed_count = len(standing) - _needed(len(standing))
+    allowed_count = len(standing) - _required_count(len(standing))
     use = touched / max(allowed_count, 1) if touched <= allowed_count else 1.0 + touched / len(standing)
     out.append(Margin("other contact" + OVER_DRAWS, f"of {len(standing)} robots", float(touched), float(allowed_count),
                       "robots whose links touch", use))
@@ -90,14 +90,14 @@ def bound(events: int, count: int, confidence: float = 0.95) -> float:
     return 1.0 if count <= events else float(beta.ppf(confidence, events + 1, count - events))
 
 
-def _needed(count: int) -> int:
+def _required_count(count: int) -> int:
     """How many of `count` robots have to keep a limit."""
     return math.ceil(SHARE * count - 1e-9)
 
 
 def _ninth(margins: list[Margin]) -> Margin:
     """The worst margin among the best nine tenths."""
-    needed = _needed(len(margins))
+    needed = _required_count(len(margins))
     m = sorted(margins, key=lambda m: m.use)[needed - 1]
     where = f"{needed} of {len(margins)} robots"
     return replace(m, name=m.name + OVER_DRAWS, where=where if m.where == "robot" else f"{m.where}, {where}")

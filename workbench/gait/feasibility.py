@@ -39,7 +39,7 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
     if request.limits.rms is not None and request.limits.rms > most:
         raise InputError(None, f"RMS torque: expected at most {most:.3g} N m, the servos' torque at full duty, "
                                f"got {request.limits.rms:g}")
-    for margin in (_foot_speed(machine, request), _slope(machine, request), _standing(machine, request)):
+    for margin in (_foot_speed(machine, request), _slope(machine, request), _standing_torque(machine, request)):
         if margin is not None and margin.use > 1:
             return margin
     return _path(machine, request)
@@ -65,7 +65,7 @@ def _slope(machine: GaitMachine, request: Request) -> Margin | None:
     return Margin("slope", f"friction {friction:g}", slope, bound, "deg", slope / bound, kind="slope")
 
 
-def _standing(machine: GaitMachine, request: Request) -> Margin | None:
+def _standing_torque(machine: GaitMachine, request: Request) -> Margin | None:
     """Least over crouches and knees of the largest static torque, as far as friction does not hold it."""
     if request.limits.rms is None:
         return None

@@ -140,7 +140,7 @@ class _Run:
         assert self.best is not None
         self._streak = self._streak + 1 if self.best.good else 0
         done = self.generation / self.budget.generations
-        self.progress(f"generation {self.generation} of {self.budget.generations}{self._told()}", done)
+        self.progress(f"generation {self.generation} of {self.budget.generations}{self._describe()}", done)
 
     def others(self) -> tuple[Candidate, ...]:
         """The next best that differ from those before them."""
@@ -183,7 +183,7 @@ class _Run:
         assert c.nominal is not None
         return self.evaluator.request.progress(c.nominal)
 
-    def _told(self) -> str:
+    def _describe(self) -> str:
         """The best so far in words, with the limit that binds."""
         if self.best is None or self.best.nominal is None:
             return ""

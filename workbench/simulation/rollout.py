@@ -132,7 +132,7 @@ class Simulation:
         if base_path is not None:
             self.diagram.GetSubsystemByName("base_path").UpdateTrajectory(self._ahead(*base_path))
         if start is not None:
-            self._put(Start(*start), commands)
+            self._set_start(Start(*start), commands)
         self._set_first_command(lead - elapsed)
         self._follow(commands, trajectory, lead, duration)
         setter = None if steadied is None else BaseSetter(
@@ -173,7 +173,7 @@ class Simulation:
         """For SteppedRun: puts the robot where its run starts; returns what `_is_stepping` knows it by."""
         self._rest_in_neutral(None)
         if start is not None:
-            self._put(start, None)
+            self._set_start(start, None)
         self._set_first_command(0.0)
         self.simulator.Initialize()
         return self._runs
@@ -278,7 +278,7 @@ class Simulation:
         bank = self.diagram.GetSubsystemByName("servo_bank")
         return bank, self.diagram.GetMutableSubsystemContext(bank, self.context)
 
-    def _put(self, start: Start, commands: Commands | None) -> None:
+    def _set_start(self, start: Start, commands: Commands | None) -> None:
         """Starts from a given state, with the ramp of each servo where it says, or at its first goal."""
         if self.config.base == "free" and start.base is None:
             raise InputError(None, "a run that starts from given joint angles needs a held base, 'fixed' or 'path', or the pose "

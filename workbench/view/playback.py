@@ -71,7 +71,7 @@ def play(take: Take, model: RobotModel, time: Array, like: tuple[Take, Playback]
         links = _seen_from(links, model.base)
     p, R = _base(take, time, clock)
     if p is None or R is None:
-        p, R = _standing(time, like[1] if like else None)
+        p, R = _rest_pose(time, like[1] if like else None)
     elif like is not None:
         p, R = _laid_over(p, R, like[1], take.zeroed)
     played = Playback(time, q, p, R, links)
@@ -91,7 +91,7 @@ def _joints(take: Take, model: RobotModel, time: Array, clock: Array, like: tupl
         if joint in take.joints:
             measured = take.q[:, take.column(joint)]
             if np.isfinite(measured).any():
-                q[:, i] = _held(time, clock, measured[:, None])[:, 0] + rest[i]
+                q[:, i] = _interpolate(time, clock, measured[:, None])[:, 0] + rest[i]
     return q
 
 
@@ -100,11 +100,11 @@ def _base(take: Take, time: Array, clock: Array) -> tuple[Array | None, Array | 
         return None, None
     if not (np.isfinite(take.p_WB).all(axis=1).any() and np.isfinite(take.quat_WB).all(axis=1).any()):
         return None, None
-    quat = _held(time, clock, take.quat_WB)
-    return _held(time, clock, take.p_WB), Rotation.from_quat(quat, scalar_first=True).as_matrix()
+    quat = _interpolate(time, clock, take.quat_WB)
+    return _interpolate(time, clock, take.p_WB), Rotation.from_quat(quat, scalar_first=True).as_matrix()
 
 
-def _held(time: Array, clock: Array, values: Array) -> Array:
+def _interpolate(time: Array, clock: Array, values: Array) -> Array:
     """Columns of `values` (N, k) at `time`: linear between neighbours, the last one seen in gaps, the nearest outside."""
     good = np.isfinite(values).all(axis=1)
     seen = np.flatnonzero(good)
@@ -118,7 +118,7 @@ def _held(time: Array, clock: Array, values: Array) -> Array:
     return np.asarray(a + (b - a) * share[:, None], dtype=float)
 
 
-def _standing(time: Array, other: Playback | None) -> tuple[Array, Array]:
+def _rest_pose(time: Array, other: Playback | None) -> tuple[Array, Array]:
     """A base that nobody followed: where the other take's stood at first, else level."""
     p, R = (other.base_p[0], other.base_R[0]) if other is not None else (np.zeros(3), np.eye(3))
     return np.tile(p, (len(time), 1)), np.tile(R, (len(time), 1, 1))

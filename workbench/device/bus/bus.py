@@ -88,7 +88,7 @@ class Bus:
             answer, result, error = self._handler.txRxPacket(self.port, self._read_packet(servo, first, count))
             return self._parameters(answer) if result == COMM_SUCCESS else b"", result, error
 
-        data = self._asked(servo, names[0] if len(names) == 1 else None, call, count)
+        data = self._ask(servo, names[0] if len(names) == 1 else None, call, count)
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
 
     def write(self, servo: int, values: Mapping[str, int], check: bool = True) -> None:
@@ -128,7 +128,7 @@ class Bus:
         """Restarts a servo, where its protocol can; clears a latched alarm."""
         if self.profile.protocol != 2:
             raise BusError("cannot be restarted over the bus; switch its power off and on", servo, self.joints.get(servo))
-        self._asked(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
+        self._ask(servo, None, lambda: (b"", *self._handler.reboot(self.port, servo)), 0)
 
     # All
 
@@ -230,11 +230,11 @@ class Bus:
         def call() -> tuple[bytes, int, int]:
             return b"", *self._handler.writeTxRx(self.port, servo, register.address, register.size, data)
 
-        self._asked(servo, name, call, 0)
+        self._ask(servo, name, call, 0)
         if register.address < self.profile.eeprom_below:
             self.pause(self.options.settle * register.size)
 
-    def _asked(self, servo: int, register: str | None, call: Callable[[], tuple[bytes, int, int]], count: int) -> bytes:
+    def _ask(self, servo: int, register: str | None, call: Callable[[], tuple[bytes, int, int]], count: int) -> bytes:
         """An answer, asked for again and again; its error byte is the servo's alarms, or a refusal."""
         joint, result = self.joints.get(servo), COMM_SUCCESS
         for attempt in range(self.options.tries):

@@ -123,7 +123,7 @@ def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
             progress("reading registers", k / len(numbers))
         if servo not in doubled:
             joint = joints.get(servo)
-            found[servo] = _found(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
+            found[servo] = _describe_servo(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
     return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
 
@@ -154,7 +154,7 @@ def read_registers(bus: Bus, servo: int) -> dict[str, int]:
     return out | bus.read(servo, *group)
 
 
-def _found(bus: Bus, servo: int, number: int, joint: str | None, mounting: Mounting) -> FoundServo:
+def _describe_servo(bus: Bus, servo: int, number: int, joint: str | None, mounting: Mounting) -> FoundServo:
     name = model_name(number, bus.profile.protocol)
     if number not in bus.profile.models:  # its table is another one
         return FoundServo(servo, joint, number, name, {}, math.nan, math.nan, 0, ())

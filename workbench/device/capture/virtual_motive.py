@@ -116,13 +116,13 @@ class VirtualMotive:
             data = data[:self._random.randrange(8, len(data))]
         elif draw < f.lost + f.broken + f.doubled:
             sent.doubled.add(number)
-            self._put(at + 0.3 / self.rate, data)
+            self._schedule(at + 0.3 / self.rate, data)
         elif draw < f.lost + f.broken + f.doubled + f.swapped:
             sent.swapped.add(number)
             at += 1.5 / self.rate
-        self._put(at, data)
+        self._schedule(at, data)
 
-    def _put(self, at: float, data: bytes) -> None:
+    def _schedule(self, at: float, data: bytes) -> None:
         self._order += 1
         heapq.heappush(self._queue, (at, self._order, data))
 

@@ -117,7 +117,7 @@ class Loading:
             heard = (heard + new)[-4096:]
         heard += self._fresh_prompt()
         if not any(name in heard for name in profile.identity):
-            raise LoadError(f"the loader says {_shown(heard)}, which is no {profile.name} ({profile.source} knows "
+            raise LoadError(f"the loader says {_excerpt(heard)}, which is no {profile.name} ({profile.source} knows "
                             f"{_listed(profile.identity)})", self._state, "check which controller this is")
 
     def _fresh_prompt(self) -> bytes:
@@ -151,7 +151,7 @@ class Loading:
                 return
             self._state = UNTOUCHED
             if last:
-                raise LoadError(f"the loader said {_shown(heard)} after LOAD", self._state, AGAIN)
+                raise LoadError(f"the loader said {_excerpt(heard)} after LOAD", self._state, AGAIN)
             self._fresh_prompt()
 
     def _send(self, image: bytes) -> None:
@@ -167,7 +167,7 @@ class Loading:
         while not any(text in heard for text in (*texts, *refused)):
             failed = [text for text in self._profile.failure if text in heard]
             if failed and not any(text.startswith(f) for f in failed for text in refused):
-                raise LoadError(f"the loader said {_shown(heard)} {when}", self._state, AGAIN)
+                raise LoadError(f"the loader said {_excerpt(heard)} {when}", self._state, AGAIN)
             if waited >= seconds:
                 self._nothing_known(heard, when)
             new = self._read(0.1)
@@ -178,7 +178,7 @@ class Loading:
     def _nothing_known(self, heard: bytes, when: str) -> None:
         if not heard:
             raise LoadError(f"the loader was silent {when}", self._state, f"check cable, port and power; {AGAIN}")
-        raise LoadError(f"the loader said {_shown(heard)} {when}, which {self._profile.source} does not hold", self._state,
+        raise LoadError(f"the loader said {_excerpt(heard)} {when}, which {self._profile.source} does not hold", self._state,
                         f"if that is right, add it there; {AGAIN}")
 
     def _start(self) -> StateMessage:
@@ -250,7 +250,7 @@ class Loading:
         return data
 
 
-def _shown(heard: bytes) -> str:
+def _excerpt(heard: bytes) -> str:
     text = heard[-60:].decode("ascii", "replace").strip()
     return repr(text)
 

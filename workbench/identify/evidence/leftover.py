@@ -45,7 +45,7 @@ def left_over(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Re
         i = next(k for k, e in enumerate(evidence) if e.name == name)
         joint = u.where[0] if u.where else ""
         event = _worst(evidence[i], residuals[i], joint) if joint in evidence[i].joints else None
-        out.append(u if event is None else replace(u, description=replace(u.description, worst=_told(event))))
+        out.append(u if event is None else replace(u, description=replace(u.description, worst=_describe(event))))
     return tuple(sorted(out, key=lambda u: -u.error))
 
 
@@ -72,7 +72,7 @@ def _middle(x: Array) -> float:
     return float(np.median(seen)) if len(seen) else float("nan")
 
 
-def _told(event: _Event) -> str:
+def _describe(event: _Event) -> str:
     """For a person."""
     error, _ = in_file_units(event.error, "")
     angle, _ = in_file_units(event.angle, "")

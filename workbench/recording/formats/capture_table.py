@@ -86,11 +86,11 @@ def bodies_of_markers(markers: Mapping[str, Array]) -> dict[str, BodyTrack]:
         sizes = np.linalg.svd(shape, compute_uv=False)
         if sizes[1] < _THIN * sizes[0]:
             continue
-        out[body] = _fitted(at, shape)
+        out[body] = _fit_body(at, shape)
     return out
 
 
-def _fitted(at: Array, shape: Array) -> BodyTrack:
+def _fit_body(at: Array, shape: Array) -> BodyTrack:
     """The path of a body whose markers (M, 3) [m] about their middle are seen at (N, M, 3): least squares, in frames that show
     three of them at least."""
     p, q = np.full((len(at), 3), np.nan), np.full((len(at), 4), np.nan)

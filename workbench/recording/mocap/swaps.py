@@ -38,7 +38,7 @@ def unswap(tracks: Tracks, model: RobotModel | None) -> Tracks:
         holds = right
         if model is not None and right[-1] != right[0]:
             holds = min((right, reverse), key=lambda h: _torn(_put_back(tracks, starts, h), model))
-        tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_told(tracks, starts, holds)))
+        tracks = replace(_put_back(tracks, starts, holds), problems=(*tracks.problems, *_describe(tracks, starts, holds)))
     return tracks if model is None else _throughout(tracks, model)
 
 
@@ -98,7 +98,7 @@ def _put_back(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> Trac
     return replace(tracks, p=p, q=np.stack([quat.continuous(track)[0] for track in q]), mended=mended)
 
 
-def _told(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> list[str]:
+def _describe(tracks: Tracks, starts: list[int], holds: list[list[int]]) -> list[str]:
     """A line for each set of labels that were exchanged, from when to when."""
     n = len(tracks.time)
     spans: dict[tuple[int, ...], list[list[int]]] = {}
@@ -153,7 +153,7 @@ def _throughout(tracks: Tracks, model: RobotModel) -> Tracks:
     even = [holds for misfit, holds in trials if misfit < 1.5 * best]  # two like legs can be repaired at either joint
     holds = min(even, key=lambda h: _out_of_place(_put_back(tracks, [0], [h]), model))
     fixed = _put_back(tracks, [0], [holds])
-    return replace(fixed, problems=(*tracks.problems, *_told(tracks, [0], [holds])))
+    return replace(fixed, problems=(*tracks.problems, *_describe(tracks, [0], [holds])))
 
 
 def _out_of_place(tracks: Tracks, model: RobotModel) -> float:

@@ -59,7 +59,7 @@ def joint_logs(r: Recording, c: FollowChecks = FOLLOW) -> dict[str, JointLog]:
         goal, position = r.channels.get(f"goal.{joint}"), r.channels.get(f"position.{joint}")
         if goal is None or position is None or not np.isfinite(goal).any():
             continue
-        goal = _held(goal)
+        goal = _fill_gaps(goal)
         on = np.isfinite(goal) & np.isfinite(position) & (r.channels.get(f"enabled.{joint}", np.ones(len(goal))) != 0)
         rows = np.flatnonzero(on)
         if len(rows) >= c.fewest:
@@ -91,7 +91,7 @@ def followed(time: Array, goal: Array, position: Array, c: FollowChecks = FOLLOW
     return Followed(float(lags[best]), float(gain[best]), offset, float(explained[best]))
 
 
-def _held(goal: Array) -> Array:
+def _fill_gaps(goal: Array) -> Array:
     """Goals (N,) with blanks filled by the last one before, or after."""
     at = np.maximum.accumulate(np.where(np.isfinite(goal), np.arange(len(goal)), -1))
     first = int(np.flatnonzero(np.isfinite(goal))[0])

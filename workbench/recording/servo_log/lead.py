@@ -59,7 +59,7 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
     inside = (time >= time[0] + most) & (time <= time[-1] - most)
     if inside.sum() < c.fewest:
         return None
-    left = np.array([_left(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
+    left = np.array([_unexplained_share(np.interp(time[inside] - lag, time, goal), position[inside]) for lag in lags])
     best = int(np.argmin(left))
     ahead = lags <= -c.rows * row
     if not ahead[best] or left[best] > 1 - c.likeness or best == 0:
@@ -67,7 +67,7 @@ def _lead(time: Array, goal: Array, position: Array, c: LeadChecks) -> float | N
     return float(-lags[best]) if np.sqrt(left[best]) < c.better * np.sqrt(left[lags >= 0].min()) else None
 
 
-def _left(goal: Array, position: Array) -> float:
+def _unexplained_share(goal: Array, position: Array) -> float:
     """Share of the position's variance that a goal, scaled by a positive number and moved, does not explain."""
     a, b = goal - goal.mean(), position - position.mean()
     total, along = float(b @ b), float(a @ b)

@@ -82,14 +82,14 @@ def _joined(log: JointLog, stretches: list[tuple[int, int]], fit: Response, c: L
     for first, end in stretches:
         if log.time[end - 1] - log.time[first] < c.bridges:
             continue
-        if out and (log.time[first] - log.time[out[-1][1] - 1] < c.bridges or _stands(log, (out[-1][1], first), fit, c)):
+        if out and (log.time[first] - log.time[out[-1][1] - 1] < c.bridges or _is_at_rest(log, (out[-1][1], first), fit, c)):
             out[-1] = (out[-1][0], end)
         else:
             out.append((first, end))
     return out
 
 
-def _stands(log: JointLog, between: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
+def _is_at_rest(log: JointLog, between: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
     rows = slice(*between)
     asked = float(np.ptp(fit.predicted[rows]))
     return bool(np.rad2deg(asked) > 2 * c.least and np.ptp(log.position[rows]) < c.stands * asked)

@@ -74,7 +74,7 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
     mended = without_faults(read, frozenset(j for j in read.joints if any(
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines
-    problems += _standing(mended.recording, checks)
+    problems += _frozen_sensors(mended.recording, checks)
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
@@ -157,7 +157,7 @@ def _comes_to(goal: float, position: Array) -> bool:
     return bool((way[-1] < 0.3 * way.max() or way[-1] < np.deg2rad(5)) and travelled < 3 * np.ptp(position))
 
 
-def _standing(r: Recording, c: LogChecks) -> Iterator[str]:
+def _frozen_sensors(r: Recording, c: LogChecks) -> Iterator[str]:
     for joint, goal, position, on in _commanded(r):
         if _shift_of_equals(goal, position, c) is not None:
             continue

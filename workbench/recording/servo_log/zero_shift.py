@@ -47,7 +47,7 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
     far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
-    asked = {k for k in inside if _asked(log, k, float(steps[k]) - _usual(steps, k), c)}
+    asked = {k for k in inside if _goal_stepped(log, k, float(steps[k]) - _usual(steps, k), c)}
     at = [k for k in inside if k not in asked and _stands_out(steps, k, c)] or \
         [k for k in inside if k not in asked and _leaps(log, k, abs(float(steps[k]) - _usual(steps, k)), far)]
     if not at:
@@ -91,7 +91,7 @@ def _usual(steps: Array, k: int) -> float:
     return float(steps[k - 1] + steps[k + 1]) / 2
 
 
-def _asked(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
+def _goal_stepped(log: JointLog, k: int, step: float, c: ShiftChecks) -> bool:
     """Whether a goal stepped the same way shortly before."""
     before = (log.time >= log.time[k] - c.before) & (log.time <= log.time[k + 1])
     goals = np.diff(log.goal[before])

@@ -100,8 +100,8 @@ def take_section(take: TakeComparison, model: RobotModel, replay: Path) -> Secti
         c = take.joints[joint]
         if k and not c.over_noise > LIMIT:
             break
-        figure = joint_overlay(joint, take.simulated, take.recorded, noise=_known(c.noise), floor=_known(c.floor),
-                               stance=by_joint(recorded, model))
+        figure = joint_overlay(joint, take.simulated, take.recorded, noise=_finite_or_none(c.noise),
+                               floor=_finite_or_none(c.floor), stance=by_joint(recorded, model))
         parts.append(Picture(figure, _about(joint, c)))
     noise = {j: c.noise for j, c in take.joints.items()}
     parts.append(Details("All joints", [
@@ -160,7 +160,7 @@ def _count(n: int, what: str) -> str:
     return f"{n} {what}{'' if n == 1 else 's'}"
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 

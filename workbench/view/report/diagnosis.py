@@ -103,7 +103,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
         report.add(recalibrated_section(diagnosis.recalibrated))
     if takes:
         report.add(_unseen(takes))
-    report.add(_left(diagnosis))
+    report.add(_residuals_section(diagnosis))
     others = [r for r in diagnosis.rejected if not any(rivals(r, f) for f in diagnosis.findings)]
     if others:
         report.add(Section("What else was tried", tried(others, "more that were tried")))
@@ -272,7 +272,7 @@ def _walks(take: TakeReport) -> bool:
     return take.recorded.base == "free" and p is not None and bool(np.nanmax(np.ptp(p[np.isfinite(p[:, 0]), :2], axis=0)) > PATH)
 
 
-def _left(diagnosis: Diagnosis) -> Section:
+def _residuals_section(diagnosis: Diagnosis) -> Section:
     if not diagnosis.unexplained:
         nothing = diagnosis.verdict in ("no_gap", "explained")
         return Section("Residuals", [Text("No residual above noise and numerical error." if nothing else
