@@ -15,7 +15,7 @@ KEPT = 64
 
 
 class Rollouts:
-    """Plays gaits on robots again and again; what does not depend on the gait is worked out once for each robot."""
+    """Plays gaits on robots repeatedly; everything independent of the gait is computed once for each robot."""
 
     def __init__(self, n_jobs: int = 2) -> None:
         self.n_jobs = n_jobs
