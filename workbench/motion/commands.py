@@ -1,4 +1,4 @@
-"""What goes out on the bus: goal positions and moving speeds at given times."""
+"""Commands that go out on the bus: goal positions and moving speeds at given times."""
 
 from __future__ import annotations
 
