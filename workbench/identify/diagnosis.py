@@ -22,7 +22,7 @@ from workbench.identify.estimators.geometry import Geometry, geometry_of
 from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
-from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -76,7 +76,7 @@ class _Settings:
     @property
     def options(self) -> EvidenceOptions:
         """Of the search of servo logs."""
-        return EvidenceOptions(drift=None if self.previous is None else SinceThen())
+        return EvidenceOptions() if self.previous is None else EvidenceOptions.since()
 
     def provenance(self) -> dict[str, object]:
         """What the results say of them."""

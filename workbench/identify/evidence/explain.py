@@ -21,7 +21,7 @@ from workbench.identify.evidence.registers import within_registers
 from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
-from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
+from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, with_fits, without_names
 from workbench.identify.evidence.tied_names import names_of_tie
 from workbench.identify.evidence.torque_law import torque_law
 from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
@@ -64,6 +64,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
     progress("names that are tied", None)
     names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+    found = tuple(with_fits(f, names[k], options) for k, f in enumerate(found))
+    rollouts = standing(rollouts, found)
     progress("an unnamed torque", None)
     rollouts, found = _beside_unnamed(rollouts, found, options)
     progress("numbers at a finer step", None)
