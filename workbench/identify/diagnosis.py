@@ -141,11 +141,10 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], SearchResult] = explained_by_selection
-    if gap and is_by_logs(evidence):
-        search = explained_by_evidence
+    search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
+    options = settings.options if gap else settings.options.without_names()
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
-                           progress, settings.options))
+                           progress, options))
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)

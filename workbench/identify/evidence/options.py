@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 
 @dataclass(frozen=True)
@@ -128,6 +128,10 @@ class EvidenceOptions:
     law: LawOptions = field(default_factory=LawOptions)
     sure: float = 3.0
     refuted: float = 0.3
+
+    def without_names(self) -> EvidenceOptions:
+        """For servo logs without a gap: the law is calibrated, and no effect is looked for."""
+        return replace(self, most=0)
 
     @classmethod
     def since(cls) -> EvidenceOptions:
