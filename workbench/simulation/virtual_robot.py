@@ -31,7 +31,7 @@ from workbench.recording import Measurement, Take, observe
 from workbench.robot import RobotModel, bus_ids
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Simulation
+from workbench.simulation.rollout import BaseState, Simulation
 
 Array = NDArray[np.float64]
 FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
@@ -81,6 +81,11 @@ class StationBody:
     def time(self, now: int) -> float:
         """The station's clock [s] at a time of the bus's [ticks]: it starts when the hand lets go."""
         return 0.0 if self.let_go is None else (now - self.let_go) / SECOND
+
+    def base(self, now: int) -> BaseState | None:
+        """Pose and velocity of the free base at a time of the bus's [ticks]; None of a held one."""
+        self._advance(now)
+        return self._run.base
 
     def take(self, started: float) -> Take:
         """What the robot has done since then, time 0 at `started` [s on the station's clock]."""

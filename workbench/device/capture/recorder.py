@@ -14,6 +14,7 @@ from workbench.device.capture.link import Link
 from workbench.device.capture.packets import (
     HIRES,
     OLDEST,
+    BodyPose,
     BrokenPacketError,
     Message,
     ServerInfo,
@@ -46,12 +47,14 @@ class RecordOptions:
 
 
 class Recorder:
-    """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come."""
+    """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come. latest: of each
+    rigid body the last pose, and when it arrived [s]."""
 
     def __init__(self, link: Link, options: RecordOptions | None = None) -> None:
         self.link, self.options = link, options or RecordOptions()
         self.info: ServerInfo | None = None
         self.names: dict[int, str] = {}
+        self.latest: dict[str, tuple[float, BodyPose]] = {}
         self.tracked = 0
         self.problem = ""
         self._ledger = Ledger()
@@ -175,6 +178,7 @@ class Recorder:
             return
         self._restarts = 0
         self._last_frame = arrival
+        self.latest |= {self.names[b.id]: (arrival, b) for b in frame.bodies if b.id in self.names}
         self.tracked = sum(body.tracked for body in frame.bodies)
         journal.packet(arrival, data)
         unknown = any(body.id not in self.names for body in frame.bodies)

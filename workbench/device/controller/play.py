@@ -133,8 +133,8 @@ class Controller:
         if not answer.well:
             raise BusError(f"the table is refused: {answer.result}")
 
-    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
-        """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
+    def start(self) -> float:
+        """Has it play from neutral; returns when it began on its own clock [s]. BusError with its reason where it does not."""
         self._wait(lambda m: False, REST)
         self._send(frame(FrameType.PLAY))
         began = self._wait(_on_the_way, ANSWER)
@@ -143,14 +143,19 @@ class Controller:
         if not isinstance(began, StateMessage) or began.state != ControllerState.PLAY:
             why = f": {_reason(began)}" if isinstance(began, StateMessage) else ""
             raise BusError("it was commanded to play, and does not" + why)
+        return began.time
+
+    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
+        """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
+        began = self.start()
         end = self.now() + seconds
         while True:
             left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
             if left is not None:
                 said = left if isinstance(left, StateMessage) else self.state()
-                return began.time, "" if said.reason == ENDED else _reason(said)
+                return began, "" if said.reason == ENDED else _reason(said)
             if self.now() >= end + SPARE:
-                return began.time, f"it still plays {SPARE:g} s after its end"
+                return began, f"it still plays {SPARE:g} s after its end"
             if self.now() - self.heard[-1][0] > SILENT:
                 raise BusError("the controller fell silent; the robot plays on by itself: hold START for 1.5 s, or switch it off")
             progress("playing", min(1 - (end - self.now()) / seconds, 1.0))

@@ -77,7 +77,7 @@ def fit_step_map(family: GaitFamily, model: RobotModel, seed: int = 0, options: 
     drawn = rng.uniform(-options.most, options.most, (options.rollouts, -(-options.cycles // options.hold)))
     turns = np.repeat(drawn, options.hold, axis=1)[:, :options.cycles]
     config = SimulationConfig(time_step=options.time_step, contact_period=0.0, log_period=0.01)
-    begin = family.table(0.0).start_seconds
+    begin = family.start_seconds
     seconds = begin + options.cycles * family.period
     takes = simulate_batch([Job(model, config, family.sequence(list(u)), seconds) for u in turns])
     rows, changes = [], []
