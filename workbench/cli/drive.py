@@ -15,10 +15,12 @@ from workbench.cli.options import add_model, add_out, load_model, positive
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from workbench.gait.drive.certify import FamilyCertificate
     from workbench.gait.drive.controller import CycleController
     from workbench.gait.drive.family import GaitFamily
     from workbench.gait.drive.loop import Driven
     from workbench.gait.drive.robot_walk import PoseSource
+    from workbench.gait.drive.step_map import StepMap
     from workbench.robot import RobotModel
     from workbench.simulation.virtual_robot import VirtualRobot
 
@@ -33,11 +35,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "cycles ahead; it estimates the robot's own turning bias on the way. In simulation the robot may differ from the model "
         "(--robot, --draw) and is shown without steering, too. With --port the robot's CM-530 plays the gait: each table is sent "
         "while another plays, and checked by the controller's program. Writes drive.json and report.html.")
-    parser.add_argument("points", metavar="X,Y", nargs="+", type=_point,
+    parser.add_argument("points", metavar="X,Y", nargs="*", type=_point,
                         help="way-points [m]: x forward, y left of where the robot stands (put -- before a negative x)")
     parser.add_argument("--gait", metavar="MOTION", required=True,
                         help="gait.csv of `workbench optimize`, with its certificate in the same folder")
     add_model(parser)
+    parser.add_argument("--certify", action="store_true", help="certify the gait's turns over random robots, as --port requires, "
+                        "and write family.json into the gait's folder; no way-points")
     parser.add_argument("--avoid", metavar="X,Y,R", type=_disc, action="append", default=[],
                         help="a disc on the floor to walk around, centre and radius [m]; may be repeated")
     truth = parser.add_mutually_exclusive_group()
@@ -70,17 +74,19 @@ def run(args: argparse.Namespace) -> int:
     from workbench.gait.drive.options import DriveOptions
     from workbench.gait.drive.path import WayPath
     from workbench.gait.drive.plan import Disc
-    from workbench.gait.drive.step_map import fit_step_map
     from workbench.view.report.drive import write_drive
 
-    path = WayPath(args.points)
     model = load_model(args.model, args.packages)
-    family, options = load_family(args.gait, model), DriveOptions(law=args.law, blind=args.blind)
+    family = load_family(args.gait, model)
+    if args.certify:
+        return _certify(args, family)
+    path = WayPath(args.points)
     _check_port(args, model)
+    certified = _certified(args, model)
+    options = DriveOptions(law=args.law, blind=args.blind, **certified.limits if certified else {})
     with output_directory(args.out) as folder, Progress("drive") as progress:
         robot = _robot(args, model, folder)
-        progress("fitting the step-to-step map")
-        step_map = fit_step_map(family, model, args.seed)
+        step_map = certified.step_map if certified else _fitted(args, family, progress)
         controller = CycleController(path, step_map, family.period, options, [Disc(*d) for d in args.avoid])
         watch = _viewer(model, controller) if args.view else None
         code, straight = 0, None
@@ -95,6 +101,47 @@ def run(args: argparse.Namespace) -> int:
     print(f"stopped: {closed.reason}; way-points passed at {misses} cm{beside}")
     print(f"wrote {args.out}: open {args.out / 'report.html'}")
     return code
+
+
+def _certify(args: argparse.Namespace, family: GaitFamily) -> int:
+    import tempfile
+
+    from workbench.cli.progress import Progress
+    from workbench.files import InputError
+    from workbench.gait.drive.certify import certify_family, gait_sha256
+    from workbench.gait.ensemble import load_ensemble
+
+    if args.points:
+        raise InputError(None, "--certify takes no way-points")
+    with tempfile.TemporaryDirectory(prefix="workbench-") as folder, Progress("drive") as progress:
+        certificate = certify_family(family, gait_sha256(args.gait), load_ensemble(), Path(folder), args.seed, progress=progress)
+    written = certificate.write(Path(args.gait).parent)
+    print(certificate.summary())
+    print(f"wrote {written}")
+    return 0 if certificate.kept else 2
+
+
+def _certified(args: argparse.Namespace, model: RobotModel) -> FamilyCertificate | None:
+    """The family's certificate; None where it is not required (in simulation, or with --force) and missing or not valid."""
+    from workbench.cli.progress import warn
+    from workbench.files import InputError
+    from workbench.gait.drive.certify import FILE, read_family
+
+    try:
+        return read_family(args.gait, model)
+    except InputError as e:
+        if args.port is not None and not args.force:
+            raise InputError(e.source, f"{e.problem}; --force drives all the same") from None
+        if (Path(args.gait).parent / FILE).is_file():
+            warn("drive", [str(e)])
+        return None
+
+
+def _fitted(args: argparse.Namespace, family: GaitFamily, progress: Callable[..., None]) -> StepMap:
+    from workbench.gait.drive.step_map import fit_step_map
+
+    progress("fitting the step-to-step map")
+    return fit_step_map(family, family.machine.model, args.seed)
 
 
 def _check_port(args: argparse.Namespace, model: RobotModel) -> None:
