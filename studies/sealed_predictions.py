@@ -2,9 +2,9 @@
 
     python -m studies.sealed_predictions [--out runs/studies/sealed_predictions] [--quick]
 
-Each robot is a puppy in MuJoCo with two hidden effects, drawn by the operating system's seed and sealed. One session (stand, sway,
+Each robot is a puppy in MuJoCo with two hidden effects, drawn from the system's seed and sealed. One session (stand, sway,
 walk) is recorded and diagnosed. The diagnosed and the nominal model then predict speed and turning of ten gaits; the SHA-256 of
-these predictions is written and printed before any of the gaits is played in MuJoCo. Stopped and started again, the study goes on
+these predictions is written and printed before any of the gaits is played in MuJoCo. A study that was stopped resumes
 with the next robot.
 """
 
@@ -135,7 +135,7 @@ def errors(said: Mapping[str, Went], true: Mapping[str, Went]) -> dict[str, floa
 
 
 def one(vault: Vault, k: int, out: Path, count: int, tell: Callable[[str], None]) -> dict[str, Any]:
-    """A robot from its making to its score; what was done before is read."""
+    """One robot, from its making to its score; finished results are read."""
     name = f"robot{k + 1:02d}"
     done = out / "results" / f"{name}.json"
     if done.is_file():
@@ -183,7 +183,7 @@ def _report(model: RobotModel, rows: Sequence[Mapping[str, Any]], vault: Vault) 
                "diagnosed model has at most half the nominal one's error.")
     report = Report("Sealed predictions", summary, f"{__doc__}\n\n{PUPPY_CLAIM}", [], Provenance.of(model))
     report.add(Section("Robots", [Table(
-        ["robot", "hidden", "found", "error of speed, diagnosed; nominal [%]", "turning [deg/s]", "rank", "SHA-256 of predictions"],
+        ["robot", "hidden", "found", "error of speed, diagnosed; nominal [%]", "turning [deg/s]", "rank", "SHA-256"],
         [[r["name"], ", ".join(r["hidden"]), ", ".join(r["found"]) or "–", _pair(r, "speed", 100), _pair(r, "turning deg/s"),
           _pair(r, "rank", digits=2), r["sha256"][:16]] for r in rows],
         "Medians over ten motions; first the diagnosed model, then the nominal one."),

@@ -1,4 +1,4 @@
-"""The family's certificate: what it measures, and that driving the robot needs it."""
+"""The family's certificate: its numbers, its bonds, and that driving the robot needs it."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ class Recorder:
 
     @property
     def counts(self) -> Counts:
-        """What has come so far."""
+        """Counts of the frames so far."""
         return self._ledger.counts()
 
     def connect(self) -> ServerInfo:
@@ -88,7 +88,7 @@ class Recorder:
         return info
 
     def request_recording(self, name: str) -> str:
-        """Asks Motive to record the take itself, under this name; "" where it does, else what it answered."""
+        """Asks Motive to record the take itself, under this name; "" where it does, else its answer."""
         for command in (f"SetRecordTakeName,{name}", "StartRecording"):
             refusal = self._command(command)
             if refusal:
@@ -103,7 +103,7 @@ class Recorder:
                seconds: float | None = None) -> Counts:
         """Records until `until()`, or so many seconds after the first frame; InputError where no frame comes at all.
 
-        A stream that stops, or starts anew with other numbers, ends it, and `problem` says so.
+        A stream that stops, or restarts with other numbers, ends it; `problem` then states the reason.
         """
         assert self.info is not None, "connect first"
         self._head(journal)
@@ -173,8 +173,8 @@ class Recorder:
         if how == "far":
             self._restarts += 1
             if self._restarts > 10:
-                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was started anew or "
-                                "plays back; what came before is kept")
+                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was restarted or "
+                                "plays back; the frames before are kept")
             return
         self._restarts = 0
         self._last_frame = arrival

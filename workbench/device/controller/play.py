@@ -29,7 +29,7 @@ from workbench.robot.servo_profile import ServoProfile
 ANSWER = 1.5
 """Until an order is answered, and a table of 4 kB checked [s]: the upload itself takes 0.7 s at 57,600 bit/s."""
 TO_NEUTRAL = 20.0
-"""Until the robot stands in neutral [s]: its ramp turns 150 deg in 5."""
+"""Until the robot reaches neutral [s]: its ramp turns 150 deg in 5."""
 REST = 1.0
 """How long it stands there before it plays [s]; a recording needs half a second of it."""
 KEPT = 0.9
@@ -90,7 +90,7 @@ class Controller:
         return float(self._port.getCurrentTime()) / 1000
 
     def state(self) -> StateMessage:
-        """What it is at; BusError where nothing that speaks its frames is there."""
+        """Its present state; BusError where nothing answers in its frames."""
         for _ in range(3):
             self._send(frame(FrameType.ASK))
             found = self._wait(lambda m: isinstance(m, StateMessage), 0.5)
@@ -99,7 +99,7 @@ class Controller:
         raise BusError("no CM-530 with the workbench's program answers; `workbench flash` puts it there")
 
     def to_neutral(self) -> StateMessage:
-        """Has it check its servos and ramp to neutral, if it does not stand there; BusError says what it found instead."""
+        """Has it check its servos and ramp to neutral, if it is not there already; BusError names the state that it found."""
         state = self.state()
         if state.state == ControllerState.PLAY:
             raise BusError("the robot plays; stop it first (1 on the remote, or START)")
@@ -157,11 +157,11 @@ class Controller:
             if self.now() >= end + SPARE:
                 return began, f"it still plays {SPARE:g} s after its end"
             if self.now() - self.heard[-1][0] > SILENT:
-                raise BusError("the controller fell silent; the robot plays on by itself: hold START for 1.5 s, or switch it off")
+                raise BusError("the controller fell silent; the robot keeps playing: hold START for 1.5 s, or switch it off")
             progress("playing", min(1 - (end - self.now()) / seconds, 1.0))
 
     def back(self) -> str:
-        """Waits until it stands in neutral, having told it to stop if it is on its way elsewhere; "", or what it says instead."""
+        """Sends a stop if it moves, and waits until it reaches neutral; returns "", or the reason why it did not."""
         end, state = self.now() + TO_NEUTRAL, self.state()
         if state.state in (ControllerState.CHECK, ControllerState.RAMP, ControllerState.PLAY):
             self._send(frame(FrameType.STOP))
