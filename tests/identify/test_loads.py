@@ -33,17 +33,6 @@ def test_an_arm_that_hangs_is_loaded_by_its_weight(logged):
     assert {c.name for c in candidates(model, [e])} >= LOADED
 
 
-def test_on_an_axis_that_stands_upright_nothing_is_loaded(logged):
-    folder, _, (e,) = logged
-    rig = folder / "rig.sdf"
-    rig.write_text(rig.read_text().replace("<xyz>0 1 0</xyz>", "<xyz>0 0 1</xyz>"))
-    model = load_session(folder / "session.yaml").model
-    assert unloaded_joints(model, [e]) == {"j"}
-    names = {c.name for c in candidates(model, [e])}
-    assert not names & LOADED
-    assert "coulomb_friction" in names
-
-
 def test_what_a_held_log_cannot_show_is_listed_with_the_reason(logged):
     _, model, (e,) = logged
     hidden = unobservable(model, [e])
@@ -55,3 +44,14 @@ def test_what_a_held_log_cannot_show_is_listed_with_the_reason(logged):
     said = " ".join(hidden_effects(hidden))
     assert f"because {HELD}: " in said
     assert "ground friction" in said
+
+
+def test_on_an_axis_that_stands_upright_nothing_is_loaded(logged):
+    folder, _, (e,) = logged
+    rig = folder / "rig.sdf"
+    rig.write_text(rig.read_text().replace("<xyz>0 1 0</xyz>", "<xyz>0 0 1</xyz>"))
+    model = load_session(folder / "session.yaml").model
+    assert unloaded_joints(model, [e]) == {"j"}
+    names = {c.name for c in candidates(model, [e])}
+    assert not names & LOADED
+    assert "coulomb_friction" in names

@@ -20,7 +20,7 @@ from workbench.types import Array
 _FULL_DUTY = 885.0
 """PWM register of an XL-330 at full duty; its load register holds the PWM, negatives as unsigned 16 bit."""
 _SUPPLY, _LEAST_VOLTS = 0.1, 0.5
-"""By how much the supply may differ from what was measured: a share of it, a drop under load, and [V] at least."""
+"""Allowed difference between supply and measured voltage: a share of it, a drop under load, and [V] at least."""
 _CHANNELS = {"goal_position": "goal", "position": "position", "speed": "velocity", "temp": "temperature"}
 _REQUIRED = ("timestamp", "position", "goal_position")
 
@@ -31,10 +31,10 @@ def _is_calibration(content: Any) -> bool:
 
 
 def read_bam_log(path: str | Path) -> Recording:
-    """Reads a BAM log: rad, rad/s, volts and degrees Celsius as they stand; the load register becomes `duty`.
+    """Reads a BAM log: rad, rad/s, volts and degrees Celsius unchanged; the load register becomes `duty`.
 
     Time is the log's own. The joint has no name in the file and is called by its motor; a take calls it by the model's one joint.
-    InputError where it is no JSON, cut, lacks an entry's key or holds what is no number.
+    InputError where it is not JSON, is cut, lacks an entry's key or contains something other than a number.
     """
     source = str(path)
     content = read_json(path)

@@ -26,7 +26,7 @@ _THIN = 0.05
 
 @dataclass(frozen=True)
 class Capture:
-    """What a capture system's file holds. time: (N,) [s]. bodies: name -> (p (N, 3) [m], quat (N, 4) wxyz). markers: name ->
+    """Content of a capture system's file. time: (N,) [s]. bodies: name -> (p (N, 3) [m], quat (N, 4) wxyz). markers: name ->
     (N, 3) [m]. up: which axis of the file is up, "y" or "z"; with z up, x and y are level."""
 
     time: Array
@@ -55,8 +55,8 @@ def recording_of(source: str, kind: str, capture: Capture) -> Recording:
     if not bodies and markers:
         bodies = bodies_of_markers(markers)
         if bodies:
-            problems.append(f"rigid bodies are formed of markers whose names begin alike: {', '.join(bodies)}; each is taken "
-                            f"to stand "
+            problems.append(f"rigid bodies are formed of markers with a common name: {', '.join(bodies)}; each is taken "
+                            f"to be "
                             "upright, without a rotation, in the first frame that shows all its markers")
     return Recording(source=source, kind=kind, version=capture.version, time=time - time[0], frames=np.arange(len(time)),
                      rate=rate_of(time), units=capture.units, rigid_bodies=bodies, markers=markers, problems=tuple(problems),
@@ -104,11 +104,11 @@ def bodies_of_markers(markers: Mapping[str, Array]) -> dict[str, BodyTrack]:
         sizes = np.linalg.svd(shape, compute_uv=False)
         if sizes[1] < _THIN * sizes[0]:
             continue
-        out[body] = _fitted(at, shape)
+        out[body] = _fit_body(at, shape)
     return out
 
 
-def _fitted(at: Array, shape: Array) -> BodyTrack:
+def _fit_body(at: Array, shape: Array) -> BodyTrack:
     """The path of a body whose markers (M, 3) [m] about their middle are seen at (N, M, 3): least squares, in frames that show
     three of them at least."""
     p, q = np.full((len(at), 3), np.nan), np.full((len(at), 4), np.nan)

@@ -1,4 +1,4 @@
-"""What a file of robot motion holds, told by its content."""
+"""The kind of a file of robot motion, recognised by its content."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is no recording that we read: which columns it has, which are wanted, and how to get there."""
+"""Files that are no recordings of a known format: their columns, the required ones, and how to convert them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _NAMED = (
     ("position", re.compile(rf"(?i){_SEEN}[._/ ](.+?){_PLACE}")),
     ("position", re.compile(r"(?i)(.+?)[._/ ](?:position|pos|present_position|angle|actual|measured|q)")),
 )
-"""Names that other tools give to columns of a joint log: what they hold, and the joint."""
+"""Names that other tools give to columns of a joint log: the quantity, and the joint."""
 _BARE = {"goal": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_GOAL}[._/ ]?(?:pos|position|angle|q)?"),
          "position": re.compile(rf"(?i)(?:motor|servo|joint)?[._/ ]?{_SEEN}[._/ ]?(?:pos|position|angle|q)?")}
 """Of a log of one servo, whose columns name no joint."""
@@ -51,7 +51,7 @@ class _Column:
 
 
 def refusal(path: Path, head: bytes) -> InputError:
-    """The error that says what a file of no known format is, and what was expected of it."""
+    """The error for a file of no known format, with its apparent kind and the expected one."""
     wanted = ", ".join(f.called for f in known_formats() if f.called)
     if (pointer := lfs_pointer(head)) is not None:
         return InputError(path, pointer)

@@ -26,7 +26,7 @@ from workbench.types import Array
 
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
 MOST_UNPACKED = 256 << 20
-"""Of all arrays in one file [bytes]: hours of an arm's log."""
+"""Largest size of the arrays in one file [bytes]: hours of an arm's log."""
 _DAMAGED = (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, AttributeError, NotImplementedError, RuntimeError,
             KeyError, TypeError, OverflowError, MemoryError, SyntaxError, struct.error, tokenize.TokenError)
 """What numpy and zipfile raise on damaged archives."""
@@ -69,7 +69,7 @@ def read_sage_npz(path: str | Path, programme: str | None = None) -> Recording:
 
 
 def _check_size(path: str | Path) -> None:
-    """InputError where what is packed would fill the memory: the archive says how large each array is."""
+    """InputError where the unpacked content would fill the memory: the archive states how large each array is."""
     with zipfile.ZipFile(path) as content:
         total = sum(entry.file_size for entry in content.infolist())
     if total > MOST_UNPACKED:
