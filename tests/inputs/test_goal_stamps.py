@@ -1,4 +1,4 @@
-"""Goals that were sent between rows: told by their uneven dwells, and set to the times at which they were sent."""
+"""Goals that were sent between rows: recognised by their uneven dwells, and set to the times at which they were sent."""
 
 from __future__ import annotations
 

@@ -41,8 +41,8 @@ class Sent:
 
 
 def sent_goals(rows: Array, c: StampChecks = CHECKS) -> Sent | None:
-    """The regular period with which goals were sent that first stand in rows (K,); None where the rows hold that period, or no
-    period explains them."""
+    """The regular period of goals that first appear in rows (K,); None where it is a whole number of rows, or no period
+    explains them."""
     if len(rows) < c.changes:
         return None
     apart = np.diff(rows)
@@ -65,8 +65,8 @@ def sent_goals(rows: Array, c: StampChecks = CHECKS) -> Sent | None:
 
 
 def with_sent_times(r: Recording, c: StampChecks = CHECKS) -> Recording:
-    """The recording with the commands at the times at which they were sent, where their rows show a regular period; with a note
-    that says so, and the remaining uncertainty in its metadata (`STAMPS`)."""
+    """The recording with the commands at the times at which they were sent, where their rows show a regular period; a note
+    reports the correction, and the metadata (`STAMPS`) holds the remaining uncertainty."""
     commands = r.commands
     if commands is None or r.sensing != "encoders" or "first command" in r.metadata or len(commands.times) < c.changes:
         return r

@@ -16,7 +16,7 @@ class HeldBackChecks:
     """goes: least motion of a goal [deg]. follows: a joint whose goals explain less of its variance, or that moves
     over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint rests at its
     extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
-    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain within `alike` of 1, to
+    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain that differs from 1 by at most `alike`, to
     `explained` of its variance, and with a residual of at most `share` of that distance."""
 
     goes: float = 5.0
