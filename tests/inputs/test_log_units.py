@@ -1,4 +1,4 @@
-"""Units, signs and zeros of servo logs: reported where they contradict the limits of a servo, or another channel of the same joint."""
+"""Units, signs and zeros of servo logs that contradict the limits of a servo, or another channel of the same joint."""
 
 from __future__ import annotations
 

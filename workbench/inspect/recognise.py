@@ -38,6 +38,7 @@ class Inspection:
 
     rate [Hz], frames and duration [s] where it has a clock. gaps: name -> share of frames not seen, of the assets,
     markers or channels that have any; share_of_gaps: over all of them. details: further facts about its kind.
+    unusable: why other verbs would refuse a session, or leave takes of it out; empty where they use all of it.
     """
 
     file: str
@@ -54,6 +55,7 @@ class Inspection:
     gaps: Mapping[str, float] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     problems: tuple[str, ...] = ()
+    unusable: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain types, for JSON."""
@@ -272,15 +274,18 @@ def _yaml(path: Path) -> Inspection:
 
 def _session(path: Path) -> Inspection:
     from workbench.compare.session import load_session
-    from workbench.inspect.problems import session_problems
+    from workbench.inspect.problems import session_check
 
     session = load_session(path)
+    check = session_check(session)
+    problems = [f"{of}: {text}" for of, lines in check.problems.items() for text in lines]
+    lost = check.refused or (f"{', '.join(sorted(map(str, check.damaged)))} cannot be used" if check.damaged else "")
     logged = _logged(session)
     return Inspection(
         str(path), "session", "1", assets=tuple(session.model.rigid_bodies), joints=session.model.joints,
         details={"model": session.model.description, "base": session.model.base,
                  "takes": [t.name for t in session.takes], "predict": [p.name for p in session.predict], **logged},
-        problems=tuple(session_problems(session)))
+        problems=tuple(problems), unusable=lost)
 
 
 def _logged(session: Session) -> dict[str, str]:
