@@ -27,6 +27,7 @@ from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.plan_compare import PlanComparison, compare_plan
 from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
 from workbench.gait.planned import planned_seeds
+from workbench.gait.refine import RefineOptions, refined
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -63,6 +64,7 @@ class OptimizeOptions:
     simulate. given: gaits to start from; planned: whether the search also starts from solved kino-centroidal programmes.
     screening: how the search's best are tried on fresh robots before the certificate. method: "search"; "plan": the joint paths
     of solved programmes as tables, without a search; "both": a search that begins at those, too.
+    refine: Gauss-Newton on the best gait's joint angles afterwards.
     InputError for a number out of range, or a method that is not known."""
 
     budget: Budget = field(default_factory=Budget)
@@ -73,6 +75,7 @@ class OptimizeOptions:
     planned: bool = True
     screening: Screening = field(default_factory=Screening)
     method: Method = "search"
+    refine: RefineOptions = field(default_factory=RefineOptions)
 
     def __post_init__(self) -> None:
         check_whole(self, seed=0, n_jobs=1)
@@ -114,10 +117,12 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         found = _sought(evaluator, options, plans, progress)
         if found is None:
             return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
+        before, found = found.best, refined(evaluator, found, options.refine, progress)
+        plans = plans.with_refined(before.shape, found.best.shape)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
             "ensemble_sha256": ensemble.sha256, "method": options.method, "generations": found.generations,
-            "rollouts": found.rollouts, "searched in": round(time.monotonic() - began, 1)}
+            "rollouts": found.rollouts, "refined": found.best is not before, "searched in": round(time.monotonic() - began, 1)}
 
         def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
             table = gait_table(machine, c.shape)
@@ -214,7 +219,8 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     said = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
-    look = replace(options, method="search", budget=FIRST_LOOK, certify=_briefly(options.certify))
+    look = replace(options, method="search", refine=RefineOptions(iterations=0), budget=FIRST_LOOK,
+                   certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
         said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
@@ -281,4 +287,4 @@ def options_of(effort: int, seed: int = 0, n_jobs: int = 2) -> OptimizeOptions:
                      draws=4 if effort == 1 else budget.draws)
     if effort == 1:
         examined = replace(examined, draws=FEWEST, checked=0, seconds=4.0)
-    return OptimizeOptions(budget, examined, seed, n_jobs)
+    return OptimizeOptions(budget, examined, seed, n_jobs, refine=RefineOptions(iterations=1 if effort == 1 else 2))

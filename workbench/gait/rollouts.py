@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 from workbench.recording.take import Take
 from workbench.simulation import Job, simulate_batch
+from workbench.simulation.cluster import in_blocks, on_cluster
 from workbench.simulation.compiled import CompiledJob, NotCoveredError, covers
 
 KEPT = 64
@@ -30,6 +32,9 @@ class Rollouts:
         if covers(jobs[0]) is not None:  # the kind is the same for all: engine, contact, step
             yield from simulate_batch(jobs, self.n_jobs)
             return
+        if self.n_jobs > 1 and len(jobs) > 1 and on_cluster():
+            yield from in_blocks(partial(_played, as_seen), jobs, self.n_jobs)
+            return
         prepared = [self._prepared(job) for job in jobs]
         if self.n_jobs == 1:
             yield from (_take(job, as_seen) for job in prepared)
@@ -48,6 +53,15 @@ class Rollouts:
             return self._robots[key].of(job)
         except NotCoveredError:
             return None
+
+
+_of_this_process = Rollouts(1)
+"""A worker's own, so that it settles each robot once however many blocks it gets."""
+
+
+def _played(as_seen: bool, jobs: Sequence[Job]) -> list[Take | None]:
+    """A block of jobs, in a worker."""
+    return list(_of_this_process.takes(jobs, as_seen))
 
 
 def _take(job: CompiledJob | None, as_seen: bool) -> Take | None:

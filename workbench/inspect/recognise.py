@@ -147,9 +147,15 @@ def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:
 
 def _recording(path: Path) -> Inspection:
     from workbench.inspect.problems import recording_problems
+    from workbench.motion.trajectory import is_bag, trajectories
     from workbench.recording.formats.read import read_recording
 
-    r = read_recording(path)
+    try:
+        r = read_recording(path)
+    except InputError:
+        if is_bag(path) and trajectories(path):
+            return _motion(path)
+        raise
     missing = {name: np.isnan(body.p).any(axis=1) for name, body in r.rigid_bodies.items()}
     missing |= {name: np.isnan(p).any(axis=1) for name, p in r.markers.items()}
     missing |= {name: np.isnan(values) for name, values in r.channels.items()}

@@ -12,6 +12,7 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.recording.take import Take
+from workbench.simulation.cluster import on_cluster
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Simulation
 
@@ -39,9 +40,7 @@ def simulate_stream(jobs: Sequence[Job], n_jobs: int = 2) -> Iterable[Take]:
     Jobs that the compiled station covers run in threads of this process, the rest in processes."""
     if n_jobs == 1 or len(jobs) == 1:
         return (run_job(job) for job in jobs)
-    from joblib.parallel import get_active_backend
-
-    if get_active_backend()[0].__class__.__name__ != "LokyBackend":  # somebody's cluster
+    if on_cluster():
         return _in_processes(jobs, n_jobs)
     return _in_threads_and_processes(jobs, n_jobs)
 

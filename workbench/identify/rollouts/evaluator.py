@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import joblib
@@ -17,12 +18,13 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
-from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
+from workbench.identify.rollouts.servo_logs import block_angles, frames, is_log, question_angles
 from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
+from workbench.simulation.cluster import in_blocks, on_cluster
 from workbench.types import Array
 
 
@@ -116,17 +118,17 @@ class RolloutEvaluator:
 
     def _in_threads(self, asked: Sequence[tuple[RolloutRequest, Mapping[int, str]]]) -> Iterator[list[Array] | None]:
         """Angles of logs, by question, each as soon as those before it are there."""
-        def rolled(of: tuple[RolloutRequest, Mapping[int, str]]) -> list[Array] | None:
-            q, takes = of
-            config = replace(self.config, time_step=q.step * self.config.time_step)
-            return log_angles([self.evidence[i] for i in takes], q.model, config, q.horizon)
-
+        wanted = [(q, tuple(takes)) for q, takes in asked]
+        rolled = partial(question_angles, self.evidence, self.config)
         if self.n_jobs == 1 or len(asked) < 2:
-            yield from map(rolled, asked)
+            yield from map(rolled, wanted)
+            return
+        if on_cluster():
+            yield from in_blocks(partial(block_angles, self.evidence, self.config), wanted, self.n_jobs)
             return
         with ThreadPoolExecutor(self.n_jobs) as pool:  # kernels hold no lock
             try:
-                yield from pool.map(rolled, asked)
+                yield from pool.map(rolled, wanted)
             finally:
                 pool.shutdown(cancel_futures=True)
 

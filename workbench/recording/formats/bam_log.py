@@ -25,6 +25,11 @@ _CHANNELS = {"goal_position": "goal", "position": "position", "speed": "velocity
 _REQUIRED = ("timestamp", "position", "goal_position")
 
 
+def _is_calibration(content: Any) -> bool:
+    return isinstance(content, dict) and bool(content) and all(
+        isinstance(of, dict) and "homing_offset" in of for of in content.values())
+
+
 def read_bam_log(path: str | Path) -> Recording:
     """Reads a BAM log: rad, rad/s, volts and degrees Celsius unchanged; the load register becomes `duty`.
 
@@ -36,6 +41,9 @@ def read_bam_log(path: str | Path) -> Recording:
     if not isinstance(content, dict) or not isinstance(content.get("entries"), list) or not content["entries"]:
         keys = ", ".join(map(str, list(content)[:6])) if isinstance(content, dict) else ""
         found = f"one with {keys or 'nothing'}" if isinstance(content, dict) else "another value"
+        if _is_calibration(content):
+            raise InputError(source, "a calibration file of LeRobot (ids, homing offsets and ranges of servos), no recording; "
+                                     "expected a BAM log, a JSON object with a list 'entries'")
         raise InputError(source, f"expected a BAM log, a JSON object with a list 'entries', found {found}")
     entries: list[Any] = content["entries"]
     time = _column(source, entries, "timestamp", True)

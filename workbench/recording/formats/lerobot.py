@@ -97,8 +97,11 @@ def _table(path: Path) -> pa.Table:
             known = parquet.read_schema(regular_file(file, MOST)).names
             missing = [name for name in (_TIME, _ACTION, _STATE) if name not in known]
             if missing:
+                log = any(name.startswith("goal.") for name in known)
+                how = "; of a joint log in parquet, write CSV: pandas.read_parquet(FILE).to_csv('log.csv', index=False)" if log \
+                    else ""
                 raise InputError(file, f"column '{missing[0]}' is missing (found {', '.join(known[:8])}); expected a LeRobot "
-                                       f"data set with {_TIME}, {_ACTION} and {_STATE}")
+                                       f"data set with {_TIME}, {_ACTION} and {_STATE}{how}")
             parts.append(parquet.read_table(file, columns=[_TIME, _ACTION, _STATE, *([_EPISODE] if _EPISODE in known else [])]))
         except (pa.ArrowException, OSError, ValueError) as e:
             if isinstance(e, InputError):

@@ -86,7 +86,11 @@ def _npz_programme(source: str, fields: dict[str, Array], name: str) -> Recordin
     prefix = f"{name}/" if name else ""
     for field, dimensions in _FIELDS.items():
         array = fields.get(prefix + field)
-        if array is None or array.ndim != dimensions:
+        if array is None:
+            found = ", ".join(list(fields)[:8])
+            raise InputError(source, f"no array '{prefix}{field}' (found {found}); expected a SAGE programme with "
+                                     f"{', '.join(_FIELDS)}, or a table as CSV")
+        if array.ndim != dimensions:
             raise InputError(source, f"'{prefix}{field}': expected an array of {dimensions} dimension(s)")
     width = fields[prefix + "q_meas"].shape[1]
     joints = JOINTS if width == len(JOINTS) else tuple(f"joint_{i + 1}" for i in range(width))
