@@ -165,7 +165,8 @@ def test_what_a_heavy_link_carries_on_its_axis_is_asked_about_though_its_joint_c
     def tiers(heavy):
         monkeypatch.setattr(scheduling, "heavy_links", lambda model: heavy)
         return [tier for tier in range(SCHEDULING.tiers)
-                for g in scheduling.groups_to_try(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.fixed_base, tier)[0]
+                for g in scheduling.groups_to_try(search, [trunk, shift], nominal, {well: 3.0, "roll": 3.0}, search.fixed_base,
+                                                  tier)[0]
                 for c in g if c is shift]
 
     assert tiers([link]) == [SCHEDULING.tiers_of_all - 1]
