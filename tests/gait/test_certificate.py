@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
+from workbench.cli.check import check_table_of
+from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
@@ -19,6 +21,8 @@ from workbench.gait.request import Request
 from workbench.gait.second_engine import AS_IT_IS, Condition, conditions, margins
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import gait_table
+from workbench.gait.trim import read_gait, trim
+from workbench.gait.turning import RecordedTurn
 from workbench.motion import Motion, load_motion, save_motion
 from workbench.robot import EffectSpec, puppy_model
 from workbench.view.figures.gait import draw_ranges
@@ -184,3 +188,48 @@ def test_engines_that_disagree_anywhere_break_the_certificate(made):
     assert all(m.use <= 1 for m in good)
     assert broken[0].use > 1
     assert broken[0].where == "friction 0.3, in other"
+
+
+def test_a_binary_table_is_checked_against_the_certificate_beside_it(made, tmp_path, capsys):
+    folder, machine, _, _ = made
+    succeeds(capsys, "export", str(folder / "gait.csv"), "--out", str(tmp_path), "--cycles", "1", "--force")
+    table = str(tmp_path / "motion.table")
+    check_table_of("flash", table, machine.model, force=False)
+    (tmp_path / NAME).write_text((tmp_path / NAME).read_text().replace('"seed": 7', '"seed": 8'))
+    with pytest.raises(InputError, match="was changed after it was written; --force"):
+        check_table_of("flash", table, machine.model, force=False)
+    other = load_motion(folder / "gait.csv").as_table()
+    other = replace(other, dwells_ms=other.dwells_ms + 1)
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(other, machine.model)))
+    (tmp_path / NAME).write_text((folder / NAME).read_text())
+    with pytest.raises(InputError, match="another table's"):
+        check_table_of("flash", table, machine.model, force=False)
+
+
+def test_a_binary_table_without_a_certificate_has_its_limits_checked(made, tmp_path):
+    _, machine, table, _ = made
+    whole = table.whole
+    whole.goals[0, whole.joints.index("flm")] = 1000
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(whole, machine.model)))
+    with pytest.raises(InputError, match="beyond the joint's limit"):
+        check_table_of("flash", str(tmp_path / "motion.table"), machine.model, force=False)
+
+
+def test_a_trimmed_gait_is_certified_for_the_robot_that_was_recorded(made, tmp_path):
+    folder, machine, table, _ = made
+    gait = read_gait(folder / "gait.csv", machine.model)
+    assert gait.shape == table.shape
+    quick = replace(OPTIONS, draws=0, watched=0, variants=("2 ms",))
+    recorded = RecordedTurn(math.radians(12), math.radians(1), 1.0, 8)
+    done = trim(machine, gait, recorded, load_ensemble(), quick, lambda what, done: None)
+    assert done.turn < 0
+    assert abs(done.expected) < math.radians(2)
+    nominal = done.certified.certificate.nominal  # it does not turn by itself, so that it goes the other way
+    assert abs(nominal.heading) < 3  # relative to the request, which includes the opposite turn
+    assert nominal.turning < -1
+    assert done.request.bias == pytest.approx(math.radians(12), abs=math.radians(4))
+    assert "trimmed for a robot that turns by" in done.certified.certificate.request
+    write_gait(tmp_path, done.table, done.certified)
+    again = read_gait(tmp_path / "gait.csv", machine.model)
+    assert again.request == done.request
+    assert again.shape.turn == pytest.approx(gait.shape.turn + done.turn)

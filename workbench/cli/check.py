@@ -79,8 +79,8 @@ def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel
 
 
 def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None:
-    """The same of a binary table, which names no maker: a certificate beside it has to be its own, and without one its limits are
-    checked as those of any motion are. InputError, unless `force`, which warns."""
+    """The same for a binary table, which does not name its maker: a certificate in its folder must be its own; without one, the
+    joints' limits are checked as for any motion. InputError, unless `force`, which warns."""
     from dataclasses import replace
     from pathlib import Path
 
@@ -103,7 +103,7 @@ def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None
         check_certificate(path, Motion.from_table(table), model)
     except InputError as e:
         if not force:
-            raise InputError(e.source, f"{e.problem}; --force goes on all the same") from None
+            raise InputError(e.source, f"{e.problem}; use --force to override") from None
         warn(verb, [str(e)])
 
 

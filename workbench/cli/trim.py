@@ -14,13 +14,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "trim",
         help="straighten a gait for the robot in a recording",
-        description="Reads how much a robot turned by itself from a recording of a certified gait (a metre of walking is "
-        "enough), and writes the same gait with another turn in each stance, certified again: gait.csv, certificate.json and a "
-        "page. The change follows from the recorded heading per metre, its scatter from cycle to cycle, and how the gait "
-        "responds to its turn on the model. Trim the result again with the next recording.")
+        description="Estimates from a recording of a certified gait (a metre of walking is enough) how far the robot turns "
+        "although it should not, and writes the same gait with another turn in each stance, certified again: gait.csv, "
+        "certificate.json and a page. The change follows from the recorded heading per metre, its scatter from cycle to cycle, "
+        "and how the gait responds to its turn on the model. Trim the result again with the next recording.")
     parser.add_argument("recording", metavar="RECORDING", help="of the base's rigid body, walking the gait")
     parser.add_argument("--gait", metavar="MOTION", required=True,
-                        help="the gait.csv that was played, with its certificate beside it")
+                        help="the gait.csv that was played; its certificate is read from the same folder")
     parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the motion is certified "
                         "(default: the file that ships)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a short certificate; 4: the default")

@@ -1,4 +1,4 @@
-"""What a programme planned beside what its table does in simulation: base, feet, joints and every tracked body."""
+"""A planned gait compared with its simulated table: base, feet, joints and every tracked body."""
 
 from __future__ import annotations
 
@@ -134,12 +134,14 @@ def _simulated(machine: GaitMachine, planned: Planned, take: Take, begin: float,
 def _speed(planned: Planned, table: GaitTable, take: Take, cycles: int) -> float:
     """Simulated by planned, over the cycles after the first."""
     assert take.p_WB is not None
-    ends = table.start_seconds + table.period * np.array([1, cycles])
+    ends = np.array([table.start_seconds + table.period * c for c in (1, cycles)])
+    seconds = float(ends[1] - ends[0])
     asked = float(np.hypot(*planned.task.velocity))
     if not asked:
         assert take.quat_WB is not None
         w, x, y, z = take.quat_WB.T
         heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
-        return abs(float(np.diff(np.interp(ends, take.time, heading))[0] / np.diff(ends)[0] / planned.task.turn_rate))
-    gone = [float(np.diff(np.interp(ends, take.time, take.p_WB[:, i]))[0]) for i in (0, 1)]
-    return float(np.hypot(gone[0], gone[1]) / np.diff(ends)[0] / asked)
+        turned = np.interp(ends, take.time, heading)
+        return abs(float(turned[1] - turned[0]) / seconds / planned.task.turn_rate)
+    x, y = (np.interp(ends, take.time, take.p_WB[:, i]) for i in (0, 1))
+    return float(np.hypot(x[1] - x[0], y[1] - y[0])) / seconds / asked

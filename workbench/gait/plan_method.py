@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,6 +25,11 @@ class Plans:
     solved: Mapping[Offsets, Planned] = field(default_factory=dict)
     shapes: tuple[GaitShape, ...] = ()
     asked: int = 0
+
+    def with_refined(self, before: GaitShape, after: GaitShape) -> Plans:
+        """With the programme behind one shape also behind another that was refined from it."""
+        planned = self.of(before)
+        return self if planned is None else replace(self, solved={**self.solved, after.offsets: planned})
 
     def of(self, shape: GaitShape) -> Planned | None:
         """The programme behind a shape; None of one that was not planned."""
@@ -61,8 +66,8 @@ def chosen(evaluator: Evaluator, plans: Plans, progress: Progress) -> Found | No
 
 
 def told_of_plan(c: Candidate, plans: Plans) -> dict[str, object]:
-    """What a certificate says of the programme behind a gait: its task, and the share of the planned speed that the nominal robot
-    has [m/s, for a turn in place rad/s]; nothing of a gait that was not planned."""
+    """The certificate's entry for the programme behind a gait: its task, planned speed [m/s, for a turn in place rad/s], and the
+    share of it that the nominal robot reaches; empty for a gait that was not planned."""
     planned = plans.of(c.shape)
     if planned is None or c.nominal is None:
         return {}

@@ -15,12 +15,12 @@ from workbench.gait.table import paths_of
 from workbench.gait.trajopt import Planned, Task, plan
 
 MODEST, MODEST_TURN = 0.2, 0.5
-"""Speeds [m/s, rad/s] of seeds where a request says none: CMA-ES goes on from there."""
+"""Speeds [m/s, rad/s] of seeds where a request has none: CMA-ES continues from there."""
 PLANNED = ((2.4, 1.0), (2.4, 1.2), (3.0, 1.0), (3.0, 1.2), (3.0, 1.4))
 """Frequencies [Hz] and shares of the required speed of the programmes that a request is planned by; tables go a tenth slower than
 their plans."""
 LIFT, CROUCH = 0.11, 0.15
-"""By leg length: low enough that bent hind knees keep their range with what the inverse servo law asks beyond."""
+"""By leg length: low enough that bent hind knees keep their range with the lead that the inverse servo law adds."""
 
 
 def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ...]:
@@ -36,8 +36,8 @@ def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ..
 
 
 def table_shape(machine: GaitMachine, planned: Planned) -> GaitShape:
-    """The shape whose table goes through the programme's own joint path, a pose for each knot: offsets are what the path differs
-    from the nearest foot path by. Goals lead by the inverse servo law, as those of any shape do."""
+    """The shape whose table goes through the programme's own joint path, a pose for each knot: offsets are the difference
+    from the nearest foot path. Goals lead by the inverse servo law, as those of any shape do."""
     shape = replace(planned.shape, poses=len(planned.q), lead=1.0, offsets=())
     (paths,) = paths_of(machine, [shape])
     extra = np.roll(planned.q, -1, axis=0) - paths.q  # a cycle's poses begin to arrive a knot after its start

@@ -25,11 +25,11 @@ class Request:
 
     way: "forward", "backward", "sideways", "turn" (in place) or "arc" (forward, curved); the last three to the left, or with
     `right` to the right. speed: at least that much [m/s, for a turn rad/s]; None: as fast as possible. radius: of an arc [m], of
-    nothing else. slope: uphill [rad], negative downhill, within 60 deg. aim: what is optimised once all limits and the speed are
-    kept: "speed", "gentleness" (largest RMS torque by its limit), "energy" (electrical power) or "smoothness" (jerk of the base);
-    all but "speed" need a speed. built_knees: whether knees bend only as in the robot's neutral pose. bias: change of heading by
-    distance [rad/m], to the left, that the robot at hand has of its own: a motion that is trimmed for it turns by as much to the
-    other side on a robot that has none. limits: to keep.
+    nothing else. slope: uphill [rad], negative downhill, within 60 deg. aim: quantity that is optimised once all limits and the
+    speed are kept: "speed", "gentleness" (largest RMS torque by its limit), "energy" (electrical power) or "smoothness" (jerk of
+    the base); all but "speed" need a speed. built_knees: whether knees bend only as in the robot's neutral pose. bias: change of
+    heading by distance [rad/m], to the left, that the robot at hand has of its own: a motion that is trimmed for it turns by as
+    much to the other side on a robot that has none. limits: to keep.
     """
 
     way: Way = "forward"
@@ -58,7 +58,7 @@ class Request:
         if not abs(self.bias) < math.inf or (self.bias and self.way == "turn"):
             raise InputError(None, f"bias: expected a finite number, and none of a turn in place, got {self.bias:g}")
         if self.speed is None and self.aim != "speed":
-            raise InputError(None, f"what is made best is {self.aim}: expected a speed to keep")
+            raise InputError(None, f"the aim is {self.aim}: expected a speed to keep")
 
     def to_plain(self) -> dict[str, Any]:
         """Plain types, for a certificate."""

@@ -1,4 +1,4 @@
-"""How far runs of a gait are from what a request requires, and the cost that a search makes small."""
+"""Distance of a gait's runs from the requirements of a request, and the cost that a search minimises."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ def direction_margins(request: Request, m: GaitMeasure) -> list[Margin]:
 
 
 def drift(request: Request, m: GaitMeasure) -> float:
-    """Change of heading by distance beyond what the request requires [rad/m]; of a turn, 0."""
+    """Change of heading by distance in excess of the request's [rad/m]; of a turn, 0."""
     if request.way == "turn":
         return 0.0
     return excess_turning(request, m) / max(abs(request.progress(m)), SLOWEST)
 
 
 def excess_turning(request: Request, m: GaitMeasure) -> float:
-    """Rate of turning beyond what the request requires [rad/s], to the left; of a turn, 0."""
+    """Rate of turning in excess of the request's [rad/s], to the left; of a turn, 0."""
     if request.way == "turn":
         return 0.0
     return m.turn_rate - curvature(request) * max(abs(request.progress(m)), SLOWEST)
@@ -79,7 +79,7 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
 
 
 def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, Any]) -> list[Margin]:
-    """The required speed again, less what the step moves it. floor: of a certificate."""
+    """The required speed again, after subtracting the numerical floor of the time step. floor: of a certificate."""
     if request.speed is None:
         return []
     surely = request.progress(nominal) - float(floor["steps"])
@@ -87,7 +87,7 @@ def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, An
 
 
 def cost(machine: GaitMachine, request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> float:
-    """What is made small among gaits that keep all limits, without unit: speed by the robot's natural one, power by weight times
+    """Cost of gaits that keep all limits, to be minimised, without unit: speed by the robot's natural one, power by weight times
     that, jerk by gravity times that by leg length, RMS torque by its limit; and how much headings differ over draws."""
     spread = SPREAD_COST * heading_spread(request, nominal, draws)
     natural, gravity = machine.natural_speed, GRAVITY

@@ -1,4 +1,4 @@
-"""A gait straightened for one robot: how its `turn` acts, and what is left of its heading after a metre or three."""
+"""A gait straightened for one robot: its response to `turn`, and its residual heading after one metre and after three."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from workbench.gait.turning import LEAST_SD, TurnEstimate, rms
 from workbench.robot import RobotModel
 
 PROBE = 0.02
-"""Change of `turn` [rad] to either side, by whose effect on the nominal robot the gain is told."""
+"""Change of `turn` [rad] to either side, from whose effect on the nominal robot the gain is computed."""
 METRES = 3
 """How many are recorded, one after the other, each with the motion that the one before led to."""
 LONGEST = 8.0
@@ -97,8 +97,8 @@ class Straightener:
 
 
 def trim_margin(request: Request, walks: Sequence[tuple[float, ...]]) -> Margin:
-    """Of what is left of headings after METRES recorded metres. walks: as `Straightener.robots` gives them; none where the gait
-    does not answer to its turn."""
+    """Limit on the residual heading after METRES recorded metres. walks: as `Straightener.robots` returns them; none where the
+    gait does not respond to its turn."""
     name, allowed = f"drift after {METRES} recorded metres", math.degrees(request.limits.trimmed)
     left = [math.degrees(w[METRES]) for w in walks if len(w) > METRES]
     if not left:
@@ -107,7 +107,7 @@ def trim_margin(request: Request, walks: Sequence[tuple[float, ...]]) -> Margin:
 
 
 def told(walks: Sequence[tuple[float, ...]], gain: float) -> dict[str, Any]:
-    """What a certificate says of straightened robots. walks: as `Straightener.robots` gives them [rad/m]."""
+    """The certificate's entry for straightened robots. walks: as `Straightener.robots` gives them [rad/m]."""
     every = {n: [math.degrees(w[n]) for w in walks if len(w) > n] for n in (0, 1, METRES)}
     return {"robots": len(walks), "fell while they were straightened": sum(len(w) <= METRES for w in walks),
             "gain 1/m": gain, "untrimmed deg/m RMS": rms(every[0]), "after one metre deg/m RMS": rms(every[1]),

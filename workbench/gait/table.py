@@ -16,7 +16,7 @@ from workbench.types import Array
 
 WAYS = (600, 150)
 """Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.6 s are 1.2 rad/s, a fifth of
-what the servos reach, so that the robot is not thrown. Search and certificate play the same bytes."""
+the servos' fastest, so that the robot is not thrown. Search and certificate play the same bytes."""
 HALF = 0.5
 """Size of strides and lifts in the first and the last cycle."""
 
@@ -36,7 +36,7 @@ class GaitTable:
 
     @property
     def whole(self) -> PoseTable:
-        """What is played from power-on to standstill, as one table of three sections: what a certificate speaks of."""
+        """The motion from power-on to standstill as one table of three sections, which is the one that is certified."""
         return PoseTable.in_sections(self.start, self.cycle, self.stop)
 
     def commands(self, cycles: int, whole: bool = False) -> Commands:
@@ -94,7 +94,7 @@ def _paths(shape: GaitShape, every: Array, off: Array, stances: NDArray[np.bool_
 
 
 def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool = True) -> GaitTable:
-    """`gait_table` of paths that are known. led: whether goals are ahead of the angles by what the inverse servo law requires;
+    """`gait_table` of paths that are known. led: whether goals lead the angles as the inverse servo law requires;
     that takes most of the time, and no path that feet cannot reach is worth it."""
     shape, q, small, stand = paths.shape, paths.q, paths.small, paths.stand
     goals = _within(machine, q, q + shape.lead * machine.droop(shape, q, paths.stance)) if led and shape.lead else q
@@ -110,7 +110,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
-    """Goals no farther than joints turn, unless the path itself is: what is commanded beyond the angles ends there."""
+    """Goals no farther than joints turn, unless the path itself is: a lead beyond the angles ends there."""
     lower, upper = machine.bounds
     half = np.array([u.count for u in machine.units]) / 2
     return np.clip(goals, np.minimum(q, lower + half), np.maximum(q, upper - half))
@@ -132,7 +132,7 @@ def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np
 
 
 def joined(parts: list[PoseTable], source: str) -> PoseTable:
-    """One table without sections, of the poses of all parts in turn; of the same joints."""
+    """One table without sections: the poses of one part after the other, all of the same joints."""
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
     return PoseTable(first.joints, goals, speeds, dwells, source, first.units)

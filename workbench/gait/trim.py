@@ -34,7 +34,7 @@ SEED = 2_000_000
 
 @dataclass(frozen=True)
 class Gait:
-    """A certified gait. shape: in numbers; request: what it was certified for."""
+    """A certified gait: its shape in numbers, and the request it was certified for."""
 
     shape: GaitShape
     request: Request
@@ -43,7 +43,7 @@ class Gait:
 
 @dataclass(frozen=True)
 class Trimmed:
-    """recorded: what the recording shows. estimate: of the robot after it, before it was trimmed. turn: the change of `turn` that
+    """recorded: turning in the recording. estimate: of the robot after it, before it was trimmed. turn: the change of `turn` that
     was made [rad]. request: that of the trimmed motion; table and certified: the motion."""
 
     recorded: RecordedTurn
@@ -69,8 +69,8 @@ class Trimmed:
 
 
 def read_gait(motion: str | Path, model: RobotModel) -> Gait:
-    """The gait beside whose motion its certificate lies. InputError where there is none, it is another robot's, or it does not
-    hold what is needed to make the motion again."""
+    """The gait beside whose motion its certificate lies. InputError where there is none, it belongs to another robot, or
+    shape or request are missing from it."""
     at = Path(motion).parent / NAME
     certificate = read_certificate(at)
     if certificate.model_sha256 != model.sha256:
@@ -83,7 +83,7 @@ def read_gait(motion: str | Path, model: RobotModel) -> Gait:
 
 
 def turn_in(recording: str | Path, model: RobotModel, period: float) -> RecordedTurn:
-    """What a recording of the base's rigid body says. period: of the gait's cycle [s]. InputError where it cannot be read, does
+    """Turning in a recording of the base's rigid body. period: of the gait's cycle [s]. InputError where it cannot be read, does
     not show the base, or is too short."""
     read = read_recording(recording)
     if read.sensing != "mocap":

@@ -1,4 +1,4 @@
-"""How much a robot turns by itself, from one recording or several, and the turn in each stance that cancels it."""
+"""A robot's own turning, estimated from one recording or several, and the turn in each stance that cancels it."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def recorded_turn(time: Array, p: Array, heading: Array, period: float, source: 
 
 @dataclass(frozen=True)
 class TurnEstimate:
-    """What is known of one robot: heading by distance [rad/m] is bias plus gain times the change of `turn` [rad].
+    """Model of one robot: heading by distance [rad/m] is bias plus gain times the change of `turn` [rad].
 
     mean: (bias, gain), covariance (2, 2). Both begin at the ensemble's and the nominal robot's."""
 
@@ -93,7 +93,7 @@ class TurnEstimate:
 
     @property
     def bias(self) -> tuple[float, float]:
-        """What the robot turns by itself, and its standard deviation [rad/m]."""
+        """The robot's own turning and its standard deviation [rad/m]."""
         return float(self.mean[0]), float(np.sqrt(self.covariance[0, 0]))
 
 
