@@ -46,4 +46,4 @@ def test_a_session_that_verbs_would_refuse_is_no_success(robot: workbench.RobotM
     (tmp_path / "log.csv").write_text(joint_log(*swing(), joint="knee"))
     assert main(["inspect", str(path)]) == 0
     (tmp_path / "log.csv").write_text(joint_log(*swing(), joint="knee")[:60])
-    assert "take 'one' cannot be used" in refused(capsys, "inspect", str(path))
+    assert "none of its takes can be used" in refused(capsys, "inspect", str(path))

@@ -43,8 +43,8 @@ def wider_limits(model: RobotModel, found: Survey) -> tuple[str, ...]:
 
 
 def set_up(bus: Bus, model: RobotModel, found: Survey) -> Iterator[str]:
-    """Writes what differs, servo by servo, and yields a line for each register. BusError where a servo has its torque on, as its
-    EEPROM cannot be written then or the robot may move, or where a register does not keep what was written."""
+    """Writes the differing registers, servo by servo, and yields a line for each. BusError where a servo has its torque on, as
+    its EEPROM cannot be written then or the robot may move, or where a register does not keep the written value."""
     on = [servo for servo in found.found.values() if servo.joint and servo.registers.get("torque_enable")]
     if on:
         raise BusError("its torque is on; switch the robot off and on before its registers are written", on[0].id, on[0].joint)

@@ -23,7 +23,7 @@ from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
-from workbench.identify.results.unknown_torque import UnknownTorque, said
+from workbench.identify.results.unknown_torque import UnknownTorque, list_arguments
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
@@ -123,7 +123,7 @@ class Explanation:
         depends_on, probability = p.unnamed_instead((c.name, c.where))
         if probability < CONCLUSIONS.worth_an_experiment:
             return ""
-        return f" Or ({probability:.2f}) a torque that depends on {said(depends_on)}, which no known effect describes."
+        return f" Or ({probability:.2f}) a torque that depends on {list_arguments(depends_on)}, which no known effect describes."
 
     def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
         """Torques of the likeliest model that no effect describes, by joint."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from workbench.recording.servo_log.following import JointLog
-from workbench.recording.servo_log.response import Response, fitted, shapes
+from workbench.recording.servo_log.response import Response, fit_response, shapes
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
     if np.rad2deg(np.ptp(log.goal)) < c.goes:
         return
     shaped = shapes(log.time, log.goal)
-    fit = fitted(shaped, log.position)
+    fit = fit_response(shaped, log.position)
     asked, seen = np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))
     if seen < c.moves * asked and fit.explained < c.follows:
         yield (f"does not follow goal.{log.name}: it moves over {seen:.3g} deg where the goal moves over {asked:.3g} deg: torque "
