@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.command import refused, succeeds
+from tests.command import main, refused, succeeds
 from tests.gap_sessions import MOTION, record_arm, write_session
 from tests.shared_data import shared
 from workbench.robot import data_file
