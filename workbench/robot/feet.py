@@ -56,8 +56,8 @@ def foot_points(model: RobotModel) -> dict[str, Points]:
 
 
 def tips(model: RobotModel) -> dict[str, Array]:
-    """Of each link that carries no other, the middle of what is farthest from its origin (3,) [m] in its frame: of its collision
-    shapes, else twice the way to its centre of mass."""
+    """The tip (3,) [m] of each link without a child, in its frame: the mean of its collision points farthest from its origin,
+    else twice its centre of mass."""
     k = model.kinematics
     shapes, carrying = _shapes(model.path), {frame.parent for frame in k.frames.values()}
     out = {}
