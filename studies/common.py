@@ -73,7 +73,7 @@ def png(figure: Figure) -> bytes:
 
 
 def publish(out: Path, model: RobotModel, report: Report, numbers: Mapping[str, object], figures: Mapping[str, Figure]) -> str:
-    """index.html, numbers.json and the figures as PNG: all of them, or none. Returns what was written.
+    """index.html, numbers.json and the figures as PNG: all of them, or none. Returns the paths.
 
     InputError if the model's file has changed since `model` was made: its runs are then of two robots.
     """

@@ -1,4 +1,4 @@
-"""What is recorded of a robot: stand, sway and walk before cameras, or logs of its own joints; and what is to be foretold."""
+"""The recordings of a robot: stand, sway and walk before cameras, or logs of its own joints; and the takes to be predicted."""
 
 from __future__ import annotations
 

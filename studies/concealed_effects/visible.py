@@ -1,4 +1,4 @@
-"""Does it show? A robot with something hidden beside the same robot without, in what would be recorded."""
+"""Is it observable? The recordings of a robot with something hidden, compared with the same robot without it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.robot import RobotModel
 from workbench.types import Array
 
 COARSE, FINE = 1e-3, 5e-4
-"""Steps [s]: of the search, and of what is recorded."""
+"""Steps [s]: of the search, and of the recordings."""
 ROTATION_NOISE = float(np.deg2rad(0.12) * np.sqrt(6))
 """Of the angle between two rigid bodies, three axes each [rad]."""
 POSITION_NOISE = 1e-4 * np.sqrt(3)

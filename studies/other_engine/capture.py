@@ -1,4 +1,4 @@
-"""What a motion capture system (OptiTrack) sees of a run."""
+"""Observation of a run by a motion capture system (OptiTrack)."""
 
 from __future__ import annotations
 

@@ -57,8 +57,8 @@ class SeriesJoint:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the robot stands in. friction: of all feet, None where `ground` says it; gravity (3,) [m/s²] and tether (3,) [N], a
-    steady force on the root link's origin, in the world; step: x [m] from which on the floor is higher, and by what [m]."""
+    """The robot's surroundings. friction: of every foot, None to use `ground`; gravity (3,) [m/s²] and tether (3,) [N], a steady
+    force on the root link's origin, in the world; step: x [m] from which on the floor is higher, and its height [m]."""
 
     ground: Ground
     friction: float | None = None
@@ -125,7 +125,7 @@ class Description:
         return Description(tuple(changed if l.name == changed.name else l for l in self.links), self.joints)
 
     def lowest(self) -> float:
-        """Height of the lowest point of all contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""
+        """Height of the lowest point of the contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""
         poses = {self.root.name: (np.zeros(3), np.eye(3))}
         for link in self.links[1:]:
             p, R = poses[link.parent]

@@ -1,6 +1,6 @@
-"""MuJoCo's system identification toolbox (`mujoco.sysid`) on one joint's friction: what the workbench's own fit is set beside.
+"""MuJoCo's system identification toolbox (`mujoco.sysid`) on one joint's friction, for comparison with the workbench's own fit.
 
-The robot is that of `to_mjcf` with the servo law as MuJoCo's own actuators. All is left at the toolbox's defaults (its own
+The robot is that of `to_mjcf` with the servo law as MuJoCo's own actuators. All settings are the toolbox's defaults (its own
 optimiser, differences batched in one call of `mujoco.rollout`, a compiled model for each point), but for one thread.
 """
 
@@ -40,7 +40,7 @@ HIGHEST = 1.5, 2.0
 
 @dataclass(frozen=True)
 class Identified:
-    """What the toolbox says. friction: Coulomb [N m] and viscous [N m s/rad]; residual: RMS over joints and time [rad];
+    """Result of the toolbox. friction: Coulomb [N m] and viscous [N m s/rad]; residual: RMS over joints and time [rad];
     rollouts: how many were made."""
 
     friction: tuple[float, float]

@@ -22,7 +22,7 @@ class Baseline:
     offset: Array
 
     def position(self, p: Programme) -> Array:
-        """What it says of a programme (N, 6)."""
+        """Prediction for a programme (N, 6)."""
         return np.column_stack([self.gain[i] * _late(p, i, self.delay[i]) + self.offset[i] for i in range(p.sent.shape[1])])
 
 

@@ -48,6 +48,6 @@ def errors(programmes: Sequence[Programme], paths: Mapping[str, Array], unit: Ar
 
 
 def together(each: Array, programmes: Sequence[Programme]) -> Array:
-    """RMS over all programmes (6,), every frame alike."""
+    """RMS over all programmes (6,), every frame with the same weight."""
     n = np.array([len(p.time) for p in programmes])[:, None]
     return np.asarray(np.sqrt((np.square(each) * n).sum(axis=0) / n.sum()))

@@ -98,7 +98,7 @@ class Clock:
 
 
 def clock(programmes: list[Programme]) -> Clock:
-    """What the stamps say."""
+    """Information from the time stamps."""
     steps = np.concatenate([np.diff(p.time) for p in programmes])
     period = float(np.median(steps))
     whole = sum(p.time[-1] - p.time[0] for p in programmes) / sum((len(p.time) - 1) / NOMINAL_RATE for p in programmes)

@@ -1,4 +1,4 @@
-"""How each joint stands: what error stays after which approach under which load, and what the current register says of it."""
+"""Each joint at rest: the remaining error by approach and load, and the reading of the current register."""
 
 from __future__ import annotations
 

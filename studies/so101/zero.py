@@ -1,4 +1,4 @@
-"""Whether the URDF's zeros and signs are the recordings': what gravity does, with each joint's zero moved, against what is seen.
+"""Whether the URDF's zeros and signs are the recordings': predicted gravity, with each joint's zero moved, against the recorded.
 
 As in `response`, without a constant: a servo has none beyond a count, and gravity over a narrow range of poses looks like one.
 """
@@ -31,7 +31,7 @@ class Zero:
 
 
 def zeros(training: Sequence[Rows], arm: Kinematics, seed: int = 0) -> list[Zero]:
-    """Of the joints that gravity turns, one offset at a time, judged by the errors of all three."""
+    """For the joints that gravity turns, one offset at a time, judged by the errors of all three."""
     rng = np.random.default_rng(seed)
     draws = rng.integers(0, len(training), (DRAWS, len(training)))
     out = []
@@ -61,7 +61,7 @@ def _moments(r: Rows, arm: Kinematics, moved: str, offset: float, i: int) -> Arr
 
 
 def _cost(moments: Array) -> Array:
-    """What is left of the squares (offsets,), over the three joints' own squares, of moments (offsets, 3, 5, 5)."""
+    """Residual sum of squares (offsets,), over the three joints' own squares, of moments (offsets, 3, 5, 5)."""
     out = np.zeros(len(moments))
     for k, joints in enumerate(moments):
         for m in joints:

@@ -35,7 +35,7 @@ def xl330(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes page, figures and numbers."""
     began = time.monotonic()
     if not DATA.is_dir():
-        raise InputError(DATA, "is missing: the recordings lie beside the project, not in it")
+        raise InputError(DATA, "is missing: this study needs recordings that are not distributed")
     found, models = find_logs(DATA), {m: published(DATA, m) for m in MODELS}
     left_out = GAINS[1:2] if quick else GAINS
     logs = bam.even(found)
@@ -57,7 +57,7 @@ def xl330(out: Path, quick: bool, progress: Progress) -> str:
 
 
 def _diagnosed(folder: Path, logs: list[Log], m1: dict[str, float], gain: int, quick: bool, progress: Progress) -> Diagnosed:
-    """The other gains' logs diagnosed, and what that is worth at this one. quick: without the diagnosis."""
+    """Diagnosis of the other gains' logs, and its error on this one. quick: without the diagnosis."""
     session = load_session(write_session(folder, logs, m1, [gain]))
     began = time.monotonic()
     told = None

@@ -1,4 +1,4 @@
-"""Figures of the rig: what its logs show before any model, and models beside the gain that they did not see."""
+"""Figures of the rig: features of its logs before any model, and predictions of models for the gain that they did not see."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ class Fitted:
 
 def fit_all(problems: Sequence[Problem], rollout: Rollout, position: Array, neutral: Mapping[str, float],
             iterations: int = ITERATIONS) -> list[Fitted]:
-    """Fits each problem to the positions (T, L) [rad] of its logs. neutral: what a number is that a problem does not have."""
+    """Fits each problem to the positions (T, L) [rad] of its logs. neutral: value of a parameter that a problem does not have."""
     names = tuple(dict.fromkeys([n.name for p in problems for n in p.numbers]))
 
     def residuals(sets: Sequence[tuple[int, Array]]) -> list[Array]:

@@ -37,7 +37,7 @@ SDF = """<?xml version="1.0"?>
 
 @dataclass(frozen=True)
 class Log:
-    """One recorded log. gain: the firmware's position gain; programme: what it was told to do."""
+    """One recorded log. gain: the firmware's position gain; programme: its command."""
 
     path: Path
     gain: int
@@ -51,7 +51,7 @@ class Log:
         return f"{self.programme}_{self.gain}"
 
     def read(self) -> Recording:
-        """What the file holds."""
+        """Contents of the file."""
         return read_recording(self.path)
 
 
@@ -120,7 +120,7 @@ def _named(recording: Recording) -> dict[str, Array]:
 
 
 def full_duty(logs: Sequence[Log]) -> tuple[float, float, int]:
-    """What the logs say of the supply [V]: median while the motor is idle, median while it stands at full duty, and rows of the
+    """Supply voltage in the logs [V]: median while the motor is idle, median while it is stalled at full duty, and rows of the
     latter."""
     idle: list[Array] = []
     full: list[Array] = []

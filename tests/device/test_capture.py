@@ -174,7 +174,7 @@ def test_a_stream_that_starts_anew_ends_the_recording(tmp_path):
         return False
 
     capture = record_take(Recorder(link), tmp_path / "take.csv", until, 10.0)
-    assert any("started anew or plays back" in problem for problem in capture.problems)
+    assert any("restarted or plays back" in problem for problem in capture.problems)
     assert 200 < capture.counts.received < 300
 
 

@@ -119,7 +119,7 @@ def test_the_observer_finds_the_bias_and_its_own_doubt() -> None:
 
 
 def test_a_robot_that_the_cameras_lost_is_stopped() -> None:
-    controller = CycleController(WayPath([(3.0, 0.0)]), MAP, PERIOD, DriveOptions(lost=3))
+    controller = CycleController(WayPath([(3.0, 0.0)]), MAP, PERIOD, DriveOptions(blind=3 * PERIOD))
     context = controller.CreateDefaultContext()
     stops = []
     for _ in range(4):

@@ -1,4 +1,4 @@
-"""What a motion asks of the servos, and how far they are from what they cannot give."""
+"""The load of the servos in a motion, and their margins of torque and speed."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ class ServoLoad:
 
 
 def motor_torque(servos: Sequence[ServoConstants], torque: Array, v: Array, a: Array, friction: bool = True) -> Array:
-    """What motor and gear must give, back-EMF taken off, so that `torque` (N, n) [N m] reaches the links:
-    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), the last fading
+    """Torque that motor and gear must give, after back-EMF, so that `torque` (N, n) [N m] reaches the links:
+    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), which fades to zero
     below CREEP (docs/formats.md, section 4)."""
     inertia, viscous, coulomb = (_row(servos, key) for key in ("reflected_inertia", "viscous_friction", "coulomb_friction"))
     needed = torque + inertia * a

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +21,19 @@ from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm, nominal_terms
 from workbench.types import Array
 
+KEPT_BUILDS = 64
+"""Changed descriptions that are kept: more than a fit looks at side by side."""
+
 
 @dataclass(frozen=True)
 class Physics:
-    """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
+    """Nominal physics and effects together. build: the changed SDF, None where it is the model's file. foot_friction: pair
     coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
     tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
-    hard ends were added, which continuous plants ignore. terms: of the servos, by effects."""
+    hard ends were added, which continuous plants ignore. terms: of the servos, by effects. retimed: whether a servo's delay or
+    an effect changes when commands are heard, or which."""
 
-    description: str | None
+    build: SdfRobot | None
     law: ServoLaw
     ground: Ground
     foot_friction: Mapping[str, float]
@@ -38,6 +45,12 @@ class Physics:
     moved: bool
     ends: bool
     terms: tuple[ServoTerm, ...] = ()
+    retimed: bool = True
+
+    @cached_property
+    def description(self) -> str | None:
+        """SDF text, None where it is the model's file."""
+        return None if self.build is None else self.build.text()
 
     @property
     def servo_terms(self) -> tuple[ServoTerm, ...]:
@@ -69,12 +82,14 @@ def physics_of(model: RobotModel) -> Physics:
     friction: dict[str, float] = {}
     stiffness: float | None = None
     terms: list[ServoTerm] = []
-    sdf: SdfRobot | None = None
+    changes: list[tuple[Effect, EffectSpec]] = []
+    retimed = any(model.servo(j).goal_delay > 0 for j in model.joints)
     for effect, spec, values in resolved(model):
         columns = _columns(model, spec)
         law = effect.law(law, columns, values)
-        term = effect.servo_term(np.isin(model.joints, spec.where), values)
-        terms += [] if term is None else [term]
+        if type(effect).servo_term is not Effect.servo_term:
+            term = effect.servo_term(np.isin(model.joints, spec.where), values)
+            terms += [] if term is None else [term]
         ground = effect.ground(ground, values)
         gravity = effect.gravity(gravity, values)
         zero[columns] += effect.zero(values)
@@ -83,12 +98,34 @@ def physics_of(model: RobotModel) -> Physics:
         stiffness = stiffness if soft is None else soft
         if slip is not None:
             friction |= dict.fromkeys(spec.where, slip)
+        retimed |= type(effect).commands is not Effect.commands
         if type(effect).description is not Effect.description:
-            sdf = sdf or SdfRobot(model.path)
-            effect.description(sdf, spec, model)
-    return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
+            changes.append((effect, spec))
+    sdf = _changed(model, changes) if changes else None
+    return Physics(sdf, law, ground, friction, stiffness, gravity, tether, zero,
                    sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends,
-                   tuple(terms))
+                   tuple(terms), retimed)
+
+
+_builds: OrderedDict[Any, SdfRobot] = OrderedDict()
+
+
+def _changed(model: RobotModel, changes: Sequence[tuple[Effect, EffectSpec]]) -> SdfRobot:
+    """The model's SDF with these effects on its description; the same object for the same ones, as most robots of a search differ
+    in their servos alone. Another package's effect may look at all of the model, so that nothing is shared with it."""
+    own = all(type(effect).__module__.startswith(f"{__package__}.") for effect, _ in changes)
+    said = tuple((s.effect, s.where, tuple(s.parameters.items())) for _, s in changes)
+    key = (model.path, model.path.stat().st_mtime_ns, said)
+    if own and (known := _builds.get(key)) is not None:
+        return known
+    sdf = SdfRobot(model.path)
+    for effect, spec in changes:
+        effect.description(sdf, spec, model)
+    if own:
+        _builds[key] = sdf
+        while len(_builds) > KEPT_BUILDS:
+            _builds.popitem(last=False)
+    return sdf
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -39,8 +40,8 @@ class SdfRobot:
     def __init__(self, path: Path) -> None:
         self.path, self.source = path, named(path)
         ElementTree.register_namespace("drake", "http://drake.mit.edu")
-        self._tree = ElementTree.parse(path)
-        model = self._tree.getroot().find("model")
+        self.root = deepcopy(_parsed(path, path.stat().st_mtime_ns))
+        model = self.root.find("model")
         if model is None:
             raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
         self._model = model
@@ -53,7 +54,7 @@ class SdfRobot:
         for uri in self._model.iter("uri"):
             if uri.text and "://" not in uri.text:  # of a text without a file Drake takes neither relative nor absolute paths
                 uri.text = f"file://{(self.path.parent / uri.text.strip()).resolve()}"
-        return ElementTree.tostring(self._tree.getroot(), encoding="unicode")
+        return ElementTree.tostring(self.root, encoding="unicode")
 
     def add_play(self, joint: str, gap: float) -> None:
         """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""
@@ -224,6 +225,12 @@ class SdfRobot:
         if inertial is None:
             raise InputError(self.source, f"link '{link}' has no <inertial>, to which mass could be added")
         return inertial
+
+
+@lru_cache(maxsize=8)
+def _parsed(path: Path, changed: int) -> Element:
+    """The root of a file, which has to be copied; changed: when the file was, so that it is read again."""
+    return ElementTree.parse(path).getroot()
 
 
 def _parallel(mass: float, d: Array) -> Array:

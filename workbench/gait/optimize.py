@@ -48,13 +48,13 @@ MEMORY = ".rollouts.jsonl"
 IN_HAND = 0.05
 """By which a search goes beyond the required speed, which the certificate asks for after its numerical floor."""
 DRIFT_SOUGHT = 10.0
-"""Times the drift allowed on the nominal robot that a search allows itself: what a gait turns evenly is trimmed afterwards."""
+"""Multiple of the drift limit on the nominal robot that a search allows: a steady turn is trimmed afterwards."""
 SCREENED = 1_000_000
 """Seed of the finalists' robots, beyond those of searches and certificates."""
 FIRST_LOOK = Budget(seeds=60, screened=6, starts=2, generations=4, draws=4)
-"""Beside a refusal: what works instead, in half a minute."""
+"""Effort of the search for an achievable value after a refusal, half a minute."""
 BRIEFLY = CertifyOptions(draws=8, checked=0, seconds=3.0, floor_seconds=1.5, variants=("2 ms", "1 ms", "0.5 ms"))
-"""How the nearest table beside a refusal is examined at most, so that a refusal comes within a minute."""
+"""Reduced examination of the nearest table after a refusal, so that a refusal comes within a minute."""
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,11 @@ class OptimizeOptions:
 class Optimized:
     """Result of a search.
 
-    request: what was searched for. met: whether the gait keeps every limit and the required speed. problem: where it does not, in
-    a line: which limit binds, and what works. table: poses in counts and milliseconds (`cycle`, `start` from neutral, `stop`);
-    certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every limit, or
-    None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was needed.
-    plan: of a planned gait, what was planned beside what it does.
+    request: that was searched. met: whether the gait keeps every limit and the required speed. problem: where it does not, in
+    a line: the binding limit, and the achievable value. table: poses in counts and milliseconds (`cycle`, `start` from neutral,
+    `stop`); certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every
+    limit, or None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was
+    needed. plan: of a planned gait, its plan and its motion.
     """
 
     request: Request
@@ -161,7 +161,7 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
 
 
 def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
-    """What a method finds; None where nothing was planned that has a table."""
+    """Result of a method; None where no plan led to a table."""
     if options.method == "plan":
         return chosen(evaluator, plans, progress)
     if options.planned:
@@ -237,7 +237,7 @@ def walk_speed(model: RobotModel) -> float:
 
 
 def robotis_walk(model: RobotModel) -> GaitMeasure:
-    """What the ROBOTIS walk does on this robot in six seconds. InputError for a robot that has not its joints."""
+    """The ROBOTIS walk on this robot in six seconds. InputError for a robot that does not have its joints."""
     try:
         motion = load_motion(data_file(WALK), model)
     except InputError:
@@ -258,7 +258,7 @@ def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Pat
 
 
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:
-    """In a line: what binds, by how much, and what works."""
+    """One line: the binding limit, its excess, and the achievable value."""
     said = f"{request}: not met"
     limit = binding(_without_speed(margins))
     if limit is not None:

@@ -22,7 +22,7 @@ from workbench.identify.estimators.geometry import Geometry, geometry_of
 from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
-from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -76,10 +76,10 @@ class _Settings:
     @property
     def options(self) -> EvidenceOptions:
         """Of the search of servo logs."""
-        return EvidenceOptions(drift=None if self.previous is None else SinceThen())
+        return EvidenceOptions() if self.previous is None else EvidenceOptions.since()
 
     def provenance(self) -> dict[str, object]:
-        """What the results say of them."""
+        """These options, as the results record them."""
         since = {} if self.previous is None else {"model before": self.previous.sha256}
         return since | ({"without": sorted(self.without)} if self.without else {})
 
@@ -87,13 +87,12 @@ class _Settings:
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
                      thorough: bool = False, without: Sequence[str] = (), previous: RobotModel | None = None,
                      engine: str = "auto") -> DiagnosisResult:
-    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
+    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that caches every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
-    effects that are known not to be there, and are not looked for; InputError where one is no effect. previous: the robot as an
-    earlier diagnosis left it, whose servos and effects are then nominal, so that findings are what is new; InputError where that
-    is another robot. Rollouts are the compiled
-    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model, or `engine` is
-    "drake"."""
+    effects that are known to be absent, and are not searched for; InputError for an unknown effect. previous: the robot of an
+    earlier diagnosis, whose servos and effects are taken as nominal, so that findings are the changes since; InputError where
+    that is another robot. Rollouts are compiled where the compiled station supports the model, unless Drake disagrees on the
+    nominal or on the final model, or `engine` is "drake"."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
     settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic(), previous)
@@ -141,11 +140,10 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], SearchResult] = explained_by_selection
-    if gap and is_by_logs(evidence):
-        search = explained_by_evidence
+    search: Callable[[Problem], SearchResult] = explained_by_evidence if is_by_logs(evidence) else explained_by_selection
+    options = settings.options if gap else settings.options.without_names()
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
-                           progress, settings.options))
+                           progress, options))
 
     # 5. What that leaves, on whole takes
     evaluator = found.takes_of(evaluator)
@@ -179,8 +177,8 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:
-    """What was measured of the robot's geometry, unless with that in the model the takes are told worse; not always better, as
-    beside what else is missing the right leg may walk the wrong way."""
+    """The measured geometry of the robot, unless it makes the residuals larger; it need not make them smaller, since combined
+    with other missing effects even the right leg length may walk the wrong way."""
     if not build.measured:
         return build
     there = Search(evaluator, build.added_to(model)).evaluated([])
@@ -189,7 +187,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
 
 
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:
-    """Rollouts beside the robot with its measured geometry: what steps and contact models leave open is another robot's."""
+    """Rollouts of the robot with its measured geometry, whose numerical floor and contact spread are its own."""
     read = [replace(t, model=known.model_of(t.spec)) for t in takes]
     return evaluator.on(prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
 
@@ -197,7 +195,7 @@ def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake
 def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
-    """What each take was and is. fitted: the model with its effects; None: nothing was found."""
+    """Each take before and after. fitted: the model with its effects; None: nothing was found."""
     was = [e.take.observed(nominal[e.name]) for e in evaluator.evidence]
     now = was if fitted is None else evaluator.observed(fitted, evaluator.config)
     out = []

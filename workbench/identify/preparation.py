@@ -1,4 +1,4 @@
-"""From recordings to evidence: takes beside the model's rollouts, registered, walks cut into windows."""
+"""From recordings to evidence: takes with the model's rollouts, registered, walks cut into windows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from workbench.types import Array, Mask, Progress
 
 @dataclass(frozen=True)
 class Prepared:
-    """Takes beside a model's rollouts: evidence, by take the rollout of a robot left to itself, takes left out and why."""
+    """Takes with a model's rollouts: evidence, by take the rollout of an unconstrained robot, takes left out and why."""
 
     evidence: list[TakeEvidence]
     nominal: dict[str, Take]
@@ -34,8 +34,8 @@ class Prepared:
 
 
 def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> Prepared:
-    """Rolls the session's model out beside each take, registers the takes against these rollouts, and puts floating-base takes
-    back to the recorded base at the beginning of each window."""
+    """Rolls out the session's model for each take, registers the takes against these rollouts, and resets the simulated base of
+    floating-base takes to the recorded one at the beginning of each window."""
     def rolled(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
         runs = [run_of(t, steadied.get(t.spec.name)) for t in these]
         return {r.name: of for r, of in zip(runs, roll_out(runs, config, progress=progress, n_jobs=n_jobs, floors=floors))}

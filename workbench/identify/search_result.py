@@ -1,4 +1,4 @@
-"""What a search of either kind hands over: its model, and what it has to say of it. The rest of a diagnosis asks no more."""
+"""The interface of both searches: the problem they are given, and the result that the rest of a diagnosis uses."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be explained. nominal: the robot with what was read off; residuals: what it leaves, by take; pool: effects that
-    may act; played: commands that never arrived, which a search may read again; thorough: without a limit of work; options: of a
-    search of servo logs."""
+    """The problem for a search. nominal: the robot with the direct estimates; residuals: its residuals, by take; pool: effects
+    that may act; played: commands that never arrived, which a search may estimate again; thorough: without a limit of work;
+    options: of a search of servo logs."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -40,11 +40,11 @@ class Problem:
 
 
 class SearchResult(Protocol):
-    """What a search found."""
+    """Result of a search."""
 
     @property
     def model(self) -> RobotModel:
-        """The robot with the effects that were found, beside the commands that never arrived."""
+        """The robot with the effects that were found, in addition to the commands that never arrived."""
 
     @property
     def calibrated(self) -> RobotModel:
@@ -83,7 +83,7 @@ class SearchResult(Protocol):
         """Torques in the model that no effect describes; before, after as in `findings`."""
 
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-        """What is beyond noise and numerics, and what casts doubt on what was fitted."""
+        """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
 
     def is_slight(self) -> bool:
         """Whether all that shows on frames that were searched is too little for a name."""
@@ -92,7 +92,7 @@ class SearchResult(Protocol):
         """Effects that were tried and are not in the model, and why."""
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
-        """Of all numbers of the model's effects; read_off: those that no search identified."""
+        """Joint posterior of the model's effects; read_off: those that were estimated directly."""
 
     def ties(self) -> tuple[Tie, ...]:
         """Findings and their rivals that are worth an experiment."""

@@ -121,7 +121,7 @@ _CODE_PAGES = ("utf-8-sig", "cp949", "cp1252", "latin-1")
 
 
 def load_mtn(path: str | Path) -> MtnFile:
-    """Reads a ROBOTIS motion file; InputError names the line and what was expected there."""
+    """Reads a ROBOTIS motion file; InputError names the line and the expected content."""
     lines = [(n, line.strip()) for n, line in enumerate(_text(path).splitlines(), start=1)]
     ends = [k for k, (_, line) in enumerate(lines) if line == "page_end"]
     starts = [k for k, (_, line) in enumerate(lines) if line == "page_begin"]

@@ -46,7 +46,7 @@ class JointFrame:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of what follows.
+    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of the joints after them.
 
     masses [kg] and centers of mass (3,) [m], in the link's frame, by link.
     """

@@ -26,11 +26,12 @@ GRAVITY = 9.81
 """Of free fall [m/s^2], as Drake's plants have it."""
 FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """Writes the same text either way."""
+_AX_12A = ServoConstants()
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The floor. friction: coefficient of foot on ground, static and dynamic alike; None: the SDF's own. stiffness [N/m] of a
+    """The floor. friction: coefficient of foot on ground, both static and dynamic; None: the SDF's own. stiffness [N/m] of a
     contact point; None or infinite: rigid. dissipation: Hunt and Crossley's [s/m]; None: 0. InputError for a negative number."""
 
     friction: float | None = None
@@ -94,12 +95,12 @@ class RobotModel:
 
     @cached_property
     def problems(self) -> tuple[str, ...]:
-        """What is doubtful in the description, a line each; InputError where Drake cannot build it."""
+        """Problems of the description, one line each; InputError where Drake cannot build it."""
         return (*self.source.problems, *model_problems(self.path, self.source.source))
 
     @cached_property
     def held_problems(self) -> tuple[str, ...]:
-        """As `problems`, of a robot whose base is always held: what the base weighs, and on what it stands, do not matter."""
+        """As `problems`, for a robot whose base is always held: the base's mass, and its feet, do not matter."""
         about = tuple(text for text in self.source.problems if not text.startswith(f"link '{self.base}' has no <inertial>"))
         return about + model_problems(self.path, self.source.source, self.base)
 
@@ -125,14 +126,14 @@ class RobotModel:
 
     def servo(self, joint: str) -> ServoConstants:
         """Constants of one joint's servo (default AX-12A where none are given)."""
-        return self.servos.get(joint, ServoConstants())
+        return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
         """The same robot with one effect more."""
         return self.with_effects((*self.effects, effect))
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
-        """The same robot with these effects in place of its own; what is known of its description is not read again."""
+        """The same robot with these effects instead of its own; its description is not read again."""
         return self.with_physics(self.servos, effects)
 
     def with_physics(self, servos: Mapping[str, ServoConstants], effects: Sequence[EffectSpec]) -> RobotModel:

@@ -25,10 +25,10 @@ from workbench.types import Array
 
 @dataclass(frozen=True)
 class Posterior:
-    """What is known of the effects' parameters, in the units of docs/formats.md, section 7.
+    """Posterior of the effects' parameters, in the units of docs/formats.md, section 7.
 
     names: (n) such as "backlash(flm).gap", "payload(body_link).position.x". mean: (n,). covariance: (n, n), infinite where
-    the data say nothing.
+    the data do not constrain them.
     """
 
     names: tuple[str, ...] = ()
@@ -84,8 +84,8 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
 
 
 def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
-    """The keys `robot` and `ground` of a file that is to lie in `folder`, its effects left out. Servos that are alike stand there
-    once; paths outside the folder are absolute."""
+    """The keys `robot` and `ground` of a file in `folder`, without effects. Identical servos are written once; paths outside the
+    folder are absolute."""
     servos = {j: model.servo(j).written() for j in model.joints}
     robot: dict[str, Any] = {
         "model": _description(model, folder.resolve()), "base": model.base,
@@ -121,8 +121,8 @@ def load_model(path: str | Path) -> RobotModel:
 def load_model_file(path: str | Path) -> ModelFile:
     """Reads a model.yaml.
 
-    InputError names the file, the key and what was expected: an unknown key, a missing SDF, an effect at a place that the robot
-    lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects package to say.
+    InputError names the file, the key and the expected value: an unknown key, a missing SDF, an effect at a place that the robot
+    lacks. The effects package checks whether an effect of that name is installed, and its parameters.
     """
     path = Path(path)
     top = top_of(path, "robot", "ground", "servos", "effects", "posterior", "provenance")

@@ -18,7 +18,7 @@ _CONSTANTS = set(KEYS)
 
 
 def read_model(top: Fields) -> RobotModel:
-    """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected."""
+    """The robot of a file's `robot` and `ground`. InputError names the file, the key and the expected value."""
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
     f.only("model", "base", "servos", "rigid_bodies", "bus_ids", "calibration", "direction", "offset", "homing", "feet", "held",
@@ -115,10 +115,10 @@ def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
 
 
 def read_servos(f: Fields, joints: tuple[str, ...], by_family: bool = False) -> dict[str, ServoConstants]:
-    """Constants by joint, of the key `servos`: one for all or one for each, as files or as they are; empty where it is absent.
+    """Constants by joint, of the key `servos`: one for all or one for each, as files or inline; empty where it is absent.
 
-    by_family: whether what the file leaves out of the servo's law (delay, goal ramp, minimum duty, dead zone, load friction, …)
-    comes from its family's profile, with its uncertainty; else it is absent.
+    by_family: whether parts of the servo's law that the file omits (delay, goal ramp, minimum duty, dead zone, load friction, …)
+    come from its family's profile, with its uncertainty; else they are absent.
     """
     given = f.raw("servos")
     if given is None:

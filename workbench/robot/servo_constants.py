@@ -29,14 +29,13 @@ class ServoConstants:
     compliance_margin (counts of 300/1023 deg) and punch (of 1023), or proportional_gain (duty per radian), with minimum_duty at
     the edge of the dead_zone [deg each side of the goal].
 
-    What more real servos do, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which the
-    servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
+    Further behaviour of real servos, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which
+    the servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
     rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tables: repeatable
-    torques that nobody has named, added to all that. torque_tolerance,
-    back_emf_tolerance: standard deviation of the natural logarithm of torque at full duty and of back-EMF; None: what stall
-    torque, supply and no-load speed say. covariance: what an earlier diagnosis knew of the law's numbers together. sd: standard
-    deviation of a constant, by key, in its unit; of others the share in SHARES_KNOWN. InputError names the key and what was
-    expected.
+    torques without a name, added to all these. torque_tolerance, back_emf_tolerance: standard deviation of the natural logarithm
+    of torque at full duty and of back-EMF; None: as follows from stall torque, supply and no-load speed. covariance: joint
+    uncertainty of the law's constants from an earlier diagnosis. sd: standard deviation of a constant, by key, in its unit; of
+    others the share in SHARES_KNOWN. InputError names the key and the expected value.
     """
 
     model: str = "AX-12A"
@@ -71,7 +70,7 @@ class ServoConstants:
                 raise InputError(None, "expected compliance_slope, compliance_margin and punch, or proportional_gain")
             for name, instead in (("minimum_duty", "punch"), ("dead_zone", "compliance_margin")):
                 if getattr(self, name):
-                    raise InputError(None, f"{name} goes with proportional_gain; beside compliance_slope expected {instead}")
+                    raise InputError(None, f"{name} belongs to proportional_gain; with compliance_slope expected {instead}")
         elif any(v is not None for v in compliance):
             raise InputError(None, "proportional_gain excludes compliance_slope, compliance_margin and punch")
         object.__setattr__(self, "torque_tables", torque_tables(self.torque_tables))
@@ -129,7 +128,7 @@ class ServoConstants:
 
     @property
     def line(self) -> TorqueSpeedLine:
-        """What the servo can give at full duty and its supply voltage."""
+        """The torque-speed line at full duty and the supply voltage."""
         return TorqueSpeedLine(self.torque_at_full_duty, self.back_emf, self.viscous_friction, self.coulomb_friction)
 
     def share_known(self, key: str) -> float:
@@ -176,7 +175,7 @@ class ServoConstants:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What no hobby servo has, though nothing forbids it: mostly a unit that is not the key's."""
+        """Values that no hobby servo has, though they are not impossible: mostly in a wrong unit."""
         out = []
         for name, (likely, unit, other) in _LIKELY.items():
             v = getattr(self, name)
@@ -211,7 +210,7 @@ _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "r
            "goal_delay": (1.0, "s"), "goal_ramp": (1e5, "deg/s"), "command_filter": (1.0, "s"),
            "derivative_gain": (100.0, "duty per rad/s"), "load_friction": (2.0, "of the load"),
            "torque_tolerance": (3.0, "(of the logarithm)"), "back_emf_tolerance": (3.0, "(of the logarithm)")}
-"""Ten times beyond what any servo of a small robot has; what is larger is another unit or a slip."""
+"""Ten times beyond any servo of a small robot; a larger value is in another unit or a mistake."""
 _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
            "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
            "coulomb_friction": (2.0, "N m", "kg cm"), "viscous_friction": (1.0, "N m s/rad", "another unit"),
@@ -231,7 +230,7 @@ def load_servo_constants(path: str | Path) -> ServoConstants:
 
 
 def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants:
-    """Constants out of keys and values that stand at `place` in the file `path`; InputError names file, place and key."""
+    """Constants from keys and values at `place` in the file `path`; InputError names file, place and key."""
     at = f"{place}: " if place else ""
     if not isinstance(content, Mapping):
         raise InputError(path, f"{at}expected a mapping of servo constants")

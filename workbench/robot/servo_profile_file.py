@@ -21,22 +21,22 @@ ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
                  "reflected_inertia", *LAW_KEYS, *MORE_KEYS)
 BY_GAIN = ("minimum_duty", "dead_zone", "derivative_gain")
-"""Of the law by proportional gain; that by compliance has punch and margin in their place."""
+"""Keys of the law by proportional gain; the law by compliance has punch and margin instead."""
 _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
            "min_voltage_limit", "torque_enable", "goal_position", "moving_speed", "torque_limit", "max_torque",
            "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
 
 
 def load_profile(path: str | PurePath) -> ServoProfile:
-    """Reads a profile; InputError names the file, the key and what was expected."""
+    """Reads a profile; InputError names the file, the key and the expected value."""
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
                   "unlock", "watchdog", "marker", "maker", "group_read", *TOLERANCES)
-    position, speed, load = (_needed(top, key) for key in ("position", "speed", "load"))
-    registers = _registers(_needed(top, "registers"))
+    position, speed, load = (_required_section(top, key) for key in ("position", "speed", "load"))
+    registers = _registers(_required_section(top, "registers"))
     profile = ServoProfile(
-        name=str(top.required("name", top.text("name"))), models=_names(_needed(top, "models")),
+        name=str(top.required("name", top.text("name"))), models=_names(_required_section(top, "models")),
         protocol=top.required("protocol", top.whole("protocol", least=1)),
         supply=_range(top, "supply"), position_mode=_position_mode(top.mapping("position_mode"), registers),
         counts=position.required("counts", position.whole("counts", least=2)),
@@ -44,11 +44,11 @@ def load_profile(path: str | PurePath) -> ServoProfile:
         speed_unit=math.radians(_number(speed, "unit")), largest_speed=speed.required("largest", speed.whole("largest", least=1)),
         table_unit=None if (of_tables := speed.number("table_unit", least=0)) is None else math.radians(of_tables),
         load_unit=_number(load, "unit"), full_torque=top.required("full_torque", top.whole("full_torque", least=1)),
-        bit_rates=_bit_rates(_needed(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
+        bit_rates=_bit_rates(_required_section(top, "bit_rates")), return_delay_unit=_number(top, "return_delay_unit"),
         eeprom_below=top.required("eeprom_below", top.whole("eeprom_below")), registers=registers,
-        law=_law(_needed(top, "law"), registers), nominal=_nominal(_needed(top, "nominal")),
+        law=_law(_required_section(top, "law"), registers), nominal=_nominal(_required_section(top, "nominal")),
         tolerances={key: v for key in TOLERANCES if (v := top.number(key, least=0)) is not None},
-        alarms=_names(_needed(top, "alarms")), refusals=_names(_needed(top, "refusals")),
+        alarms=_names(_required_section(top, "alarms")), refusals=_names(_required_section(top, "refusals")),
         unlock=_unlock(top.mapping("unlock"), registers), watchdog=_watchdog(top.mapping("watchdog"), registers),
         marker=_marker(top, registers), maker=top.text("maker") or "",
         group_read=_group_read(top), source=str(path))
@@ -86,9 +86,9 @@ def servo_profile(model: str) -> ServoProfile:
 
 
 def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:
-    """The constants, with what their file leaves out of the servo's law taken from its family's profile, with its uncertainty.
+    """The constants, with parts of the servo's law that their file omits taken from its family's profile, with its uncertainty.
 
-    given: keys of the file; what it gives stays, 0 too. Servos of an unknown family stay as they are. What belongs to the law by
+    given: keys of the file; their values are kept, including 0. Servos of an unknown family stay as they are. Keys of the law by
     proportional gain is not added to a servo with the law by compliance.
     """
     family = _family_of(servo.model)
@@ -104,7 +104,7 @@ def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConst
 
 
 def model_name(number: int, protocol: int) -> str:
-    """What a model number stands for."""
+    """Name of the servo with a model number."""
     for profile in servo_profiles().values():
         if profile.protocol == protocol and number in profile.models:
             return profile.models[number]
@@ -120,7 +120,7 @@ def _plain(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
 
 
-def _needed(f: Fields, key: str) -> Fields:
+def _required_section(f: Fields, key: str) -> Fields:
     found = f.mapping(key)
     if found is None:
         raise f.error(key, "is missing")

@@ -1,4 +1,4 @@
-"""The torque-speed line of a servo: what it can give at full duty (docs/formats.md, section 4)."""
+"""The torque-speed line of a servo at full duty (docs/formats.md, section 4)."""
 
 from __future__ import annotations
 

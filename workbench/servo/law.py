@@ -52,7 +52,7 @@ class ServoLaw:
 
     @property
     def line(self) -> TorqueSpeedLine:
-        """What the servos can give at full duty and their supply voltage."""
+        """The torque-speed lines at full duty and the supply voltage."""
         return TorqueSpeedLine(self.full_torque, self.back_emf, self.viscous, self.coulomb)
 
     @property

@@ -1,4 +1,4 @@
-"""What a servo may do beyond the nominal law, at each instant: terms of a TermBank."""
+"""Behaviour of a servo beyond the nominal law, at each instant: terms of a TermBank."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ class TermNumbers:
 
 
 class ServoTerm:
-    """Does nothing unless overridden. What it returns is for all servos (n,), or one number for all."""
+    """Does nothing unless overridden. Its results are for every servo (n,), or one number for all."""
 
     def numbers(self) -> TermNumbers | None:
         """All that the term does, in numbers; None where they do not say it."""
         return None
 
     def strength(self, law: ServoLaw, now: Instant) -> Array | float:
-        """What is left of the duty torque, 0 to 1."""
+        """Factor on the duty torque, 0 to 1."""
         return 1.0
 
     def ceiling(self) -> Array | float:

@@ -31,7 +31,7 @@ from workbench.robot import RobotModel, bus_ids
 from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
-from workbench.simulation.rollout import Simulation
+from workbench.simulation.rollout import BaseState, Simulation
 from workbench.types import Array
 
 FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
@@ -87,8 +87,13 @@ class StationBody:
         """The station's clock [s] at a time of the bus's [ticks]: it starts when the hand lets go."""
         return 0.0 if self.let_go is None else (now - self.let_go) / SECOND
 
+    def base(self, now: int) -> BaseState | None:
+        """Pose and velocity of the free base at a time of the bus's [ticks]; None of a held one."""
+        self._advance(now)
+        return self._run.base
+
     def take(self, started: float) -> Take:
-        """What the robot has done since then, time 0 at `started` [s on the station's clock]."""
+        """The take since then, time 0 at `started` [s on the station's clock]."""
         take = self._run.take()
         return replace(take, time=take.time - started, starts_at=0.0)
 
@@ -106,7 +111,7 @@ class StationBody:
 
 
 def _without_controller(model: RobotModel) -> RobotModel:
-    """The same robot with a controller that does as it is told: what the bus carries has been through the real one."""
+    """The same robot with a controller that adds nothing: the commands on the bus have passed through the real one."""
     kept = tuple(spec for effect, spec, _ in resolved(model) if type(effect).commands is Effect.commands)
     return replace(model, effects=kept)
 
@@ -114,7 +119,7 @@ def _without_controller(model: RobotModel) -> RobotModel:
 class VirtualRobot:
     """A robot on its bus. model: as it really is, hidden effects included; base: "free" or "fixed".
 
-    Each servo's registers say what the model's constants are. rate: of the bus [bit/s].
+    Each servo's registers hold the model's constants. rate: of the bus [bit/s].
     """
 
     def __init__(self, model: RobotModel, base: str = "free", rate: int = 1_000_000) -> None:
@@ -135,7 +140,7 @@ class VirtualRobot:
         self.port = VirtualPort(self.bus, rate)
 
     def controller(self, commands: Commands) -> Commands:
-        """What the robot's controller makes of a motion's commands: late, dropped or mixed up, where its effects say so."""
+        """A motion's commands after the robot's controller: delayed, dropped or mixed up by the model's effects."""
         return played(commands.reordered(self.model.joints), self.model)
 
     def scene(self, started: float, seed: int = 0, rotation_noise: float = float(np.deg2rad(0.12)),

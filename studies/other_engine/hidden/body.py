@@ -42,7 +42,7 @@ def loose_mount(robot: Description, spec: EffectSpec) -> Description:
 
 
 def joint_stop(robot: Description, spec: EffectSpec) -> Description:
-    """The servo's shaft ends there, or before, where the description says so."""
+    """The servo's shaft ends there, or earlier if the description sets a limit."""
     lower, upper = angle(spec, "lower"), angle(spec, "upper")
     return _joints(robot, spec, lambda l: replace(l, lower=max(l.lower, lower), upper=min(l.upper, upper)))
 
@@ -107,7 +107,7 @@ def soft_ground(robot: Description, spec: EffectSpec) -> Description:
 
 
 def ground_friction(around: Surroundings, spec: EffectSpec) -> Surroundings:
-    """Of all feet that have none of their own."""
+    """Applies to every foot without a value of its own."""
     return replace(around, friction=number(spec, "friction"))
 
 

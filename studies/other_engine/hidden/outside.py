@@ -1,4 +1,4 @@
-"""Physics that the contract has no name for. An honest diagnosis says that something is left, and what it depends on.
+"""Physics outside the vocabulary. An honest diagnosis reports an unexplained residual, and the signal it depends on.
 
 | effect | where | parameters |
 |---|---|---|

@@ -34,7 +34,7 @@ def clock_rate(sent: Commands, spec: EffectSpec, model: RobotModel, rng: np.rand
 
 
 def dropped_command(sent: Commands, spec: EffectSpec, model: RobotModel, rng: np.random.Generator) -> Commands:
-    """A servo that misses a pose goes on to its last goal at its last speed; before its first it stays in neutral."""
+    """A servo that misses a pose continues to its last goal at its last speed; before its first it stays in neutral."""
     goals, speeds = sent.goals.copy(), sent.speeds.copy()
     for joint in spec.where:
         c = sent.column(joint)

@@ -14,13 +14,12 @@ from workbench.device.bus.survey import ALL_IDS, FIRST, FoundServo, Survey, surv
 from workbench.device.bus.wire import ping
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profiles
+from workbench.types import Progress
 
 LONGEST_PING = {1: 6, 2: 14}
 """Bytes of the answer to a ping, by protocol."""
 FEW = range(1, 21)
 """IDs that are asked at other bit rates; nearly every robot has a servo among them."""
-
-Progress = Callable[[str, float | None], None]
 
 
 def list_servos(port: Any, strip_echo: bool = False, progress: Progress | None = None) -> tuple[Survey, ...]:

@@ -18,11 +18,12 @@ ROUNDING = 2
 
 
 def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> dict[str, int]:
-    """What `set_up` writes into a joint's servo: no return delay, and the joint's range, by the model
+    """What `set_up` writes into a joint's servo: answers to all instructions without delay, and the joint's range, by the model
     and the table of ranges that the firmware's tables keep to."""
     own = joint_ranges(model)[joint]
     lowest, highest = JointServo(profile, model.mountings.get(joint, Mounting())).limits(own.lower, own.upper)
-    return {"return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
+    level = {"status_return_level": 2} if "status_return_level" in profile.registers else {}
+    return {**level, "return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
 
 
 def wider_limits(model: RobotModel, found: Survey) -> tuple[str, ...]:

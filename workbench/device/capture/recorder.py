@@ -14,6 +14,7 @@ from workbench.device.capture.link import Link
 from workbench.device.capture.packets import (
     HIRES,
     OLDEST,
+    BodyPose,
     BrokenPacketError,
     Message,
     ServerInfo,
@@ -41,17 +42,21 @@ class RecordOptions:
     """Until a stream that stopped ends the recording."""
     echo_every: float = 0.5
     """Between measurements of the server's clock; the best of a few is kept."""
+    trailing: float = 0.25
+    """Silence at the end of a recording that is reported: seven frames at 30 Hz, the slowest rate."""
     keep_alive_every: float = 1.0
     """Between signs of life, without which a server that sends to each client alone stops after some seconds."""
 
 
 class Recorder:
-    """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come."""
+    """One conversation with a server, recorded into a journal. `connect`, then `listen` until enough has come. latest: of each
+    rigid body the last pose, and when it arrived [s]."""
 
     def __init__(self, link: Link, options: RecordOptions | None = None) -> None:
         self.link, self.options = link, options or RecordOptions()
         self.info: ServerInfo | None = None
         self.names: dict[int, str] = {}
+        self.latest: dict[str, tuple[float, BodyPose]] = {}
         self.tracked = 0
         self.problem = ""
         self._ledger = Ledger()
@@ -62,7 +67,7 @@ class Recorder:
 
     @property
     def counts(self) -> Counts:
-        """What has come so far."""
+        """Counts of the frames so far."""
         return self._ledger.counts()
 
     def connect(self) -> ServerInfo:
@@ -85,7 +90,7 @@ class Recorder:
         return info
 
     def request_recording(self, name: str) -> str:
-        """Asks Motive to record the take itself, under this name; "" where it does, else what it answered."""
+        """Asks Motive to record the take itself, under this name; "" where it does, else its answer."""
         for command in (f"SetRecordTakeName,{name}", "StartRecording"):
             refusal = self._command(command)
             if refusal:
@@ -100,7 +105,7 @@ class Recorder:
                seconds: float | None = None) -> Counts:
         """Records until `until()`, or so many seconds after the first frame; InputError where no frame comes at all.
 
-        A stream that stops, or starts anew with other numbers, ends it, and `problem` says so.
+        A stream that stops, or restarts with other numbers, ends it; `problem` then states the reason.
         """
         assert self.info is not None, "connect first"
         self._head(journal)
@@ -118,6 +123,9 @@ class Recorder:
             self._check_silence(now - began, now - self._last_frame)
             if progress is not None:
                 progress(self._said(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
+        quiet = self.link.now() - self._last_frame
+        if self.counts_received and not self.problem and quiet > self.options.trailing:
+            self.problem = f"no frame came in the last {quiet:.1f} s of the recording"
         return self.counts
 
     @property
@@ -170,11 +178,12 @@ class Recorder:
         if how == "far":
             self._restarts += 1
             if self._restarts > 10:
-                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was started anew or "
-                                "plays back; what came before is kept")
+                self.problem = (f"the stream jumped from frame {self._ledger.last} to {frame.number}: Motive was restarted or "
+                                "plays back; the frames before are kept")
             return
         self._restarts = 0
         self._last_frame = arrival
+        self.latest |= {self.names[b.id]: (arrival, b) for b in frame.bodies if b.id in self.names}
         self.tracked = sum(body.tracked for body in frame.bodies)
         journal.packet(arrival, data)
         unknown = any(body.id not in self.names for body in frame.bodies)

@@ -30,7 +30,7 @@ from workbench.robot.servo_profile import ServoProfile
 ANSWER = 1.5
 """Until an order is answered, and a table of 4 kB checked [s]: the upload itself takes 0.7 s at 57,600 bit/s."""
 TO_NEUTRAL = 20.0
-"""Until the robot stands in neutral [s]: its ramp turns 150 deg in 5."""
+"""Until the robot reaches neutral [s]: its ramp turns 150 deg in 5."""
 REST = 1.0
 """How long it stands there before it plays [s]; a recording needs half a second of it."""
 KEPT = 0.9
@@ -91,7 +91,7 @@ class Controller:
         return float(self._port.getCurrentTime()) / 1000
 
     def state(self) -> StateMessage:
-        """What it is at; BusError where nothing that speaks its frames is there."""
+        """Its present state; BusError where nothing answers in its frames."""
         for _ in range(3):
             self._send(frame(FrameType.ASK))
             found = self._wait(lambda m: isinstance(m, StateMessage), 0.5)
@@ -100,7 +100,7 @@ class Controller:
         raise BusError("no CM-530 with the workbench's program answers; `workbench flash` puts it there")
 
     def to_neutral(self) -> StateMessage:
-        """Has it check its servos and ramp to neutral, if it does not stand there; BusError says what it found instead."""
+        """Has it check its servos and ramp to neutral, if it is not there already; BusError names the state that it found."""
         state = self.state()
         if state.state == ControllerState.PLAY:
             raise BusError("the robot plays; stop it first (1 on the remote, or START)")
@@ -134,8 +134,8 @@ class Controller:
         if not answer.well:
             raise BusError(f"the table is refused: {answer.result}")
 
-    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
-        """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
+    def start(self) -> float:
+        """Has it play from neutral; returns when it began on its own clock [s]. BusError with its reason where it does not."""
         self._wait(lambda m: False, REST)
         self._send(frame(FrameType.PLAY))
         began = self._wait(_on_the_way, ANSWER)
@@ -144,20 +144,25 @@ class Controller:
         if not isinstance(began, StateMessage) or began.state != ControllerState.PLAY:
             why = f": {_reason(began)}" if isinstance(began, StateMessage) else ""
             raise BusError("it was commanded to play, and does not" + why)
+        return began.time
+
+    def play(self, seconds: float, progress: Callable[[str, float | None], None]) -> tuple[float, str]:
+        """Plays for so long; when it began on its own clock [s], and why it ended early ("": it played to its end)."""
+        began = self.start()
         end = self.now() + seconds
         while True:
             left = self._wait(_left_play, min(0.1, max(end + SPARE - self.now(), 0.001)))
             if left is not None:
                 said = left if isinstance(left, StateMessage) else self.state()
-                return began.time, "" if said.reason == ENDED else _reason(said)
+                return began, "" if said.reason == ENDED else _reason(said)
             if self.now() >= end + SPARE:
-                return began.time, f"it still plays {SPARE:g} s after its end"
+                return began, f"it still plays {SPARE:g} s after its end"
             if self.now() - self.heard[-1][0] > SILENT:
-                raise BusError("the controller fell silent; the robot plays on by itself: hold START for 1.5 s, or switch it off")
+                raise BusError("the controller fell silent; the robot keeps playing: hold START for 1.5 s, or switch it off")
             progress("playing", min(1 - (end - self.now()) / seconds, 1.0))
 
     def back(self) -> str:
-        """Waits until it stands in neutral, having told it to stop if it is on its way elsewhere; "", or what it says instead."""
+        """Sends a stop if it moves, and waits until it reaches neutral; returns "", or the reason why it did not."""
         end, state = self.now() + TO_NEUTRAL, self.state()
         if state.state in (ControllerState.CHECK, ControllerState.RAMP, ControllerState.PLAY):
             self._send(frame(FrameType.STOP))

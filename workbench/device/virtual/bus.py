@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from workbench.device.virtual.servo import VirtualServo
 
 Line = Callable[[int], int]
-"""What a stretch of cable makes of a byte."""
+"""Effect of a stretch of cable on a byte."""
 
 
 class Talker(Protocol):
@@ -58,8 +58,8 @@ def byte_ticks(rate: int) -> int:
 class ServoBus:
     """The wire with its servos; controllers and adapters talk by `talk` and listen by `join`.
 
-    to_servos, from_servos: what the cable makes of bytes on their way (`bit_flips`). All servos share one decoder for each bit
-    rate, as they all hear the same.
+    to_servos, from_servos: effect of the cable on bytes in each direction (`bit_flips`). All servos share one decoder for each
+    bit rate, as they all hear the same.
     """
 
     def __init__(self, clock: Clock, to_servos: Line | None = None, from_servos: Line | None = None) -> None:
@@ -103,7 +103,7 @@ class ServoBus:
         return ends[-1]
 
     def silence(self, talker: object) -> None:
-        """What this talker has not sent yet stays unsent, as when its power goes."""
+        """Bytes that this talker has not sent yet are dropped, as when its power fails."""
         self.settle()
         self._flying = [b for b in self._flying if b.talker is not talker]
 
@@ -174,12 +174,11 @@ class ServoBus:
         """Sync Read: each answers when the one before it has; one that does not silences all after it."""
         if not ids:
             return
-        for servo in self.servos:
-            if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key:
-                end = servo.answer_in_turn(what, time)
-                if end is not None:
-                    self.clock.at(end, partial(self._asked_in_turn, what, ids[1:], key, end))
-                    return
+        ends = [servo.answer_in_turn(what, time) for servo in self.servos
+                if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key]
+        answered = [end for end in ends if end is not None]
+        if answered:
+            self.clock.at(max(answered), partial(self._asked_in_turn, what, ids[1:], key, max(answered)))
 
     def _collide(self, one: Burst, two: Burst) -> None:
         """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""
@@ -201,4 +200,4 @@ class ServoBus:
 
 
 PACKET_PAUSE = SECOND // 10
-"""A packet that stops for longer is forgotten by a servo [ticks]. Not documented; any value above a few ms fits what is known."""
+"""A packet that stops for longer is discarded by a servo [ticks]. Not documented; any value above a few ms is consistent."""

@@ -23,7 +23,8 @@ from workbench.types import Array
 class CycleController(LeafSystem):
     """Ports: `pose` in, x, y [m] and heading [rad] at the end of a cycle, NaN where the cameras lost the robot; `turn` out, of
     the cycle after next [rad per stance]; `state` out, the estimate: x, y, heading, and the robot's turning bias beyond the map's
-    [rad per cycle]; `along` out, distance along the path [m]; `stop` out, 1 where the path ends or the robot was lost;
+    [rad per cycle]; `along` out, distance along the path [m]; `stop` out, 1 where the path ends with
+    the next cycle, which is committed, or the robot was lost;
     `lost` out, 1 where it was lost.
 
     Updates every `period` [s], from `period` on. discs: obstacles, which only the law "mpc" avoids.
@@ -32,7 +33,8 @@ class CycleController(LeafSystem):
     def __init__(self, path: WayPath, step_map: StepMap, period: float, options: DriveOptions | None = None,
                  discs: Sequence[Disc] = ()) -> None:
         super().__init__()
-        self.path, self.map, self.options, self.discs = path, step_map, options or DriveOptions(), tuple(discs)
+        self.path, self.map, self.period, self.discs = path, step_map, period, tuple(discs)
+        self.options = options or DriveOptions()
         self._pose = self.DeclareVectorInputPort("pose", 3)
         self.DeclareDiscreteState(first_state(step_map, self.options))
         self.DeclareVectorOutputPort("turn", 1, self._say(lambda x: x[at.AFTER:at.AFTER + 1]))
@@ -48,10 +50,10 @@ class CycleController(LeafSystem):
         return calculate
 
     def _lost(self, x: Array) -> bool:
-        return bool(x[at.LOST] >= self.options.lost)
+        return bool(x[at.LOST] * self.period >= self.options.blind - 1e-9)
 
     def _ends(self, x: Array) -> bool:
-        return bool(self._lost(x) or x[at.ALONG] + x[at.AHEAD] / 2 >= self.path.length)
+        return bool(self._lost(x) or x[at.ALONG] + 1.5 * x[at.AHEAD] >= self.path.length)
 
     def _update(self, context: Context, values: DiscreteValues) -> EventStatus:
         x = np.array(context.get_discrete_state(0).value())
@@ -68,7 +70,8 @@ class CycleController(LeafSystem):
         along, left, heading = self._committed(x, left, m)
         if o.law == "proportional":
             off = heading - self.path.heading(along) + np.arctan(left / o.reach) + m.aside / m.ahead
-            wanted = -(m.bias + x[at.BIAS]) - off * m.ahead / o.reach
+            bend = self.path.heading(along + m.ahead) - self.path.heading(along)
+            wanted = bend - (m.bias + x[at.BIAS]) - off * m.ahead / o.reach
             return limited(wanted / (m.gain + m.memory), x[at.NEXT], o)
         return limited(self._planned(along, left, heading, x, m).turns[0], x[at.NEXT], o)
 

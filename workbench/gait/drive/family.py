@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, read_certificate
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.gait.table import GaitTable, gait_table, joined
-from workbench.motion import Commands
+from workbench.motion import Commands, PoseTable
 from workbench.robot import RobotModel
 
 RESOLUTION = 0.005
@@ -22,42 +25,73 @@ class GaitFamily:
     """Cycles of one gait that differ in `turn` alone [rad per stance, to the left].
 
     The shape's own turn (its trim) is added to the requested turn. InputError where a table of the family cannot be made, because
-    a goal is beyond the registers.
+    a goal is beyond the registers. Cycles begin at the pose (`phase` of the shape's cycle) that the joints reach most slowly, as
+    the controller's program changes tables there only if the way is short; the poses before it belong to the start.
     """
 
     def __init__(self, machine: GaitMachine, shape: GaitShape) -> None:
         self.machine, self.shape = machine, shape
         self._tables: dict[int, GaitTable] = {}
+        self.phase = _calmest(self._table(0.0).cycle)
 
-    def table(self, turn: float) -> GaitTable:
-        """Start, cycle and stop of the gait that turns by `turn` [rad per stance]."""
+    def cycle(self, turn: float, before: float = 0.0) -> PoseTable:
+        """One cycle after one with the turn `before`, whose last goals are elsewhere: the joints' speeds into its first pose are
+        those of that way. The controller's program checks that the pose is within reach of them."""
+        return self._entered(self._loop(turn), before)
+
+    def stop(self, before: float = 0.0) -> PoseTable:
+        """From a cycle with the turn `before` to neutral, going straight."""
+        straight = self._table(0.0)
+        rest = _part(straight.cycle, slice(self.phase, None))
+        return self._entered(joined([rest, straight.stop], "drive"), before)
+
+    @property
+    def start(self) -> PoseTable:
+        """From neutral into the gait, going straight."""
+        straight = self._table(0.0)
+        return joined([straight.start, _part(straight.cycle, slice(0, self.phase))], "drive") if self.phase else straight.start
+
+    @property
+    def start_seconds(self) -> float:
+        """How long the start takes [s]."""
+        return float(self.start.dwells_ms.sum()) / 1000
+
+    @property
+    def period(self) -> float:
+        """Of one cycle [s], the same for all of the family."""
+        return self._table(0.0).period
+
+    def sequence(self, turns: Sequence[float]) -> Commands:
+        """The start, and a cycle for each of `turns` [rad per stance], as one schedule."""
+        cycles = [self.cycle(u, before) for before, u in zip((0.0, *turns), turns)]
+        return joined([self.start, *cycles], "drive").commands(1)
+
+    def _table(self, turn: float) -> GaitTable:
         key = round(turn / RESOLUTION)
         if key not in self._tables:
             self._tables[key] = gait_table(self.machine, replace(self.shape, turn=self.shape.turn + key * RESOLUTION), "drive")
         return self._tables[key]
 
-    def cycle(self, turn: float) -> Commands:
-        """The commands of one cycle."""
-        return self.table(turn).cycle.commands(1)
+    def _loop(self, turn: float) -> PoseTable:
+        cycle = self._table(turn).cycle
+        return _part(cycle, np.roll(np.arange(len(cycle)), -self.phase))
 
-    @property
-    def start(self) -> Commands:
-        """From neutral into the gait, going straight."""
-        return self.table(0.0).start.commands(1)
+    def _entered(self, table: PoseTable, before: float) -> PoseTable:
+        way = np.abs(table.goals[0] - self._loop(before).goals[-1]) * np.array([u.count for u in table.units])
+        needed = np.ceil(self.shape.hurry * way / (table.dwells_ms[0] / 1000) / self.machine.speed_unit)
+        speeds = table.speeds.copy()
+        speeds[0] = np.clip(needed, 1, self.machine.fastest)
+        return replace(table, speeds=speeds)
 
-    @property
-    def stop(self) -> Commands:
-        """From the gait to neutral."""
-        return self.table(0.0).stop.commands(1)
 
-    @property
-    def period(self) -> float:
-        """Of one cycle [s], the same for all of the family."""
-        return self.table(0.0).period
+def _part(table: PoseTable, rows: slice | NDArray[np.int64]) -> PoseTable:
+    return replace(table, goals=table.goals[rows], speeds=table.speeds[rows], dwells_ms=table.dwells_ms[rows])
 
-    def sequence(self, turns: Sequence[float]) -> Commands:
-        """The start, and a cycle for each of `turns` [rad per stance], as one schedule."""
-        return joined([self.table(0.0).start, *(self.table(u).cycle for u in turns)], "drive").commands(1)
+
+def _calmest(cycle: PoseTable) -> int:
+    """The pose of a cycle that all joints reach most slowly."""
+    ways = np.abs(cycle.goals - np.roll(cycle.goals, 1, axis=0)).max(axis=1)
+    return int(np.argmin(ways / cycle.dwells_ms))
 
 
 def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:

@@ -13,12 +13,14 @@ from pydrake.systems.framework import Context
 from workbench.compare.metrics import heading
 from workbench.gait.drive.controller import CycleController
 from workbench.gait.drive.path import WayPath
-from workbench.gait.drive.walk import Seen, Walk
+from workbench.gait.drive.walk import Seen, StoppedError, Walk
 from workbench.recording.take import Take
 from workbench.types import Array, Progress
 
 Watch = Callable[[Seen, Array], None]
 """Called at the end of each cycle with the robot's pose and the planned positions (N, 2) [m]."""
+FELL, END = "fell", "end of the path"
+"""Reasons for which a walk ends."""
 SETTLED = 0.8
 """Distance along the path [m] from which errors are judged: with two cycles of delay and an unknown bias the first part is open
 loop."""
@@ -82,34 +84,46 @@ def drive(walk: Walk, path: WayPath, controller: CycleController, most_cycles: i
     """Walks along `path`. steer: False plays the straight gait instead (open loop), for comparison.
 
     The robot starts from rest at the origin, heading along x. It stops at the end of the path, after `most_cycles`, when it
-    falls, or when the cameras have lost it; the gait's stop section is played unless it fell.
+    falls, or when the cameras have lost it. The stop section is played, unless it fell or was stopped by someone else; as a turn,
+    a stop acts one cycle after it was decided.
     """
-    context = controller.CreateDefaultContext()
     rows: list[list[float]] = []
+    try:
+        reason = _walked(walk, path, controller, most_cycles, steer, rows, progress, watch)
+        if reason != FELL:
+            walk.end()
+    except StoppedError as e:
+        reason = e.reason
+    columns = np.array(rows).reshape(-1, 11).T
+    turns, left, off, along, biases = columns[6:]
+    return Driven(path, columns[:3].T, columns[3:6].T, turns, left, off, along, biases, reason, walk.take())
+
+
+def _walked(walk: Walk, path: WayPath, controller: CycleController, most_cycles: int, steer: bool, rows: list[list[float]],
+            progress: Progress, watch: Watch | None) -> str:
+    """Start and cycles, up to the last one before the stop; a row for each end of a cycle. Returns why it ends."""
+    context, seen = controller.CreateDefaultContext(), walk.begin()
     played = committed = near = 0.0  # turns of the cycle that has ended and of the next, which is on the controller already
-    reason, seen = f"{most_cycles} cycles", walk.begin()
-    for k in range(most_cycles):
-        if not np.isfinite(seen.pose).all():
-            reason = "fell"
-            break
-        near, left = path.project(seen.pose[:2], near)
+    reason = ""
+    for k in range(most_cycles + 1):
+        if seen.fell:
+            return FELL
+        left = math.nan
+        if np.isfinite(seen.pose).all():
+            near, left = path.project(seen.pose[:2], near)
         after, bias, ends = _decided(controller, context, seen.captured) if steer else (0.0, math.nan, "")
         rows.append([*seen.pose, *seen.captured, played, left, _wrapped(seen.pose[2] - path.heading(near)), near, bias])
         progress(f"cycle {k + 1}", min(near / path.length, 1.0))
         if watch is not None:
             watch(seen, controller.planned_points(context) if steer else np.empty((0, 2)))
-        if not steer and near + controller.map.ahead / 2 >= path.length:
-            ends = "end of the path"
-        if ends:
-            reason = ends
+        if reason:
             break
-        seen = walk.cycle(committed, after)
+        if not steer and near + 1.5 * controller.map.ahead >= path.length:
+            ends = END
+        reason = ends or (f"{most_cycles} cycles" if k == most_cycles - 1 else "")
+        seen = walk.cycle(committed, None if reason else after)
         played, committed = committed, after
-    if reason != "fell":
-        walk.end()
-    columns = np.array(rows).reshape(-1, 11).T
-    turns, left_, off, along, biases = columns[6:]
-    return Driven(path, columns[:3].T, columns[3:6].T, turns, left_, off, along, biases, reason, walk.take())
+    return reason
 
 
 def _decided(controller: CycleController, context: Context, seen: Array) -> tuple[float, float, str]:
@@ -117,7 +131,7 @@ def _decided(controller: CycleController, context: Context, seen: Array) -> tupl
     controller.GetInputPort("pose").FixValue(context, seen)
     context.SetDiscreteState(0, controller.EvalUniquePeriodicDiscreteUpdate(context).value(0))
     turn, state, stop, lost = (np.asarray(controller.GetOutputPort(n).Eval(context)) for n in ("turn", "state", "stop", "lost"))
-    why = "lost by the cameras" if lost[0] else "end of the path"
+    why = "lost by the cameras" if lost[0] else END
     return float(turn[0]), float(state[3]), why if stop[0] else ""
 
 

@@ -39,12 +39,12 @@ class DriveOptions:
     first_bias: float = 0.05
     noise: float = 0.0021
     stride_gain: float = 0.2
-    lost: int = 4
+    blind: float = 1.5
     clearance: float = 0.12
     inside: float = 1000.0
 
     def __post_init__(self) -> None:
         check_choice("law", self.law, ("mpc", "proportional"))
-        check_whole(self, horizon=2, lost=1)
+        check_whole(self, horizon=2)
         check_positive(self, "most", "most_change", "aside", "turned", "change", "reach", "drift", "first_bias", "noise",
-                       "stride_gain", "clearance", "inside")
+                       "stride_gain", "blind", "clearance", "inside")

@@ -75,18 +75,23 @@ def fit_step_map(family: GaitFamily, model: RobotModel, seed: int = 0, options: 
     drawn = rng.uniform(-options.most, options.most, (options.rollouts, -(-options.cycles // options.hold)))
     turns = np.repeat(drawn, options.hold, axis=1)[:, :options.cycles]
     config = SimulationConfig(time_step=options.time_step, contact_period=0.0, log_period=0.01)
-    begin = family.table(0.0).start_seconds
+    begin = family.start_seconds
     seconds = begin + options.cycles * family.period
     takes = simulate_batch([Job(model, config, family.sequence(list(u)), seconds) for u in turns])
     rows, changes = [], []
     for take, asked in zip(takes, turns):
-        poses = cycle_poses(take, begin, family.period, options.cycles)
-        if not np.isfinite(poses).all() or _fell(take):
+        if fell(take):
             raise InputError(None, "the robot falls while its turning is varied; this gait cannot be steered")
-        moved = increments(poses)
-        rows.append(np.column_stack([np.ones(len(asked) - 1), asked[1:], asked[:-1]])[1:])
-        changes.append(moved[2:])
-    return _fitted(np.concatenate(rows), np.concatenate(changes), options.most)
+        A, moved = rows_of(take, asked, family)
+        rows.append(A)
+        changes.append(moved)
+    return fitted(np.concatenate(rows), np.concatenate(changes), options.most, steered=True)
+
+
+def rows_of(take: Take, turns: Array, family: GaitFamily) -> tuple[Array, Array]:
+    """Rows for `fitted` of a take that played these turns, without the first two cycles, which the start still moves."""
+    moved = increments(cycle_poses(take, family.start_seconds, family.period, len(turns)))
+    return np.column_stack([np.ones(len(turns) - 1), turns[1:], turns[:-1]])[1:], moved[2:]
 
 
 def increments(poses: Array) -> Array:
@@ -97,12 +102,14 @@ def increments(poses: Array) -> Array:
     return np.column_stack([ahead, aside, np.arctan2(np.sin(step[:, 2]), np.cos(step[:, 2]))])
 
 
-def _fitted(A: Array, changes: Array, most: float) -> StepMap:
+def fitted(A: Array, changes: Array, most: float, steered: bool = False) -> StepMap:
+    """Least squares: A (N, 3) of ones, turns and the turns before [rad]; changes (N, 3) as `increments` gives them. steered:
+    InputError where the largest turn changes the heading by less than its scatter."""
     turning, *_ = np.linalg.lstsq(A, changes[:, 2], rcond=None)
     side, *_ = np.linalg.lstsq(A[:, :2], changes[:, 1], rcond=None)
     left = float(np.std(changes[:, 2] - A @ turning, ddof=3)), float(np.std(changes[:, 1] - A[:, :2] @ side, ddof=2))
     gain = float(turning[1])
-    if abs(gain) * most < left[0]:
+    if steered and abs(gain) * most < left[0]:
         turns, scatter = np.rad2deg(abs(gain) * most), np.rad2deg(left[0])
         raise InputError(None, f"steering by {most:g} rad turns this gait by {turns:.1f} deg a cycle, less than its scatter "
                                f"({scatter:.1f} deg); it cannot be steered")
@@ -110,7 +117,8 @@ def _fitted(A: Array, changes: Array, most: float) -> StepMap:
     return StepMap(float(turning[0]), gain, float(turning[2]), ahead, float(side[0]), float(side[1]), left, most)
 
 
-def _fell(take: Take) -> bool:
+def fell(take: Take) -> bool:
+    """Whether the base was ever farther than 45 deg from upright."""
     assert take.quat_WB is not None
     x, y = take.quat_WB[:, 1], take.quat_WB[:, 2]
     return bool(np.min(1 - 2 * (x**2 + y**2)) < np.cos(np.radians(45)))

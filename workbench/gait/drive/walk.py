@@ -35,21 +35,31 @@ class Cameras:
 @dataclass(frozen=True, eq=False)
 class Seen:
     """The end of a cycle. pose, captured (3,): x, y [m], heading [rad], true (of a real robot: as captured) and by the cameras;
-    captured is NaN where they lost it, pose where the robot lies."""
+    NaN where unknown. fell: whether the robot lies."""
 
     pose: Array
     captured: Array
+    fell: bool = False
+
+
+class StoppedError(Exception):
+    """The walk ended before it was told to; `reason` in words."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(reason)
 
 
 class Walk(Protocol):
-    """A robot that plays a start, cycles and a stop; what plays after the next cycle is said one cycle ahead."""
+    """A robot that plays a start, cycles and a stop; each is requested one cycle ahead. All may raise StoppedError."""
 
     def begin(self) -> Seen:
         """Plays the start section."""
         ...
 
-    def cycle(self, turn: float, after: float) -> Seen:
-        """Plays a cycle with `turn`, which was said before, while `after` is made ready [rad per stance]."""
+    def cycle(self, turn: float, after: float | None) -> Seen:
+        """Plays a cycle with `turn`, as requested before, while one with `after` [rad per stance], or with None the stop, is
+        made ready."""
         ...
 
     def end(self) -> None:
@@ -69,9 +79,9 @@ class SimulatedWalk:
 
     def __init__(self, family: GaitFamily, robot: RobotModel, cameras: Cameras | None = None, seed: int = 0) -> None:
         self.family, self.cameras, self._rng = family, cameras or Cameras(), np.random.default_rng(seed)
-        period_ms, start_ms = round(1000 * family.period), round(1000 * family.table(0.0).start_seconds)
+        period_ms, start_ms = round(1000 * family.period), round(1000 * family.start_seconds)
         self.config = SimulationConfig(time_step=1e-3, contact_period=0.0, log_period=math.gcd(period_ms, start_ms, 10) / 1000)
-        self._robot = robot
+        self._robot, self._turn = robot, 0.0
         self._played: list[tuple[Commands, float]] = []
         self._run: SteppedRun | CompiledSteppedRun
         try:
@@ -81,17 +91,19 @@ class SimulatedWalk:
 
     def begin(self) -> Seen:
         """Plays the start section."""
-        self._play(self.family.start, self.family.table(0.0).start_seconds)
+        self._play(self.family.start.commands(1), self.family.start_seconds)
         return self._seen()
 
-    def cycle(self, turn: float, after: float) -> Seen:
+    def cycle(self, turn: float, after: float | None) -> Seen:
         """Plays a cycle; `after` needs no preparation here."""
-        self._play(self.family.cycle(turn), self.family.period)
+        self._play(self.family.cycle(turn, self._turn).commands(1), self.family.period)
+        self._turn = turn
         return self._seen()
 
     def end(self) -> None:
         """Plays the stop section."""
-        self._play(self.family.stop, self.family.stop.end)
+        stop = self.family.stop(self._turn).commands(1)
+        self._play(stop, stop.end)
 
     def take(self) -> Take:
         """Everything from the start on."""
@@ -109,16 +121,18 @@ class SimulatedWalk:
                 self._run.advance(lasted)
 
     def _seen(self) -> Seen:
-        pose = pose_of(self._run.base)
-        noise = self._rng.normal(size=3) * [self.cameras.position, self.cameras.position, self.cameras.heading]
-        lost = self._rng.random() < self.cameras.lost
-        return Seen(pose, np.full(3, np.nan) if lost else pose + noise)
+        return captured(self._run.base, self.cameras, self._rng)
 
 
-def pose_of(base: BaseState | None) -> Array:
-    """x, y [m] and heading [rad] (3,) of a free base; NaN where the robot lies."""
+def captured(base: BaseState | None, cameras: Cameras, rng: np.random.Generator) -> Seen:
+    """A free base as it is and as the cameras see it."""
     assert base is not None, "the base is free"
-    _, x, y, _ = base.quat_WB
-    if 1 - 2 * (x**2 + y**2) < FALLEN:
-        return np.full(3, np.nan)
-    return np.array([*base.p_WB[:2], float(heading(base.quat_WB[None])[0])])
+    pose = np.array([*base.p_WB[:2], float(heading(base.quat_WB[None])[0])])
+    noise = rng.normal(size=3) * [cameras.position, cameras.position, cameras.heading]
+    lost = rng.random() < cameras.lost
+    return Seen(pose, np.full(3, np.nan) if lost else pose + noise, lies(base.quat_WB))
+
+
+def lies(quat: Array) -> bool:
+    """Whether the z axis of a body with this rotation (4,) wxyz is farther than 45 deg from upright."""
+    return bool(1 - 2 * (quat[1]**2 + quat[2]**2) < FALLEN)

@@ -77,8 +77,7 @@ class DroppedCommands:
 def with_dropped_commands(
     evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]
 ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
-    """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: of
-    the nominal robot."""
+    """An evaluator whose takes are played without the missed poses, and these poses. residuals: of the nominal robot."""
     effect, *_ = (*estimated_by("missed poses"), None)
     if effect is None:
         return evaluator, ()
@@ -112,8 +111,8 @@ def poses_lost(
     known: Mapping[int, tuple[int, ...]],
     residuals: Mapping[int, Array],
 ) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
-    """Poses that a joint missed, by take, and what is left of all takes played without them. known: those missed in motion. What
-    comes after a missed pose is read anew, beside a robot that did not get it either."""
+    """Poses that a joint missed, by take, and the residuals of the takes played without them. known: those missed in motion.
+    Poses after a missed one are examined again, compared with a robot that did not receive it either."""
     lost, now = dict(known), dict(residuals)
     new = {i: k for i, k in lost.items() if k}
     for _ in range(READ_OFF.turns):
@@ -141,14 +140,14 @@ def stands_at_an_end(evidence: Sequence[TakeEvidence], i: int, joint: str, k: in
     e = evidence[i]
     assert e.take.commands is not None
     goal = float(e.take.commands.goals[k, e.take.commands.column(joint)])
-    seen = _seen(e, joint)
+    seen = _observed_angle(e, joint)
     stood = float(np.median(seen[_at_the_end_of(e, k) & np.isfinite(seen)]))
     way = 1.0 if goal > stood else -1.0
-    end = max(float(np.nanquantile(way * _seen(other, joint), 0.995)) for other in evidence if joint in other.joints)
+    end = max(float(np.nanquantile(way * _observed_angle(other, joint), 0.995)) for other in evidence if joint in other.joints)
     return way * goal > end and way * stood > end - READ_OFF.at_stop
 
 
-def _seen(e: TakeEvidence, joint: str) -> Array:
+def _observed_angle(e: TakeEvidence, joint: str) -> Array:
     """Where a joint was [rad], the zero being the servo's."""
     return np.asarray(e.recorded[:, e.channels.index(joint)] + e.zero(joint))
 
@@ -161,12 +160,12 @@ def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
 
 
 def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> tuple[int, ...]:
-    """Commands that a joint missed beside those that are known (gone), by what it did until the next came. After one, none until
-    it stands where it was told to: the model got what it did not."""
+    """Commands that a joint missed in addition to the known ones (gone), judged by its motion until the next command. After one,
+    none until the joint reaches a goal again: the model received a command that the joint did not."""
     commands = e.take.commands
     assert commands is not None
     column, i = commands.column(joint), e.channels.index(joint)
-    seen = _seen(e, joint)
+    seen = _observed_angle(e, joint)
     said = seen - residual[:, i] * e.sigma[i]
     at, missed, alike = 0.0, list[int](), True
     for k, goal in enumerate(commands.goals[:, column]):
@@ -189,5 +188,5 @@ def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> 
 
 def _telling(e: TakeEvidence, joint: str, gone: Sequence[int]) -> int:
     """How many poses would have moved a joint, as it was seen to do or not."""
-    seen = np.isfinite(_seen(e, joint))
+    seen = np.isfinite(_observed_angle(e, joint))
     return sum(k in gone or bool((_at_the_end_of(e, k) & seen).any()) for k in {*steps(e, joint, gone), *gone})

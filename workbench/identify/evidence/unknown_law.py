@@ -113,7 +113,7 @@ def _fitted(region: Region, options: EvidenceOptions, at: _State, scales: Sequen
         before = at
         at = yield from _stepped(region, options, at, scales, 1)
         at = yield from _measured(options, at, scales[0])
-        if at.h is before.h:
+        if np.array_equal(at.h.theta, before.h.theta) and np.array_equal(at.law.weights, before.law.weights):
             break
     return at
 

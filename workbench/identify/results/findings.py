@@ -1,4 +1,4 @@
-"""What a diagnosis says (docs/formats.md, section 6), typed: the verdict, where the gap is, what explains it, what does not."""
+"""Results of a diagnosis (docs/formats.md, section 6), typed: the verdict, the gap, its explanation, and the unexplained rest."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Estimate:
     def __post_init__(self) -> None:
         value, low, high = (x if isinstance(x, tuple) else (x,) for x in (self.value, self.low, self.high))
         if not len(value) == len(low) == len(high) in (1, 3):
-            raise ValueError("expected value, low and high alike: one number each, or three")
+            raise ValueError("expected value, low and high of the same shape: one number each, or three")
         for v, a, b in zip(value, low, high):
             if not (math.isfinite(v) and a <= v <= b):
                 raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
@@ -181,7 +181,7 @@ class GapEntry:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """RMS error that the fitted model leaves, and the floor of noise and numerics, in `unit`; description: what it depends on."""
+    """RMS error of the fitted model, and the floor of noise and numerics, in `unit`; description: the signal it depends on."""
 
     where: tuple[str, ...]
     error: float
@@ -215,11 +215,12 @@ class Diagnosis:
     """Everything found in a session.
 
     verdict: docs/formats.md, section 6. nominal: the session's robot; model: the same with the findings' effects; posterior: of
-    their parameters, in the units of section 7. gap: where, when and by how much recordings differ from the nominal model.
-    findings, rejected: effects that were kept, and not kept. unexplained: what the fitted model leaves. recalibrated: servo
-    constants adjusted within their tolerance. tied: gravity over torque, which angles tell as one number. left_out: damaged
-    takes, (name, reason). stopped: whether the search reached its limit of work. unknown_torques: of the model, which no effect
-    describes. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
+    their parameters, in the units of section 7. gap: where and when recordings differ from the nominal model, and how much.
+    findings, rejected: effects that were kept, and not kept. unexplained: residuals of the fitted model. recalibrated: servo
+    constants adjusted within their tolerance. tied: the ratio of gravity to torque, which is all that angles determine. left_out:
+    damaged takes, (name, reason). stopped: whether the search reached its limit of work. unknown_torques: torques of the model
+    that no effect describes. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were
+    used.
     """
 
     verdict: Verdict

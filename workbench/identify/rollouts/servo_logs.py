@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
+    from workbench.identify.rollouts.evaluator import RolloutRequest
 
 SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
@@ -37,11 +39,17 @@ def frames(e: TakeEvidence) -> NDArray[np.bool_]:
     return np.asarray((e.since >= 0) & (e.since <= e.until))
 
 
+@lru_cache(maxsize=16)
+def _held(config: SimulationConfig) -> SimulationConfig:
+    """The configuration in which logs are rolled out."""
+    return replace(config, base="fixed", settle=SETTLE)
+
+
 def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig, horizon: float = math.inf
                ) -> list[Array] | None:
     """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
     config: base and rest apart, which are a log's. horizon [s]: of windows, each of which starts from the recorded state."""
-    held = replace(config, base="fixed", settle=SETTLE)
+    held = _held(config)
     models: dict[str, RobotModel] = {}
     jobs = []
     for e in takes:
@@ -57,3 +65,17 @@ def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: Simulat
     except NotCoveredError:
         return None
     return [q[:, [model.joints.index(j) for j in e.joints]] for e, q in zip(takes, angles)]
+
+
+def question_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig, question: tuple[RolloutRequest, tuple[int, ...]]
+                    ) -> list[Array] | None:
+    """`log_angles` of a request on some of the takes. config: of the search, whose steps the request counts."""
+    q, takes = question
+    config = replace(config, time_step=q.step * config.time_step)
+    return log_angles([evidence[i] for i in takes], q.model, config, q.horizon)
+
+
+def block_angles(evidence: Sequence[TakeEvidence], config: SimulationConfig,
+                 questions: Sequence[tuple[RolloutRequest, tuple[int, ...]]]) -> list[list[Array] | None]:
+    """The same of several requests, in a worker of a cluster."""
+    return [question_angles(evidence, config, question) for question in questions]

@@ -81,7 +81,7 @@ class SubsetOptions:
     """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
     most_steps: int = 5
     together_steps: int = 12
-    """Steps of a fit of all effects: when one was added, and where it is restarted; when several were added from linear
+    """Steps of a fit of the whole model: when one was added, and where it is restarted; when several were added from linear
     predictions; and when others must compensate for a removed one. It ends when little changes."""
 
 
@@ -125,11 +125,12 @@ class AcceptanceOptions:
     ground, and share of a fixed-base channel's gap that counts as a new gap: two simulators, or a robot and a model, differ by
     some hundredths of an effect's response, and a second effect must not be based on that."""
     alone: float = 0.25
-    """Of `least_share`, for a joint on a fixed base that nothing was given to and of which much more than of any other is left:
-    what engines play differently of an effect that all joints show, they do in all."""
+    """Multiple of `least_share` for a joint on a fixed base without an effect and with a much larger residual than any other:
+    where simulators differ in an effect that all joints show, they differ in every joint."""
     rough_share: float = 0.04
     left_share: float = 0.02
-    """The same share of a channel's gap on the ground, where simulators differ more; and of all residuals there, to continue."""
+    """The same share of a channel's gap on the ground, where simulators differ more; and of the total residual there, for
+    another round."""
     least_closed: float = 0.15
     last_closed: float = 0.5
     """Share of the excess error at its joint or link that an effect must remove when it is accepted, and together with later
@@ -177,7 +178,7 @@ class ForwardOptions:
     replayed_steps: int = 4
     """Of a fit to takes that are played otherwise."""
     last_steps: int = 3
-    """Steps of a fit of all effects after one was dropped at the end; it ends when little changes."""
+    """Steps of a fit of the whole model after one was dropped at the end; it ends when little changes."""
     most_rivals: int = 2
     close: float = 0.15
     halfway: float = 0.5

@@ -31,12 +31,16 @@ class Machine(NamedTuple):
 
 
 def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, dt: float, apart: bool = False) -> Machine:
-    """NotCoveredError says what the arrays cannot hold. apart: contacts between links are not known, and end a run."""
+    """NotCoveredError names the part that the arrays cannot hold. apart: contacts between links are not known, and end a run."""
     missing = [j for j in model.joints if j not in tables.joints]
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")
     joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.int64)
-    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), _shapes(model, physics, tables, free, apart))
+    kept = f"shapes, {'apart' if apart else 'touching'}"
+    shapes = None if free else tables.derived.get(kept)  # of a held robot nothing but the tables decides them
+    if not isinstance(shapes, Shapes):
+        shapes = tables.derived[kept] = _shapes(model, physics, tables, free, apart)
+    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), shapes)
 
 
 def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:

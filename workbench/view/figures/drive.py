@@ -1,22 +1,28 @@
-"""A driven path: where the robot was to go, where it went, and what was decided in each cycle."""
+"""A driven path: way-points, the way walked, and the turn of each cycle."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
 from workbench.gait.drive.loop import Driven
+from workbench.gait.drive.plan import Disc
 from workbench.view.figures.style import ACCENT, COMMAND, OTHERS, SIMULATED, legend_above, new_figure, styled
 
 
 @styled
-def driven_path(closed: Driven, straight: Driven | None = None) -> Figure:
+def driven_path(closed: Driven, straight: Driven | None = None, discs: Sequence[Disc] = ()) -> Figure:
     """Seen from above, x forward to the right, y left upwards [m]: the path, the way-points, the steered robot and, if given, the
-    same robot with the straight gait."""
+    same robot with the straight gait; discs to walk around."""
     figure = new_figure(9, 4.8)
     axes = figure.subplots()
     axes.plot(*closed.path.p.T, color=COMMAND, linewidth=1.2, linestyle="--", label="path")
     axes.plot(*closed.path.points.T, "o", color=COMMAND, markersize=6, label="way-points")
+    for disc in discs:
+        axes.add_patch(Circle((disc.x, disc.y), disc.radius, color=COMMAND, alpha=0.3))
     if straight is not None:
         axes.plot(straight.poses[:, 0], straight.poses[:, 1], color=OTHERS[0], linewidth=1.4, label="not steered")
     axes.plot(closed.poses[:, 0], closed.poses[:, 1], ".-", color=SIMULATED, label="steered, end of each cycle")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from workbench.files.reading import write_whole
 from workbench.gait.certificate import CLAIM
 from workbench.gait.drive.loop import SETTLED, Driven
+from workbench.gait.drive.plan import Disc
 from workbench.gait.drive.step_map import StepMap
 from workbench.robot import RobotModel
 from workbench.view.figures.drive import driven_cycles, driven_path
@@ -18,34 +20,41 @@ from workbench.view.report.page import Picture, Provenance, Report, Section, Tab
 
 def drive_numbers(driven: Driven) -> dict[str, object]:
     """For JSON: why it stopped, errors from `SETTLED` on, and how far it passed from each way-point. Metres and degrees."""
-    s, end = driven.settled, driven.poses[-1]
+    s = driven.settled
+    end = driven.poses[np.isfinite(driven.poses).all(axis=1)][-1]
     return {"reason": driven.reason, "cycles": len(driven.turns) - 1,
             "end": {"x": float(end[0]), "y": float(end[1]), "heading_deg": float(np.rad2deg(end[2]))},
-            "largest_lateral_error_m": float(np.abs(driven.left[s]).max()) if s.any() else None,
-            "largest_heading_error_deg": float(np.rad2deg(np.abs(driven.off[s]).max())) if s.any() else None,
+            "largest_lateral_error_m": _largest(driven.left[s]),
+            "largest_heading_error_deg": _largest(np.rad2deg(driven.off[s])),
             "missed_waypoints_m": [float(v) for v in driven.missed()],
             "bias_deg_per_cycle": None if np.isnan(driven.bias[-1]) else float(np.rad2deg(driven.bias[-1]))}
 
 
-def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driven, straight: Driven | None, most: float
-                ) -> list[Path]:
+def write_drive(folder: Path, model: RobotModel, step_map: StepMap, closed: Driven, straight: Driven | None, most: float,
+                discs: Sequence[Disc] = ()) -> list[Path]:
     """Writes drive.json and report.html into `folder`; returns the paths, the page first. straight: the same robot, not steered;
-    most: largest turn [rad per stance]."""
+    most: largest turn [rad per stance]; discs: obstacles."""
     numbers = drive_numbers(closed)
-    content = {"format": 1, "claim": CLAIM, "steered": numbers,
+    content = {"format": 1, "claim": CLAIM, "steered": numbers, "discs": [vars(d) for d in discs],
                "not_steered": None if straight is None else drive_numbers(straight),
                "step_map": {k: v if not isinstance(v, tuple) else list(v) for k, v in vars(step_map).items()},
-               "poses": closed.poses.tolist(), "turns": closed.turns.tolist()}
+               "poses": [None if np.isnan(p).any() else p.tolist() for p in closed.poses], "turns": closed.turns.tolist()}
     write_whole(folder / "drive.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     misses = ", ".join(f"{100 * m:.1f}" for m in closed.missed())
     report = Report("Driven path", f"Way-points passed at {misses} cm; stopped: {closed.reason}.", CLAIM,
                     provenance=Provenance(model.sha256, more=(("judged from", f"{SETTLED} m on"),)))
-    report.add(Section("The path", [Picture(driven_path(closed, straight), "Both robots are the same, with the same gait.")]))
+    caption = "" if straight is None else "Both robots are the same, with the same gait."
+    report.add(Section("The path", [Picture(driven_path(closed, straight, discs), caption)]))
     cycles = Picture(driven_cycles(closed, most), "Dotted: the largest turn.")
     report.add(Section("Cycle by cycle", [cycles, _errors(closed, straight)]))
     report.add(Section("The step-to-step map", [_map(step_map), Text(
         "The scatter of one cycle's heading bounds what any controller that acts once a cycle can reach.")]))
     return [report.write(folder / "report.html"), folder / "drive.json"]
+
+
+def _largest(errors: np.ndarray) -> float | None:
+    known = np.abs(errors[np.isfinite(errors)])
+    return float(known.max()) if len(known) else None
 
 
 def _errors(closed: Driven, straight: Driven | None) -> Table:

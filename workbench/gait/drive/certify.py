@@ -1,0 +1,197 @@
+"""The certificate of a family: how each unit of turn changes the heading over random robots, and that none falls.
+
+It is written as family.json into the folder of the gait, and bound to the gait's certificate and to the robot.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workbench.files import InputError
+from workbench.files.option_checks import check_positive, check_whole
+from workbench.files.reading import read_text, write_whole
+from workbench.gait.certificate import CLAIM, NAME, plain, read_certificate
+from workbench.gait.draws import bound
+from workbench.gait.drive.family import GaitFamily
+from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_map, fitted, rows_of
+from workbench.gait.ensemble import Ensemble
+from workbench.robot import RobotModel
+from workbench.simulation import Job, SimulationConfig, simulate_batch
+
+FILE = "family.json"
+Array = NDArray[np.float64]
+Progress = Callable[[str, float | None], None]
+
+
+@dataclass(frozen=True)
+class FamilyOptions:
+    """How a family is certified.
+
+    most: largest turn [rad per stance]; most_change: from one cycle to the next [rad]; both as `DriveOptions` has them. draws:
+    robots; of 20 that stand, fewer than 14 % fall (at 95 %). cycles: of each robot's walk, with turns at random. hold: cycles for
+    which a turn is kept. least_gain: smallest gain of any robot, as a share of the nominal one; with less the plan's turns do not
+    bring the robot back within its horizon. most_gain: largest gain, as a share; at twice the nominal one the loop with its two
+    cycles of delay begins to oscillate. authority: heading change at the largest turn, in scatters of one cycle's heading.
+    """
+
+    most: float = 0.15
+    most_change: float = 0.08
+    draws: int = 20
+    cycles: int = 30
+    hold: int = 2
+    least_gain: float = 0.5
+    most_gain: float = 2.0
+    authority: float = 3.0
+    time_step: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_whole(self, draws=1, cycles=8, hold=1)
+        check_positive(self, "most", "most_change", "least_gain", "most_gain", "authority", "time_step")
+
+
+@dataclass(frozen=True, eq=False)
+class FamilyCertificate:
+    """most, most_change: the turns that were played [rad per stance]. step_map: of the nominal robot. draws: count, falls and the
+    bound that they leave, and over the robots lowest, median and highest of total gain [rad per rad], scatter [rad], speed [m/s]
+    and own turning bias [rad per cycle]. problems: limits that are broken, in words. gait, model_sha256: hashes of the gait's
+    certificate and of the robot."""
+
+    most: float
+    most_change: float
+    step_map: StepMap
+    draws: dict[str, Any]
+    gait: str
+    model_sha256: str
+    problems: tuple[str, ...] = field(default=())
+
+    @property
+    def kept(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.problems
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """As `DriveOptions` takes them: nothing beyond the turns that were played."""
+        return {"most": self.most, "most_change": self.most_change}
+
+    def summary(self) -> str:
+        """In a few lines, for a person."""
+        d, deg = self.draws, np.degrees
+        lines = [f"turns up to {self.most:g} rad per stance, changes up to {self.most_change:g}: {d['falls']} of {d['count']} "
+                 f"random robots fell (below {100 * d['falls at most']:.2g} % at 95 %)"]
+        if "gain rad/rad" in d:
+            low, middle, high = (deg(g * self.most) for g in d["gain rad/rad"])
+            nominal = deg(_gain(self.step_map) * self.most)
+            lines += [f"the largest turn changes the heading by {nominal:.1f} deg a cycle on the nominal robot, {low:.1f} to "
+                      f"{high:.1f} on random ones (median {middle:.1f})",
+                      f"one cycle's heading scatters by {deg(self.step_map.scatter[0]):.2f} deg, {deg(d['scatter rad'][1]):.2f}"]
+        return "\n".join([*lines, *(f"not kept: {p}" for p in self.problems)])
+
+    def to_json(self) -> dict[str, Any]:
+        """As in the file, with the sum that finds changes."""
+        content = plain({"format": 1, "claim": CLAIM, "kept": self.kept, **vars(self), "step_map": vars(self.step_map)})
+        return {**content, "sha256": _digest(content)}
+
+    def write(self, folder: Path) -> Path:
+        """Writes family.json."""
+        write_whole(folder / FILE, json.dumps(self.to_json(), indent=1, allow_nan=False) + "\n")
+        return folder / FILE
+
+
+def certify_family(family: GaitFamily, gait_sha256: str, ensemble: Ensemble, folder: Path, seed: int = 0,
+                   options: FamilyOptions | None = None, progress: Progress = lambda what, done: None) -> FamilyCertificate:
+    """Plays turns at random on the nominal robot and on robots drawn into `folder`. InputError where the nominal robot falls or
+    cannot be steered."""
+    o, model = options or FamilyOptions(), family.machine.model
+    progress("the nominal robot", None)
+    nominal = fit_step_map(family, model, seed, MapOptions(most=o.most, hold=o.hold, time_step=o.time_step))
+    turns = bounded_turns(np.random.default_rng([seed, 58]), o)
+    robots = ensemble.draws(model, o.draws, seed, folder)
+    config = SimulationConfig(time_step=o.time_step, contact_period=0.0, log_period=0.01)
+    seconds = family.start_seconds + o.cycles * family.period
+    jobs = [Job(r, config, family.sequence(list(turns)), seconds) for r in robots]
+    takes = simulate_batch(jobs, progress=lambda done, of: progress(f"drawn robot {done} of {of}", done / of))
+    maps = [fitted(*rows_of(t, turns, family), o.most) for t in takes if not fell(t)]
+    falls = len(takes) - len(maps)
+    draws = {"count": len(takes), "falls": falls, "falls at most": bound(falls, len(takes)), **_spread(maps, family.period)}
+    problems = _problems(nominal, maps, falls, o)
+    return FamilyCertificate(o.most, o.most_change, nominal, draws, gait_sha256, model.sha256, problems)
+
+
+def bounded_turns(rng: np.random.Generator, o: FamilyOptions) -> Array:
+    """Turns (cycles,) at random within the largest turn and the largest change; both limits are met."""
+    out, last = np.zeros(o.cycles), 0.0
+    for k in range(0, o.cycles, o.hold):
+        last = float(np.clip(rng.choice((-1.0, 1.0)) * o.most, last - o.most_change, last + o.most_change))
+        out[k:k + o.hold] = last
+    return out
+
+
+def read_family(gait: str | Path, model: RobotModel) -> FamilyCertificate:
+    """The certificate in the folder of a gait; InputError where it is missing, was changed, is another gait's or robot's, or says
+    that a limit is broken."""
+    at = Path(gait).parent / FILE
+    if not at.is_file():
+        raise InputError(at, "the family's certificate is missing; `workbench drive --certify --gait MOTION` writes it")
+    try:
+        content = json.loads(read_text(at))
+        digest = content.pop("sha256")
+        good = content["format"] == 1 and digest == _digest(content)
+        step = content["step_map"]
+        numbers: dict[str, Any] = {f.name: step[f.name] for f in fields(StepMap)}
+        step_map = StepMap(**numbers | {"scatter": tuple(step["scatter"])})
+        found = FamilyCertificate(content["most"], content["most_change"], step_map, content["draws"], content["gait"],
+                                  content["model_sha256"], tuple(content["problems"]))
+    except (ValueError, KeyError, TypeError, AttributeError) as e:
+        raise InputError(at, f"not a family's certificate ({type(e).__name__}: {e})") from None
+    if not good:
+        raise InputError(at, "it was changed after it was written")
+    if found.model_sha256 != model.sha256:
+        raise InputError(at, f"it was made for another robot ({found.model_sha256[:12]}) than this ({model.sha256[:12]})")
+    if found.gait != gait_sha256(gait):
+        raise InputError(at, f"it was made for another gait than that of {NAME} in the same folder")
+    if found.problems:
+        raise InputError(at, f"a limit is broken: {found.problems[0]}")
+    return found
+
+
+def gait_sha256(gait: str | Path) -> str:
+    """Of the tables that the gait's certificate speaks of. InputError where it cannot be read."""
+    return read_certificate(Path(gait).parent / NAME).tables["gait"]
+
+
+def _problems(nominal: StepMap, maps: list[StepMap], falls: int, o: FamilyOptions) -> tuple[str, ...]:
+    out = [f"{falls} of {falls + len(maps)} drawn robots fell"] if falls else []
+    if abs(_gain(nominal)) * o.most < o.authority * nominal.scatter[0]:
+        turned, scatter = np.degrees(abs(_gain(nominal)) * o.most), np.degrees(nominal.scatter[0])
+        out.append(f"the largest turn changes the heading by {turned:.1f} deg a cycle, less than {o.authority:g} times its "
+                   f"scatter of {scatter:.1f} deg")
+    shares = [_gain(m) / _gain(nominal) for m in maps]
+    if shares and min(shares) < o.least_gain:
+        out.append(f"a drawn robot has {min(shares):.2f} of the nominal gain, expected at least {o.least_gain:g}")
+    if shares and max(shares) > o.most_gain:
+        out.append(f"a drawn robot has {max(shares):.2f} of the nominal gain, expected at most {o.most_gain:g}")
+    return tuple(out)
+
+
+def _gain(m: StepMap) -> float:
+    return m.gain + m.memory
+
+
+def _spread(maps: list[StepMap], period: float) -> dict[str, list[float]]:
+    """Lowest, median and highest over the robots that stood."""
+    values = {"gain rad/rad": [_gain(m) for m in maps], "scatter rad": [m.scatter[0] for m in maps],
+              "speed m/s": [m.ahead / period for m in maps], "bias rad/cycle": [m.bias for m in maps]}
+    return {k: [float(f(v)) for f in (np.min, np.median, np.max)] for k, v in values.items() if v}
+
+
+def _digest(content: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
