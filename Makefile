@@ -49,9 +49,10 @@ lint: $(STAMP)
 	$(BIN)/lint-imports
 	$(BIN)/python .ci/counts.py
 
-# The slow tests, then the trial of diagnosis in runs/concealed_effects: hours; stopped and called again, it goes on.
+# The slow tests, 100,000 faults in virtual time (runs/rude), then the trial of diagnosis in runs/concealed_effects: hours; stopped and called again, it goes on.
 prove: $(STAMP)
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile -m slow
+	$(BIN)/python -m tests.rude.prove --workers $(WORKERS)
 	$(BIN)/python -m studies.concealed_effects --workers $(WORKERS)
 
 # Each study writes into runs/studies/; `python -m studies.NAME --help` says more of one. The trial belongs to `make prove`.

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from workbench.compare.session import Session, load_session
 from workbench.motion.commands import Commands
@@ -15,8 +14,8 @@ from workbench.recording import write_joint_log
 from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 JOINTS = ("one", "three", "two")
 ODD = "two"
 """The joint that differs."""

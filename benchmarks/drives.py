@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.bare_plant import BarePlant
 from benchmarks.figure import Figure, in_turns, median_and_quartiles
@@ -18,7 +17,6 @@ from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
 
-Array = NDArray[np.float64]
 LEAD = 0.1
 
 

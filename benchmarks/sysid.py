@@ -10,7 +10,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.arm import EXTRA, ODD, SERVO, TRUE_STEP, Log, arm, goals, measured, session
 from benchmarks.figure import Figure, in_turns, median_and_quartiles
@@ -26,11 +25,11 @@ from workbench.identify.proposals import candidates
 from workbench.identify.rollouts import RolloutEvaluator
 from workbench.identify.selection.options import SUBSETS
 from workbench.simulation import SimulationConfig
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from studies.other_engine.sysid import Identified
 
-Array = NDArray[np.float64]
 NAME = "fit_against_mujoco_sysid"
 MEANING = ("wall seconds of this library's fit of two frictions of one joint over those of mujoco.sysid, at the same step, from "
            "the same log and the same nominal robot")

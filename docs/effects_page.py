@@ -1,7 +1,7 @@
-"""Writes docs/effects.md from the effects themselves: `python -m docs.effects_page`.
+"""MkDocs hook that generates the page effects.md from the effects.
 
-Names, units, ranges, relations and the first paragraph come from the code, what parameters mean from docs/formats.md. The
-formula, what an effect looks like in a recording, and what it is confused with, are said here, once for each.
+Names, units, ranges, relations and the first paragraph come from the code, the meaning of parameters from docs/formats.md. The
+formula, the signature in a recording, and the effects it is easily confused with are given here, once for each.
 """
 
 from __future__ import annotations
@@ -10,21 +10,23 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
 from workbench.effects.base import Effect, Parameter
 from workbench.effects.registry import known_effects
-from workbench.files.reading import write_whole
 from workbench.robot import EffectSpec
 
-PAGE = Path(__file__).with_name("effects.md")
+PAGE = "effects.md"
 LAYERS = {
-    "timing": "Timing: what reaches the servos, and when", "actuator": "Actuators: what a servo makes of its goal",
+    "timing": "Timing: which commands reach the servos, and when", "actuator": "Actuators: how a servo follows its goal",
     "structure": "Structure: what lies between servo and link", "inertia": "Inertia: masses",
-    "ground": "Ground: what the floor and the surroundings do", "measurement": "Measurement: how the robot is seen"}
+    "ground": "Ground: floor and external forces", "measurement": "Measurement: how the robot is observed"}
 
 
 class Seen(NamedTuple):
-    """Of one effect: its formula (symbols in the page's head), what it looks like in a recording, and what it is easily confused
-    with."""
+    """One effect: its formula (symbols in the page's head), its signature in a recording, and the effects with which it is easily
+    confused."""
 
     formula: str
     looks: str
@@ -40,7 +42,7 @@ SEEN: dict[str, Seen] = {
     "clock_rate": Seen(
         "`t_recording = t_first + ratio · t`",
         "All joints run later and later, in proportion to time.",
-        "timing_drift, where all dwells are alike"),
+        "timing_drift, where all dwells are equal"),
     "com_shift": Seen(
         "`c = c₀ + offset`, the inertia about the centre of mass as it was",
         "The robot leans, and walks turn; joints that carry the link err with gravity.",
@@ -66,8 +68,8 @@ SEEN: dict[str, Seen] = {
         "The joint stops short of its goal by a constant angle, with little torque.",
         "backlash, coulomb_friction"),
     "dropped_command": Seen(
-        "`P(pose k is missed) = probability`, each by itself; then goal and speed of pose k−1 stay",
-        "Single poses are missing: the joint goes on as before until the next one.",
+        "`P(pose k is missed) = probability`, each independently; then goal and speed of pose k−1 stay",
+        "Single poses are missing: the joint continues as before until the next one.",
         "joint_stop, coulomb_friction"),
     "foot_friction": Seen(
         "`|F_t| ≤ friction · F_n` at this foot",
@@ -92,7 +94,7 @@ SEEN: dict[str, Seen] = {
     "joint_compliance": Seen(
         "`τ = stiffness (Δq + 1 ms · dΔq/dt)`, `Δq = q − q_link`",
         "The link sags with load and swings after steps, where the servo's own sensor is right.",
-        "servo_gain, which sags alike"),
+        "servo_gain, which sags the same way"),
     "joint_stop": Seen(
         "`lower ≤ q ≤ upper`, or the description's own end where that is nearer",
         "The curve is cut off flat at an angle.",
@@ -165,7 +167,7 @@ SEEN: dict[str, Seen] = {
     "timing_drift": Seen(
         "pose k is sent at `t_k + k · per_pose`, k from 0",
         "All joints run later by a step at each pose.",
-        "clock_rate, where all dwells are alike"),
+        "clock_rate, where all dwells are equal"),
     "torque_ceiling": Seen(
         "`τ_motor = clip(τ_duty − τ_emf, −torque, torque)`",
         "One joint stalls or lags at its peaks of torque; elsewhere it is right.",
@@ -184,7 +186,7 @@ SEEN: dict[str, Seen] = {
         "link_length, com_shift"),
 }
 LIMITS = {
-    "payload": "Close to com_shift where `mass` is small beside the link's: `offset = mass (position − c₀)/m`.",
+    "payload": "Close to com_shift where `mass` is small compared with the link's: `offset = mass (position − c₀)/m`.",
     "stribeck_friction": "Reduces to coulomb_friction as `speed` goes to infinity.",
 }
 """How an effect becomes the simpler one that it `reduces_to`."""
@@ -200,9 +202,15 @@ of the servo's joint, q_link: angle of its link; τ: torque; e, d, duty, slope, 
 nominal Coulomb and viscous friction τ_C and b₀; t: time since the first command; m, c: mass and centre of mass of a link;
 F_t, F_n: tangential and normal contact force. Index 0: nominal.
 
-Generated from the code and from [the formats page](formats.md#7-effects) by `python -m docs.effects_page`.
+Generated from the code and from [the formats page](formats.md#7-effects).
 """
 FORMATS = Path(__file__).with_name("formats.md")
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Adds the page to the site."""
+    files.append(File.generated(config, PAGE, content=page()))
+    return files
 
 
 def page() -> str:
@@ -264,7 +272,7 @@ def _effect(effect: Effect, meaning: str) -> str:
 
 
 def _first_paragraph(effect: Effect) -> str:
-    """What the effect is, as its class says."""
+    """The first paragraph of the effect's class docstring."""
     said = " ".join((type(effect).__doc__ or "").split("\n\n")[0].split())
     return said if said.endswith(".") else f"{said}."
 
@@ -284,7 +292,3 @@ def _yaml(spec: EffectSpec) -> str:
     numbers = {k: f"[{', '.join(f'{x:g}' for x in v)}]" if isinstance(v, tuple) else f"{v:g}" for k, v in spec.parameters.items()}
     inside = f", parameters: {{{', '.join(f'{k}: {v}' for k, v in numbers.items())}}}" if numbers else ""
     return f"- {{effect: {spec.effect}, where: [{', '.join(spec.where)}]{inside}}}"
-
-
-if __name__ == "__main__":
-    print(write_whole(PAGE, page()))

@@ -54,7 +54,7 @@ class Page:
                 return answer.get("result", {})
 
     async def value(self, expression: str) -> Any:
-        """What an expression of JavaScript comes to."""
+        """The value of a JavaScript expression."""
         answer = await self.ask("Runtime.evaluate", expression=expression, returnByValue=True)
         return answer["result"].get("value")
 

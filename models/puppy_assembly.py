@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
+
 X, Y, Z = np.eye(3)
 LEGS = ("fl", "fr", "bl", "br")
 MM = 1e-3

@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from models.puppy_assembly import Link, PartsTable, Placement
 from models.puppy_shapes import Shape
 from workbench.robot import COUNT, ServoConstants
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 GEAR_RATIO = 254  # AX-12A manual
 VELOCITY = 6.18  # rad/s, no load at 12 V; effort is stall at 12 V (AX-12A manual)
 LOWER, UPPER = (0 - 512) * COUNT, (1023 - 512) * COUNT  # goal positions 0 and 1023

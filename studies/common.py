@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.cli.progress import Progress
@@ -21,10 +20,10 @@ from workbench.files import InputError
 from workbench.files.reading import write_together
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.figures.style import styled
 from workbench.view.report.page import Report
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[1]
 
 COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
@@ -74,7 +73,7 @@ def png(figure: Figure) -> bytes:
 
 
 def publish(out: Path, model: RobotModel, report: Report, numbers: Mapping[str, object], figures: Mapping[str, Figure]) -> str:
-    """index.html, numbers.json and the figures as PNG: all of them, or none. Returns what was written.
+    """index.html, numbers.json and the figures as PNG: all of them, or none. Returns the paths.
 
     InputError if the model's file has changed since `model` was made: its runs are then of two robots.
     """

@@ -31,7 +31,7 @@ from workbench.identify.diagnosis import DiagnosisResult, diagnose_session
 from workbench.identify.results.take_report import TakeReport, rms
 
 BLOCK = 0.5
-"""Length of the stretches whose sums of squares count as one draw [s]: longer than what a servo remembers, a third of a step."""
+"""Length of the blocks whose sums of squares count as one draw [s]: longer than a servo's memory, a third of a step."""
 CERTAIN = 1e-3
 """Chance below which one model tells unseen stretches better than another, and not by accident."""
 
@@ -69,7 +69,7 @@ def unseen_squares(take: TakeReport) -> list[float]:
 
 
 def by_accident(whole: DiagnosisResult, less: DiagnosisResult) -> float:
-    """Chance (one-sided) of the smaller vocabulary leaving so much more over the blocks if both told them alike."""
+    """One-sided probability that the smaller vocabulary has so much larger residuals over the blocks if both are equally good."""
     more = np.concatenate([np.subtract(unseen_squares(b), unseen_squares(a)) for a, b in zip(whole.takes, less.takes)])
     return float(wilcoxon(more, alternative="greater").pvalue) if np.any(more) else 1.0
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import cauchy, norm
 
 from studies.common import run_study
@@ -35,8 +34,8 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.preparation import prepared
 from workbench.identify.rollouts import RolloutEvaluator
 from workbench.simulation import SimulationConfig
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 MODELS = ((), ("load_friction",), ("load_friction", "torque_saturation"))
 LOGS = ("sin_sin_200", "up_and_down_200")
 NUMBERS = ("torque_at_full_duty", "coulomb_friction", "zero")

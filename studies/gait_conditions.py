@@ -1,7 +1,7 @@
-"""What does a better gait do differently, and where does it fail? Inverse dynamics, and a map of speed over floors.
+"""How does a better gait differ, and where does it fail? Inverse dynamics, and a map of speed over floors.
 
 Of the ROBOTIS walk and of the gaits that `workbench optimize --out runs/gaits/NAME` has written: torque, speed and slip of each
-joint and foot, what binds, cost of transport, and speed and falls over friction, slope and softness of the floor.
+joint and foot, binding limit, cost of transport, and speed and falls over friction, slope and softness of the floor.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
     said = "no optimised gait under runs/gaits: the ROBOTIS walk alone" if best is None else (
         f"{best.name} goes {100 * told[best.name]['speed']:.0f} cm/s where the ROBOTIS walk goes "
         f"{100 * told['ROBOTIS walk']['speed']:.0f}")
-    report = Report("What a better gait does differently", f"On the model, {said}.", f"{__doc__}\n\n{PUPPY_CLAIM}", [],
+    report = Report("How a better gait differs", f"On the model, {said}.", f"{__doc__}\n\n{PUPPY_CLAIM}", [],
                     Provenance.of(model))
     header = ["gait", "speed [cm/s]", "slip [cm/s]", "tilt [deg]", "worst RMS torque [N m]", "of", "electrical cost of transport",
               "mechanical"]

@@ -1,8 +1,8 @@
 """How fast may a gait be for how much torque? The front of speed against the largest RMS torque of a servo, certified.
 
-For each speed the gentlest gait that keeps it (`workbench optimize --gentlest --speed V`), in OUT/front/V; one that is there with
-its certificate is not sought again, so that a stopped study goes on. Beside them the ROBOTIS walk, and ROBOTIS's rule: a fifth of
-stall.
+For each speed the gentlest gait that keeps it (`workbench optimize --gentlest --speed V`), in OUT/front/V; a gait that exists
+there with its certificate is not searched again, so that an interrupted study continues. For comparison the ROBOTIS walk, and
+ROBOTIS's rule: a fifth of stall.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ RULE = RECOMMENDED * ServoConstants().torque_at_full_duty
 
 
 def study(out: Path, quick: bool, progress: Callable[[str, float | None], None]) -> str:
-    """Seeks what is not there yet, and draws the front."""
+    """Searches for the missing gaits, and draws the front."""
     model = puppy_model()
     speeds = SPEEDS[1:2] if quick else SPEEDS
     rows: list[dict[str, Any]] = []

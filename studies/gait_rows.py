@@ -1,4 +1,4 @@
-"""The gaits that ship in data/gaits (motion, certificate, command): what they do when they are played; their table in the docs.
+"""Plays the gaits that ship in data/gaits (motion, certificate, command) and writes their table in the docs.
 
 Every motion is played from power-on to standstill as its certificate says: by `simulate`, by `run` on the emulated robot, and in
 MuJoCo. The rows of the table are written between its marks in docs/gaits.md.
@@ -6,12 +6,14 @@ MuJoCo. The rows of the table are written between its marks in docs/gaits.md.
 
 from __future__ import annotations
 
+import csv
 import math
 import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from studies.common import ROOT, publish, run_study
 from studies.other_engine.as_take import mujoco_take
@@ -25,7 +27,8 @@ from workbench.gait.measure import GaitMeasure, measure
 from workbench.motion import Motion, load_motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, bus_ids, puppy_model
-from workbench.simulation import Simulation, SimulationConfig
+from workbench.simulation import Job, Simulation, SimulationConfig
+from workbench.simulation.compiled import CompiledJob
 from workbench.simulation.play import LEAD, play_motion
 from workbench.simulation.virtual_robot import VirtualRobot
 from workbench.view.report.page import Provenance, Report, Section, Table
@@ -33,6 +36,8 @@ from workbench.view.report.page import Provenance, Report, Section, Table
 GAITS = ROOT / "data/gaits"
 COMMAND = "command.txt"
 """Of each folder: what found the gait, as it was typed."""
+SEEDS = "seeds.csv"
+"""Of each folder: the result of each seed, by `studies.gait_row_seeds`."""
 PAGE = ROOT / "docs/gaits.md"
 BEGIN, END = "<!-- rows of data/gaits: python -m studies.gait_rows -->", "<!-- end of rows -->"
 AFTER = 0.3
@@ -41,18 +46,24 @@ AFTER = 0.3
 
 @dataclass(frozen=True)
 class Row:
-    """A gait of data/gaits: the command that found it, the motion, its certificate."""
+    """A gait of data/gaits: the command that found it, the motion, its certificate, and the rows of seeds.csv."""
 
     name: str
     command: str
     motion: Motion
     certificate: Certificate
+    seeds: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def by_seed(self) -> str:
+        """Speeds on the nominal robot by seed, those that were refused in brackets."""
+        return ", ".join(f"({speed or '–'})" if kept != "yes" else speed for _, kept, speed, *_ in self.seeds)
 
 
 @dataclass(frozen=True)
 class Did:
-    """What a motion did from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt [deg], torque
-    [N m], that lasts 10 ms: the largest of the whole. how: by what it was played."""
+    """Result of playing a motion from power-on to standstill. heading: change by distance [deg/m] of the walking part. tilt
+    [deg], and torque [N m] that lasts 10 ms: the largest from beginning to end. how: name of the player."""
 
     how: str
     speed: float
@@ -67,24 +78,32 @@ def rows(model: RobotModel, folder: Path = GAITS) -> list[Row]:
     for path in sorted(folder.glob("*/gait.csv")):
         motion = load_motion(path, model)
         certificate = check_certificate(path, motion, model)
-        out.append(Row(path.parent.name, read_text(path.with_name(COMMAND)).strip(), motion, certificate))
+        seeds = tuple(csv.reader(read_text(path.with_name(SEEDS)).splitlines()))[1:] if path.with_name(SEEDS).is_file() else ()
+        out.append(Row(path.parent.name, read_text(path.with_name(COMMAND)).strip(), motion, certificate,
+                       tuple(tuple(row) for row in seeds)))
     return out
 
 
 def certified(certificate: Certificate) -> Did:
-    """What the certificate says."""
+    """The same numbers from the certificate."""
     n = certificate.nominal
     return Did("certificate", n.forward, n.heading, n.tilt, certificate.ways.torque)
 
 
 def played(row: Row, model: RobotModel, by: str) -> Did:
-    """The motion's own bytes, played by "simulate", "run" (on the emulated robot) or "MuJoCo"."""
-    take = {"simulate": _simulated, "run": _run, "MuJoCo": _elsewhere}[by](row.motion, model)
+    """The motion's own bytes, played by "simulate", "run" (on the emulated robot), "MuJoCo", or "compiled" (the same step as
+    simulate's, in a tenth of the time)."""
+    take = {"simulate": _simulated, "run": _run, "MuJoCo": _elsewhere, "compiled": _compiled}[by](row.motion, model)
     return _did(by, take, row.motion, model)
 
 
 def _simulated(motion: Motion, model: RobotModel) -> Take:
     return play_motion(Simulation(model, SimulationConfig(base="free")), motion)
+
+
+def _compiled(motion: Motion, model: RobotModel) -> Take:
+    commands = motion.commands()
+    return CompiledJob(Job(model, SimulationConfig(base="free"), commands, commands.end + AFTER, LEAD)).take()
 
 
 def _run(motion: Motion, model: RobotModel) -> Take:
@@ -114,17 +133,31 @@ def _did(how: str, take: Take, motion: Motion, model: RobotModel) -> Did:
 
 def markdown(found: list[Row]) -> str:
     """The rows as a table of docs/gaits.md."""
-    lines = ["| gait | nominal [m/s] | 5th percentile of draws [m/s] | fell | heading over draws [deg/m RMS] | tilt, torque from "
-             "power-on | back to its cycle | heading from cycle to cycle |", "|---|---|---|---|---|---|---|---|"]
-    for row in found:
-        n, d, c = row.certificate.nominal, row.certificate.draws, row.certificate.cycle
-        five = d["speed m/s"][1] if "speed m/s" in d else None
-        lines.append(
-            f"| `{row.name}`: `{row.command}` | {n.forward:.3f} | {'–' if five is None else f'{five:.3f}'} | "
-            f"{d['falls']} of {d['count']} | {d['heading deg/m RMS']:.0f} | {n.tilt:.1f} deg, "
-            f"{row.certificate.ways.torque:.2f} N m | {'–' if c.slowest is None else f'{c.slowest} cycles'} | "
-            f"{c.heading:.2g} deg |")
-    return "\n".join(lines)
+    head = ("gait", "nominal", "5th percentile of draws", "fell", "heading over draws; after one recorded metre; three "
+            "[deg/m RMS]", "slip, nominal", "MuJoCo: speed kept", "largest tilt, torque", "back to its cycle",
+            "nominal by seed (refused)")
+    return "\n".join([_row(head), "|" + len(head) * "---|", *(_row(_cells(row)) for row in found)])
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _cells(row: Row) -> list[str]:
+    n, d, c, ways = row.certificate.nominal, row.certificate.draws, row.certificate.cycle, row.certificate.ways
+    five = d.get(f"speed {n.unit}", [None, None])[1]
+    kept = row.certificate.other_engine.get("speed kept")
+    return [f"`{row.name}`: `{row.command}`", f"{n.speed:.3f} {n.unit}", "–" if five is None else f"{five:.3f}",
+            f"{d['falls']} of {d['count']}", _headings(d), f"{100 * n.slip / max(abs(n.speed), 0.02):.0f} %",
+            "–" if kept is None else f"{100 * kept:.0f} %", f"{n.tilt:.1f} deg, {ways.torque:.2f} N m",
+            "–" if c.slowest is None else f"{c.slowest} cycles", row.by_seed or "–"]
+
+
+def _headings(draws: Mapping[str, Any]) -> str:
+    """RMS over draws as they are, after one recorded metre, and after three."""
+    trimmed = draws.get("straightened") or {}
+    later = [trimmed.get(f"after {n} deg/m RMS") for n in ("one metre", "3 metres")]
+    return ", ".join("–" if h is None else f"{h:.1f}" for h in (draws["heading deg/m RMS"], *later))
 
 
 def write_rows(text: str, page: Path = PAGE) -> None:

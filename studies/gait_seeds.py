@@ -1,8 +1,8 @@
-"""Do seeds by trajectory optimisation pay? Twenty tasks: how often they are solved, how long it takes, what their seeds walk.
+"""Do seeds by trajectory optimisation pay? Twenty tasks: how often they are solved, how long it takes, how their seeds walk.
 
-Each plan becomes a table by the same inverse servo law as any gait, and is played by the full servo law. Beside it the best of as
-many random seeds of the same family as the plan's time would have paid for, and the median of all of them. Then searches with
-planned seeds and without: rollouts until they are near the best gait that any of them found.
+Each plan becomes a table by the same inverse servo law as any gait, and is played with the full servo law. It is compared with
+the best of as many random seeds of the same family as the plan's time would have paid for, and with their median. Then searches
+with planned seeds and without: rollouts until they are near the best gait that any of them found.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
         searched[name] = saved(machine, wanted, SEARCHES[:1] if quick else SEARCHES, QUICK if quick else BUDGET)
     report.add(_savings(searched))
     figure, text = _trajectory(machine, shown)
-    caption = "Right middle joint of the front legs: planned, and what the servo makes of the table."
+    caption = "Right middle joint of the front legs: planned, and as the servo follows the table."
     report.add(Section("Planned, tabled, reached", [Text(text), Picture(figure, caption)]))
     return publish(out, machine.model, report, {"tasks": numbers, "solved": solved, "median seconds": float(np.median(times)),
                                                 "rollouts until near": {name: asdict(s) for name, s in searched.items()}},
@@ -113,7 +113,7 @@ def _savings(searched: Mapping[str, Saved]) -> Section:
 
 
 def _trajectory(machine: GaitMachine, planned: Planned) -> tuple[Figure, str]:
-    """The planned angles of one joint beside what the servos make of the table, over two cycles."""
+    """The planned angles of one joint, and those of the servos that follow the table, over two cycles."""
     shape = replace(planned.shape, poses=8)
     table = gait_table(machine, shape)
     take = simulate_batch([Job(machine.model, SimulationConfig(), table.commands(4))])[0]

@@ -28,8 +28,8 @@ REQUESTS = {"forward": Request(), "backward": Request("backward"), "sideways": R
 
 @dataclass(frozen=True)
 class Saved:
-    """One request's searches. best: speed of the best gait of all [m/s]; planned, random: by seed of the random generator,
-    rollouts until NEAR of it; None where a search did not come there."""
+    """One request's searches. best: speed of the best gait of any search [m/s]; planned, random: by seed of the random generator,
+    rollouts until NEAR of it; None for a search that did not reach it."""
 
     best: float
     planned: tuple[int | None, ...]

@@ -1,4 +1,4 @@
-"""By how much does a gait's heading vary on robots that nobody measured, and what causes it? Without zero offsets and unequal
+"""How much does a gait's heading vary on robots that nobody measured, and why? Without zero offsets and unequal
 latency, with these alone, and with all.
 
 Of the ROBOTIS walk and of the gaits that `workbench optimize --out runs/gaits/NAME` has written: the standard deviation of
@@ -30,7 +30,7 @@ from workbench.view.report.page import Provenance, Report, Section, Table, Text
 ROBOTS = 16
 STEP = 2e-3
 SLOWEST = 0.02
-"""Speed [m/s] from which turning is told by distance, as in certificates: one that stands has none."""
+"""Speed [m/s] above which turning is measured by distance, as in certificates: a standing robot has none."""
 
 
 def parts(whole: Ensemble) -> Mapping[str, Ensemble]:

@@ -1,4 +1,4 @@
-"""Where two names fit a recording alike: the next experiment is designed, played on the concealed robot, and the name reached.
+"""Two names fit a recording equally well: the next experiment is designed, played on the concealed robot, and scored.
 
     python -m studies.next_experiment [--out runs/studies/next_experiment] [--quick]
 
@@ -45,7 +45,7 @@ class Name:
 
 @dataclass(frozen=True)
 class Case:
-    """hidden: what the robot has; rival: what might imitate it. first: (time [s], angle [deg]) of the joint in the first
+    """hidden: the robot's effect; rival: a possible imitator. first: (time [s], angle [deg]) of the joint in the first
     motion."""
 
     name: str
@@ -94,8 +94,8 @@ def next_experiment(out: Path, quick: bool, progress: Callable[[str, float | Non
     reached = sum(o.ratios[1] >= EXPERIMENT.separated for o in outcomes)
     report = Report(
         "The next experiment", f"{reached} of {len(outcomes)} ties resolved: the designed motion reaches the hidden name.",
-        "Robots of another engine (MuJoCo), filmed with noise. What is designed knows the two fitted models, not the truth. "
-        "Log-likelihood ratios count frames that err alike, 50 ms, once.",
+        "Robots of another engine (MuJoCo), filmed with noise. The design knows the two fitted models, not the truth. "
+        "Log-likelihood ratios count frames with correlated errors, 50 ms, once.",
         provenance=Provenance.of(model, seed=SEED, seconds=time.monotonic() - began))
     report.add(Section("Before and after", [Picture(figures["likelihoods"], "For the hidden name, against its rival."),
                                             table(outcomes)]))
@@ -103,8 +103,8 @@ def next_experiment(out: Path, quick: bool, progress: Callable[[str, float | Non
         report.add(Section(o.case.name, [
             Text(f"Hidden: `{o.case.hidden.effect}` in {o.case.joint}. Designed: {o.experiment.motion.name}, "
                  f"{o.experiment.motion.duration:.1f} s, base {o.experiment.base}; it took {o.seconds:.0f} s."),
-            Picture(figures[o.case.hidden.effect], "Both names after each was fitted to both recordings; what a name cannot "
-                                                   "follow is the evidence.")]))
+            Picture(figures[o.case.hidden.effect], "Both names after each was fitted to both recordings; the part that a name "
+                                                   "cannot follow is the evidence.")]))
     numbers = {o.case.name: {
         "hidden": o.case.hidden.effect, "rival": o.case.rival.effect, "joint": o.case.joint, "value": o.case.value,
         "log_likelihood_ratio": {"before": o.ratios[0], "expected": o.experiment.separations[0].log_likelihood_ratio,
@@ -168,7 +168,7 @@ def probability(ratio: float) -> float:
 
 @styled
 def draw(o: Outcome) -> Figure:
-    """The joint in the first and in the designed take: recorded, and what each fitted name leaves."""
+    """The joint in the first and in the designed take: recording, and residuals of each fitted name."""
     figure = new_figure(11, 5.6)
     axes = figure.subplots(2, 2, sharex="col", width_ratios=(1, 2.4))
     for column, take in enumerate(o.jury.takes):

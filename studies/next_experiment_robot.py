@@ -1,4 +1,4 @@
-"""A robot of the other engine with something hidden, filmed motion by motion; and how well a name fits what was filmed."""
+"""A robot of the other engine with a hidden effect, filmed motion by motion; and how well a name fits the recordings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from studies.concealed_effects.robots import quadruped
@@ -25,12 +24,12 @@ from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FLOOR = float(np.deg2rad(0.05))
 """By which two engines differ anyway [rad]."""
 TOGETHER = 6.0
-"""Frames that err alike."""
+"""Frames with correlated errors."""
 REST = 0.1
 
 
@@ -52,7 +51,7 @@ class Hidden:
         self.camera = random_camera(self.rng)
 
     def film(self, name: str, motion: Motion, base: str) -> Session:
-        """Plays a motion and records it as one more take; the session, nothing of which says what is hidden."""
+        """Plays a motion and records it as one more take; returns the session, which reveals nothing of the hidden effect."""
         rows = MotionRows(motion.joints, motion.times, np.rad2deg(motion.angles))
         _, capture, _ = record(self.model.with_effect(self.effect), TakePlan(name, rows, 1, base), self.camera, self.rng)
         (self.folder / f"{name}.motion.csv").write_text(rows.to_csv(), encoding="utf-8")
@@ -66,7 +65,7 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Fitted:
-    """A name with the number that fits best. cost: chi squared, frames that err alike counted once; observed: by take."""
+    """A name with its best parameter. cost: chi squared, frames with correlated errors counted once; observed: by take."""
 
     effect: EffectSpec
     cost: float

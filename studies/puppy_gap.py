@@ -170,11 +170,11 @@ def study(out: Path, quick: bool, progress: Callable[[str, float | None], None])
               f"(last column; the cameras' noise is {POSE_NOISE} deg), and the floor cannot. So record the same six seconds on "
               "a stand first, then on the floor, with the battery's voltage read before and after: the stand identifies the "
               "joints, and the remaining difference of the walk is the floor's.")
-    headline = (f"{tied[0].variant.name} comes closest to the real robot's 37 cm; {len(tied) - 1} other variants cannot be told "
-                "from it.")
+    headline = (f"{tied[0].variant.name} comes closest to the real robot's 37 cm; {len(tied) - 1} other variants cannot be "
+                "distinguished from it.")
     report = Report("The puppy's own gap", headline,
                     provenance=Provenance(model.sha256, more=(("recording", "none: the thesis's published end position"),)))
-    report.add(Section("What was compared", [Text(text)]))
+    report.add(Section("Variants", [Text(text)]))
     report.add(Section("Cannot be told apart", [_table(tied, True), Text(settle)]))
     report.add(Section("Single effects", [_table(ranked, False)]))
     report.add(Section("Best of singles and pairs", [_table(every[:20], False)]))

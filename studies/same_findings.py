@@ -28,7 +28,7 @@ def without_run(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def result_of(folder: Path) -> dict[str, Any]:
-    """What one diagnosis says, by file."""
+    """The results of one diagnosis, by file."""
     findings, model = (folder / name for name in FILES)
     return {FILES[0]: without_run(json.loads(findings.read_text())), FILES[1]: without_run(yaml.safe_load(model.read_text()))}
 

@@ -110,10 +110,11 @@ def test_progress_is_plain_lines_where_there_is_no_terminal(capsys: pytest.Captu
 
     with Progress("simulate", quiet=0) as progress:
         for k in range(1000):
-            progress("walking", k / 1000)
+            progress(f"walking, {k} steps", k / 1000)
         progress("drawing")
     lines = capsys.readouterr().err.splitlines()
-    assert [line.partition(" (")[0] for line in lines] == ["workbench simulate: walking 0 %", "workbench simulate: drawing"]
+    said = [line.partition(" (")[0] for line in lines]
+    assert said == ["workbench simulate: walking, 0 steps 0 %", "workbench simulate: drawing"]
 
 
 def test_progress_of_a_short_run_is_silent_and_of_a_long_one_comes_by_itself(capsys: pytest.CaptureFixture[str]) -> None:

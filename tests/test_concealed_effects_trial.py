@@ -142,7 +142,7 @@ def test_the_whole_trial_on_a_page_and_in_the_repository(out, tmp_path):
     assert whole["criteria"][0]["value"] == pytest.approx(1 / 3)
     assert json.loads((out / "summary.json").read_text()) == whole
     page = (out / "report.html").read_text()
-    for part in ("chosen by hand", vault.digest(), "What was called what", "How sure", "Sizes", "Every session",
+    for part in ("chosen by hand", vault.digest(), "Confusion matrix", "How sure", "Sizes", "Every session",
                  "gear ripple flm (outside)", "no such joint"):
         assert part in page, part
     readme = tmp_path / "README.md"

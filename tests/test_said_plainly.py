@@ -28,7 +28,7 @@ def test_a_file_of_another_kind_is_told_what_was_expected(tmp_path: Path, capsys
     (tmp_path / "log.csv").write_text("time,goal.a\n0,1\n")
     with pytest.raises(workbench.InputError, match=r"no XML; expected a robot as SDF or URDF, or a model\.yaml"):
         workbench.load_model(tmp_path / "findings.json")
-    assert "as a session.yaml or a model.yaml has" in refused(capsys, "diagnose", str(tmp_path / "log.csv"), "--out", "x")
+    assert "as in a session.yaml or a model.yaml" in refused(capsys, "diagnose", str(tmp_path / "log.csv"), "--out", "x")
 
 
 def test_add_servos_says_what_to_do_with_effects() -> None:
@@ -46,4 +46,4 @@ def test_what_was_tried_is_sorted_by_how_much_less_likely() -> None:
     assert ["2 times less" in str(row[-1]) for row in rows] == [True, False, False]
     assert "81 times less probable" in str(rows[1][-1])
     assert "more than 1,000,000 times less" in str(rows[2][-1])
-    assert str(SpokenAgainst(7.0)) == "takes that were kept back are 1,000 times less probable with it"
+    assert str(SpokenAgainst(7.0)) == "the held-out takes are 1,000 times less probable with it"

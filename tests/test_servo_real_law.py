@@ -162,7 +162,7 @@ def test_servo_yaml_gives_them_with_how_well_they_are_known(tmp_path):
 
 
 @pytest.mark.parametrize(("changes", "expected"), [
-    ({"minimum_duty": 0.02}, "minimum_duty goes with proportional_gain; beside compliance_slope expected punch"),
+    ({"minimum_duty": 0.02}, "minimum_duty belongs to proportional_gain; with compliance_slope expected punch"),
     ({"goal_delay": 20.0}, "goal_delay: expected at most 1 s"), ({"load_friction": -0.1}, "load_friction: expected a non-neg"),
     ({"torque_tolerance": "wide"}, "torque_tolerance: expected a number")])
 def test_what_cannot_be_is_said(changes, expected):

@@ -189,7 +189,7 @@ def test_reasons_name_effects_as_people_do() -> None:
     assert str(worse).startswith("in place of com_shift(body_link) it leaves 686 more")
     assert "it leaves only 3 less" in str(replace(worse, behind=-3.2))
     other = Outdone("a_plug_in", (), 40.0, 7.0)
-    assert in_words(other) == "a plug in takes 40 off chi squared on the choosing stretches, this 7"
+    assert in_words(other) == "a plug in reduces chi squared on the choosing stretches by 40, this one by 7"
 
 
 def test_the_next_experiment_is_a_link_and_says_what_it_tells_apart() -> None:
@@ -248,8 +248,8 @@ def test_the_page_reads_from_top_to_bottom(model: RobotModel, take: TakeReport, 
     order = ["Backlash at flm explains all", "flm has 2.0 deg of free play", "trot was left out: line 9",
              "Where the recordings differ from the model", "2 more places and times", "Or joint compliance at flm: 2 %",
              "2 deg (1.8 to 2.3)",
-             "Tried in its place", "dead band at flm takes 900 off", "Before and after, on unseen stretches",
-             "Residuals", "a &lt;take&gt;", "What else was tried", "its signature is not that of what is missing",
+             "Tried in its place", "dead band at flm reduces chi squared", "Before and after, on unseen stretches",
+             "Residuals", "a &lt;take&gt;", "What else was tried", "its response does not match the residuals",
              "What to record next", "next_experiment.csv", "See it move", "<b>seed</b> 7"]
     places = [page.find(words) for words in order]
     assert -1 not in places, order[places.index(-1)]

@@ -1,6 +1,6 @@
 """Simulate a small legged robot on hobby servos, compare it with recordings, and find the physics that the simulation left out.
 
-`import workbench` gives what is listed in `__all__`, each loaded when it is first used:
+`import workbench` offers the names listed in `__all__`, each loaded when it is first used:
 
     result = workbench.diagnose("session.yaml")
     result.save("runs/mine")

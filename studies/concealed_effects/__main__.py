@@ -3,10 +3,10 @@
 Another engine's robots with hidden physics: makes the sessions and seals the truth (the seed is drawn by the operating system
 once, at the first run), writes down the seal's hash, diagnoses every session with the `workbench diagnose` that a user types, and
 only then opens the seal of each to score it. OUT gets seal.json, sessions/, results/, sealed/, summary.json and report.html.
-Stopped and started again, it goes on where it was; a diagnosis that fails or takes too long counts as failed. Where not all
-sessions are diagnosed the report says so.
+If it is interrupted and started again, it continues; a diagnosis that fails or takes too long counts as failed. If not all
+sessions are diagnosed, the report states that.
 
-Returns 0 where all that is asked is met, else 1.
+Returns 0 if every target is met, else 1.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main() -> int:
         vault = take_up(args.out) if args.take_up else Vault(args.out / "sealed", args.count, args.seed)
         if args.verify:
             same = is_what_was_sealed(vault, args.verify)
-            print(f"{args.verify}: the seed makes {'' if same else 'not '}what was sealed")
+            print(f"{args.verify}: the session from this seed is {'' if same else 'not '}the sealed one")
             return 0 if same else 1
         if args.again:
             forget_failed(args.out)
@@ -44,7 +44,7 @@ def main() -> int:
         print(f"error: {e}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("stopped; run again, it goes on from here", file=sys.stderr)
+        print("stopped; run again to continue", file=sys.stderr)
         return 130
     for c in result["criteria"]:
         print(f"{c['what']}: {c['got']} (asked: {c['asked']})")
@@ -70,11 +70,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--sessions", type=int, metavar="N", help="diagnose only the first N now: a partial trial")
     parser.add_argument("--limit", type=float, default=LIMIT, metavar="S", help=f"seconds for a diagnosis (default: {LIMIT:g})")
     parser.add_argument("--again", action="store_true", help="ask again what failed before")
-    parser.add_argument("--report", action="store_true", help="only score what is diagnosed, and write the report")
+    parser.add_argument("--report", action="store_true", help="only score the diagnosed sessions, and write the report")
     parser.add_argument("--keep", action="store_true",
-                        help="the same, and put the summary into the repository; of a part, what goes on with it")
-    parser.add_argument("--take-up", action="store_true", help="in a new OUT, go on with the part of a trial that is kept here")
-    parser.add_argument("--verify", metavar="NAME", help="make a session anew and compare it with its seal")
+                        help="the same, and put the summary into the repository; of a partial trial, the data to continue it")
+    parser.add_argument("--take-up", action="store_true", help="in a new OUT, continue the partial trial in the repository")
+    parser.add_argument("--verify", metavar="NAME", help="make a session again and compare it with its seal")
     parser.add_argument("--seed", type=int, help="for development only; a report says that it was chosen by hand")
     return parser.parse_args()
 

@@ -1,4 +1,4 @@
-"""`workbench diagnose` asked about one session as a user would, with a clock and scales beside it."""
+"""Runs `workbench diagnose` on one session as a user would, and measures its time and memory."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LIMIT = 3600.0
 
 
 class StoppedError(Exception):
-    """Asking was called off; nothing is kept of what was under way."""
+    """The run was cancelled; nothing of the current diagnosis is kept."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Asker:
     _stopped: bool = False
 
     def ask(self, session: Path, results: Path) -> Asked:
-        """Leaves what came out, said.txt and asked.json in `results`, whole; what is there already is not asked again."""
+        """Writes the results, said.txt and asked.json into `results`, complete; a session with a result is not asked again."""
         known = asked(results)
         if known is not None:
             return known
@@ -70,7 +70,7 @@ class Asker:
         return done
 
     def stop(self) -> None:
-        """Ends what is under way."""
+        """Ends the current diagnosis."""
         self._stopped = True
         for pid in tuple(self._running):
             _end(pid)

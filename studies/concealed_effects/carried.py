@@ -1,7 +1,7 @@
-"""A trial that takes longer than one machine is there: what the repository keeps of its beginning, and another goes on with.
+"""A trial that takes longer than one machine is available: the repository keeps its beginning, and another machine continues it.
 
-Scores of what was diagnosed, the seed, and the hashes that were committed to: what is left is made anew from the seed and
-compared with its hash. Who reads the seed here could open the seals, as on one machine; the hash proves that nothing was changed.
+Kept are the scores so far, the seed, and the committed hashes: the rest is made again from the seed and compared with its hash.
+Whoever reads the seed here could open the seals, as on one machine; the hash proves that nothing was changed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def carry(vault: Vault, scores: Sequence[Mapping[str, Any]], path: Path = CARRIE
 
 
 def take_up(out: Path, path: Path = CARRIED) -> Vault:
-    """Begins a folder with what was carried; ValueError where nothing was, or a trial was begun there."""
+    """Starts a folder from the kept part; ValueError if there is none, or if a trial was already started there."""
     if not path.exists():
         raise ValueError(f"{path}: no trial is under way")
     if (out / "sealed").exists():

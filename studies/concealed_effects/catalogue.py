@@ -1,4 +1,4 @@
-"""What can be hidden, where, and how large: from just felt to plainly wrong, never absurd."""
+"""The effects that can be hidden, where, and how large: from just noticeable to plainly wrong, never absurd."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class NoneFoundError(Exception):
 
 @dataclass
 class Bench:
-    """A nominal robot and its takes, with what was played so far."""
+    """A nominal robot and its takes, with the motions played so far."""
 
     robot: Robot
     model: RobotModel
@@ -91,7 +91,7 @@ class Bench:
         return most
 
     def each_adds(self, effects: Sequence[EffectSpec]) -> bool:
-        """Whether each shows beside the others: the robot without it, but with the rest, would be recorded otherwise."""
+        """Whether each is observable among the others: the robot without it, but with the rest, would be recorded differently."""
         left = list(effects) if len(effects) > 1 else []
         for take in self.takes:
             for e in tuple(left):
@@ -114,7 +114,7 @@ class Bench:
 
 
 def conceal(bench: Bench, effects: Sequence[str], masked: bool, rng: np.random.Generator) -> tuple[EffectSpec, ...]:
-    """Effects by name made particular, each of which shows alone and beside the others. NoneFoundError where no draw does."""
+    """Draws parameters for named effects until each is observable alone and among the others. NoneFoundError if no draw is."""
     failed: list[list[EffectSpec]] = []
     for _ in range(4):
         chosen: list[EffectSpec] = []

@@ -21,7 +21,7 @@ WIDEST = 1.0
 
 @styled
 def confusion_figure(counts: Counter[tuple[str, str]]) -> Figure:
-    """True effects down, what they were called across; on the diagonal its own name, alone or in a tie."""
+    """Confusion matrix: true effects down, named effects across; on the diagonal its own name, alone or in a tie."""
     rows = sorted({t for t, _ in counts} - {NOTHING}) + [NOTHING] * any(t == NOTHING for t, _ in counts)
     names = sorted({c for _, c in counts} - set(LAST))
     columns = sorted({*names, *rows} - {NOTHING}) + list(LAST)

@@ -1,5 +1,5 @@
-"""Makes the trial's sessions: what a user would send into OUT/sessions/NAME, which shows nothing of what is hidden, and the
-truth into OUT/sealed. Run again, it goes on where it was stopped."""
+"""Makes the trial's sessions: a user's files in OUT/sessions/NAME, which reveal nothing of the hidden effects, and the truth in
+OUT/sealed. An interrupted run continues."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def is_what_was_sealed(vault: Vault, name: str) -> bool:
 
 
 def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
-    """What a user would send, and what is sealed, as files by name. `folder` gets the robot's SDF."""
+    """A user's files, and the sealed ones, by name. `folder` gets the robot's SDF."""
     rng = np.random.default_rng(plan.seed)
     for n in range(REDRAWS):  # robots that do not walk as drawn, and hiding places that do not exist, are drawn again
         if n and n % STUBBORN == 0:
@@ -93,7 +93,7 @@ def write_session(folder: Path, plan: SessionPlan) -> tuple[Files, Files]:
         except NoneFoundError:
             continue
     else:
-        raise RuntimeError(f"{plan.name}: none of {REDRAWS} robots can hide what was drawn")
+        raise RuntimeError(f"{plan.name}: none of {REDRAWS} robots can hide the drawn effects")
     hidden = bench.with_effects(effects)
     session = session_entry(model, "robot.sdf" if robot.sdf else model.description, "servo.yaml")
     shown, sealed = {"servo.yaml": servo_yaml(model)}, Files()

@@ -21,7 +21,7 @@ ABOUT = (
 
 
 def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -> Path:
-    """Writes the page; `result`: what `trial.report` writes beside it."""
+    """Writes the page; `result`: the summary that `trial.report` writes with it."""
     asked = criteria(scores)
     report = Report("Concealed effects", headline(asked, result), ABOUT, _key_numbers(result), _provenance(result))
     report.add(Section("Required and reached", [criteria_table(asked), Text(_remarks(result))]))
@@ -29,10 +29,10 @@ def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -
         return report.write(path)
     counts, bins, given = confusion(scores), reliability(scores), sizes(scores)
     if counts:
-        report.add(Section("What was called what", [Picture(confusion_figure(counts), (
-            "Hidden effects down, what the diagnosis called them across. **Green**: their own name, alone or as one of a tie of "
-            "two. **Orange**: another's name at their place, and, in the last row, all findings that fit nothing, those of the "
-            "other orange fields among them. **Grey**: nothing was said, or nothing came out.")), _effects_table(scores)]))
+        report.add(Section("Confusion matrix", [Picture(confusion_figure(counts), (
+            "Hidden effects down, named effects across. **Green**: their own name, alone or as one of a tie of "
+            "two. **Orange**: another name at the right joint or link, and, in the last row, all findings that match nothing, "
+            "those of the other orange cells among them. **Grey**: no finding, or no result.")), _effects_table(scores)]))
     if bins:
         report.add(Section("How sure, and how often right", [Picture(reliability_figure(bins), (
             "Findings by the confidence that they state. A bar is the 95 % interval (Clopper and Pearson) of the share that is "
@@ -43,7 +43,7 @@ def write_page(path: Path, scores: Sequence[Score], result: Mapping[str, Any]) -
             "and the 90 % interval, green where it covers the truth. Shaded: 15 %."))]))
     report.add(Section("Time", [Picture(time_figure([s.seconds for s in scores], [s.memory for s in scores]),
                                         "Wall time of each diagnosis, and the most memory that it held.")]))
-    report.add(Section("Every session", [Details(f"{len(scores)} sessions: what was hidden, and what was said",
+    report.add(Section("Every session", [Details(f"{len(scores)} sessions: hidden effects and findings",
                                                  [_sessions_table(scores)])]))
     return report.write(path)
 
@@ -59,7 +59,7 @@ def headline(asked: Sequence[Criterion], result: Mapping[str, Any]) -> str:
 
 
 def criteria_table(asked: Sequence[Criterion]) -> Table:
-    """What is asked beside what came."""
+    """Targets and results."""
     words = {True: "yes", False: "**no**", None: "–"}
     rows = [[text.replace(" %", "\u00a0%") for text in (c.what, c.asked, c.got)] for c in asked]
     return Table(["", "required", "reached", "met"], [[*row, words[c.met]] for row, c in zip(rows, asked)])
@@ -112,7 +112,7 @@ def _sessions_table(scores: Sequence[Score]) -> Table:
 
 
 def hidden_in(s: Score) -> str:
-    """What a session hides, in words."""
+    """The hidden effects of a session, in words."""
     words = [f"{h} (outside)" if h.split()[0] in s.outside else h for h in s.hidden]
     return "; ".join(words).replace("_", " ") or "nothing"
 

@@ -27,8 +27,8 @@ class SessionPlan:
 
 
 def plan_sessions(seed: int, count: int = 100) -> list[SessionPlan]:
-    """`count` sessions: of a hundred, 25 quiet, 15 with physics outside the vocabulary (a third of them with a named effect
-    beside it), 20 with one effect, 25 with two, 15 with three; half of those with two or more masked.
+    """`count` sessions: of a hundred, 25 quiet, 15 with physics outside the vocabulary (a third of them also with a named
+    effect), 20 with one effect, 25 with two, 15 with three; half of those with two or more masked.
 
     Effects are dealt from a shuffled deck, so that each comes up about equally often.
     """

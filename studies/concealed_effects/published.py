@@ -1,4 +1,4 @@
-"""What the repository keeps of a trial: results/trial.json, and a table of it in docs/validation.md."""
+"""The results of a trial in the repository: results/trial.json, and a table of it in docs/validation.md."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def kept(results: Path = RESULTS) -> dict[str, Any] | None:
 
 
 def kept_section(page: Path = PAGE) -> str:
-    """What the page says of it."""
+    """The trial's part of the page."""
     return read_text(page).partition(BEGIN + "\n")[2].partition(END)[0]
 
 
@@ -53,7 +53,7 @@ def as_text(result: Mapping[str, Any]) -> str:
 
 
 def section(result: Mapping[str, Any] | None) -> str:
-    """The table and what has to be said beside it, in Markdown."""
+    """The table and the remarks below it, in Markdown."""
     if result is None:
         return "No trial has been run yet.\n"
     rows = ["| | required | reached | met |", "|---|---|---|---|"]
@@ -97,7 +97,7 @@ def _surest(scores: Sequence[Score]) -> str:
 
 
 def _by_version(scores: Sequence[Score]) -> str:
-    """What each version of the workbench named, where it was changed on the way."""
+    """Effects named by each version of the workbench, if it was changed during the trial."""
     versions = list(dict.fromkeys(s.code for s in scores))
     if len(versions) < 2:
         return ""

@@ -1,8 +1,8 @@
-"""One diagnosis against the truth: what was named, where, how large, how surely; by the rules by which the project is judged.
+"""Scores one diagnosis against the truth: name, place, size and confidence, by the rules by which the project is judged.
 
-Named: the effect is the finding's own, or the one alternative beside it (a tie of two). Placed: the true place is in `where`,
-shared out over the places that stand there. Findings below confidence 0.5 are not
-counted; each one left over is a false alarm, unless
+Named: the effect is the finding's own, or its one alternative (a tie of two). Placed: the true place is in `where`, with its
+credit divided by the number of places listed. Findings below confidence 0.5 are not
+counted; each one without a match is a false alarm, unless
 something outside the vocabulary is hidden there, which no name fits: such a session asks for a verdict other than "explained".
 `soft_ground` is neither hit nor false alarm: contact is each engine's own.
 """
@@ -16,15 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.files import InputError
 from workbench.files.reading import read_text
 from workbench.recording import read_recording
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NEUTRAL = frozenset({"soft_ground"})
 COUNTS = 0.5
 """Confidence from which a finding counts."""
@@ -42,7 +41,7 @@ SIZE = {
 }
 """The scalar parameter by which an effect's size is judged."""
 ZERO = {"clock_rate": 1.0, "friction_asymmetry": 1.0}
-"""Value at which an effect vanishes, where errors relative to the value itself would say nothing."""
+"""Value at which an effect vanishes, where errors relative to the value itself would be meaningless."""
 PARENTS = {"tail": "body"} | {
     f"{leg}{part}": f"{leg}{above}" if above else "tail" if leg[0] == "B" else "body"
     for leg in ("BL", "BR", "FL", "FR") for part, above in (("btm", "mid"), ("mid", "top"), ("top", ""))}
@@ -53,8 +52,8 @@ FLOOR = {"fixed": np.deg2rad(0.3), "free": np.deg2rad(0.4), "log": np.deg2rad(0.
 
 @dataclass(frozen=True)
 class EffectScore:
-    """One true effect. called: its own name, that of another finding at its place, "abstained", or "failed" where nothing came
-    out. tie: it is the alternative of the finding so called. share: of the true place in `where`; None where it was missed."""
+    """One true effect. called: its own name, that of another finding at its place, "abstained", or "failed" without a result.
+    tie: it is the alternative of the finding with this name. share: of the true place in `where`; None where it was missed."""
 
     effect: str
     where: list[str]
@@ -96,10 +95,10 @@ class ParameterScore:
 
 @dataclass(frozen=True)
 class Score:
-    """One session. verdict: "failed" where nothing came out, with the reason in `complaint`. hidden: all that is, in words;
-    outside: names of what has none in the vocabulary; effects: those that are to be named. said: the findings, in words.
-    false_alarms: findings that fit nothing. calibration: (confidence, true) of each finding. closed: unseen take -> share of
-    the gap closed. seconds of wall and of processor, memory [bytes], code: of what answered."""
+    """One session. verdict: "failed" without a result, with the reason in `complaint`. hidden: all hidden effects, in words;
+    outside: names of those outside the vocabulary; effects: those that should be named. said: the findings, in words.
+    false_alarms: findings that match nothing. calibration: (confidence, true) of each finding. closed: unseen take -> share of
+    the gap closed. seconds of wall and of processor, memory [bytes], code: of the version that was run."""
 
     name: str
     robot: str
@@ -144,7 +143,7 @@ class Score:
 
 
 def score(truth: Mapping[str, Any], findings: Mapping[str, Any], closed: Mapping[str, float | None] | None = None) -> Score:
-    """`truth`: the sealed truth.json; `findings`: findings.json. InputError where the latter is not what the contract says."""
+    """`truth`: the sealed truth.json; `findings`: findings.json. InputError where the latter violates the contract."""
     found = [f for f in _list(findings, "findings") if f["confidence"] >= COUNTS and f["effect"] not in NEUTRAL]
     outside = set(truth["outside"])
     used: set[int] = set()
@@ -210,7 +209,7 @@ def _finite(x: Any) -> Any:
 def _list(findings: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     value = findings.get(key)
     if not isinstance(value, list) or "verdict" not in findings:
-        raise InputError(None, f"findings.json: '{key}': expected a list, and a 'verdict' beside it")
+        raise InputError(None, f"findings.json: '{key}': expected a list, and a 'verdict' with it")
     return value
 
 
@@ -230,7 +229,7 @@ def _share(true: Sequence[str], said: Sequence[str]) -> float:
 
 
 def _instead(e: Mapping[str, Any], found: Sequence[Mapping[str, Any]], used: set[int]) -> str:
-    """What an effect that was missed was called: the name of a finding at its place that is no other's; else abstained."""
+    """Name given to a missed effect: that of a finding at the same place that matches no other; else abstained."""
     for i, f in enumerate(found):
         if i not in used and _share(e["where"], f["where"]) > 0:
             return str(f["effect"])

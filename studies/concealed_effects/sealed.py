@@ -1,10 +1,10 @@
 """The truth, sealed: enciphered with a seed that nobody chose, its hash published before anything is diagnosed.
 
 A folder holds plan.json (the seed, drawn by the operating system at the first run, and how many sessions it makes; readable by
-its owner alone), and for each session NAME.sealed, a zip of what the session does not show, and NAME.sha256 of that zip. Opening
+its owner alone), and for each session NAME.sealed, a zip of the hidden truth, and NAME.sha256 of that zip. Opening
 checks the hash. The cipher is SHAKE-256's output, keyed by seed and name, over the zip: enough to keep a reader, or a diagnosis
-that looks around in its folders, from seeing the truth by accident; the hash is what proves that it was not changed afterwards.
-A zip depends on the seed alone, so that whoever learns the seed, at the end, can make all sessions anew and compare.
+that looks around in its folders, from seeing the truth by accident; the hash proves that it was not changed afterwards.
+A zip depends on the seed alone, so that whoever learns the seed, at the end, can make all sessions again and compare.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Vault:
     """Sealed answers in a folder."""
 
     def __init__(self, folder: Path, count: int | None = None, seed: int | None = None) -> None:
-        """Goes on with the plan that is there, else writes one; ValueError where what is asked is not what is there.
+        """Continues the existing plan, or writes a new one; ValueError if the request differs from the existing plan.
         count: of sessions (default: 100). seed: for tests and development; a trial leaves it to the operating system."""
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
@@ -61,8 +61,8 @@ class Vault:
         return hashlib.sha256(json.dumps(self.commitments, sort_keys=True).encode()).hexdigest()
 
     def seal(self, name: str, files: Mapping[str, str | bytes]) -> str:
-        """Seals files by their names; returns the SHA-256 that is now committed to. A name can be sealed once; one that was
-        committed to on another machine with what was, or ValueError."""
+        """Seals files by their names; returns the SHA-256, which is then committed. A name can be sealed only once, and a name
+        committed on another machine only with the same content; else ValueError."""
         if self.holds(name):
             raise ValueError(f"{name}: sealed already")
         plain = self.packed(name, files)
@@ -88,7 +88,7 @@ class Vault:
         return buffer.getvalue()
 
     def open(self, name: str) -> dict[str, bytes]:
-        """The files of a session; InputError where they are not what was committed to."""
+        """The files of a session; InputError if they differ from the commitment."""
         path = self.folder / f"{name}.sealed"
         try:
             plain = self._cipher(name, path.read_bytes())

@@ -65,7 +65,7 @@ def bounds(k: int, n: int) -> tuple[float, float]:
 
 
 def reliability(scores: Sequence[Score]) -> list[Bin]:
-    """Bins of the confidences of all findings that count; empty ones left out."""
+    """Bins of the confidences of all counted findings; empty ones are omitted."""
     pairs = [p for s in scores for p in s.calibration]
     out = []
     for low, high in itertools.pairwise(BINS):
@@ -101,7 +101,7 @@ def sizes(scores: Sequence[Score]) -> list[ParameterScore]:
 
 
 def criteria(scores: Sequence[Score]) -> list[Criterion]:
-    """What is asked of the trial, in its order."""
+    """The targets of the trial, in order."""
     effects = [e for s in scores for e in s.effects]
     hits, shares = sum(e.named for e in effects), [e.share for e in effects if e.share is not None]
     quiet, outside = [s for s in scores if s.quiet], [s for s in scores if s.outside]

@@ -1,11 +1,10 @@
-"""What is recorded of a robot: stand, sway and walk before cameras, or logs of its own joints; and what is to be foretold."""
+"""The recordings of a robot: stand, sway and walk before cameras, or logs of its own joints; and the takes to be predicted."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.concealed_effects.robots import Robot
 from studies.other_engine.excitation import MotionRows, varied_walk
@@ -14,8 +13,8 @@ from studies.other_engine.make_session import TakePlan, plan_takes
 from studies.other_engine.player import Rollout, play
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel, data_file
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LOG_RATE = 100.0
 LOG_NOISE = float(np.deg2rad(0.05))
 LOG_COUNT = float(np.deg2rad(360 / 4096))

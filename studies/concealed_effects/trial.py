@@ -1,4 +1,4 @@
-"""The trial's stages: make and seal, publish the seals, diagnose, open and score, report. Each keeps what is there."""
+"""The trial's stages: make and seal, publish the seals, diagnose, open and score, report. Each keeps existing results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Say = Callable[[str], None]
 
 
 def run(out: Path, vault: Vault, asker: Asker, workers: int = 1, most: int | None = None, say: Say = print) -> dict[str, Any]:
-    """The whole trial, or its first `most` sessions; returns what is written to summary.json."""
+    """The whole trial, or its first `most` sessions; returns the content of summary.json."""
     before = {s.name for s in scored_before(out)}
     generate(out, vault, workers, say, before)
     publish(out, vault, say)
@@ -33,7 +33,7 @@ def run(out: Path, vault: Vault, asker: Asker, workers: int = 1, most: int | Non
 
 
 def publish(out: Path, vault: Vault, say: Say = print) -> None:
-    """Writes down what was committed to, before anything is diagnosed; ValueError where it changed since."""
+    """Records the commitments before anything is diagnosed; ValueError if they changed since."""
     path = out / "seal.json"
     now = {"sha256_of_all": vault.digest(), "seed_drawn_by": vault.drawn_by, "sessions": vault.commitments}
     if len(vault.commitments) != vault.count:
@@ -49,7 +49,7 @@ def publish(out: Path, vault: Vault, say: Say = print) -> None:
 
 
 def diagnose(out: Path, names: list[str], asker: Asker, workers: int = 1, say: Say = print) -> None:
-    """`workbench diagnose` on each session that has no result yet; one that fails is counted, and the others go on."""
+    """`workbench diagnose` on each session without a result; a failure is counted, and the others continue."""
     missing = [n for n in names if asked(out / "results" / n) is None]
     done = len(names) - len(missing)
     pool = ThreadPoolExecutor(workers)

@@ -1,4 +1,4 @@
-"""Does it show? A robot with something hidden beside the same robot without, in what would be recorded."""
+"""Is it observable? The recordings of a robot with something hidden, compared with the same robot without it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.concealed_effects.takes import LOG_COUNT, LOG_NOISE, LogPlan, play_log
@@ -15,10 +14,10 @@ from studies.other_engine.hidden import turned_frames
 from studies.other_engine.make_session import TakePlan
 from studies.other_engine.player import Rollout, play
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 COARSE, FINE = 1e-3, 5e-4
-"""Steps [s]: of the search, and of what is recorded."""
+"""Steps [s]: of the search, and of the recordings."""
 ROTATION_NOISE = float(np.deg2rad(0.12) * np.sqrt(6))
 """Of the angle between two rigid bodies, three axes each [rad]."""
 POSITION_NOISE = 1e-4 * np.sqrt(3)

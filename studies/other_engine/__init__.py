@@ -1,12 +1,12 @@
 """The robot in another engine: MuJoCo, with servo, contact, firmware and capture code of its own.
 
-It shares no simulation code with the workbench, only plain data (`RobotModel`, `ServoConstants`, `Commands`), so that
-an agreement between the two means something. It makes recordings whose physics is known (`make_session`), and is what
-the bench races against (`bench`). A run goes through stages, each of which takes and returns plain data; between them
-is where physics that the model does not have can be put in:
+It shares no simulation code with the workbench, only plain data (`RobotModel`, `ServoConstants`, `Commands`), so that an
+agreement between the two is meaningful. It makes recordings whose physics is known (`make_session`), and is the reference of
+the bench (`bench`). A run goes through stages, each of which takes and returns plain data; physics that the model lacks can be
+inserted between them:
 
-    firmware (what is sent) ->
-    description (links, joints, feet) -> mjcf (MuJoCo's model) -> player (with the servo bank) -> capture (what is seen)
+    firmware (commands sent) ->
+    description (links, joints, feet) -> mjcf (MuJoCo's model) -> player (with the servo bank) -> capture (observation)
 """
 
 from studies.other_engine.capture import Camera, Capture, film

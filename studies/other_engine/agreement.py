@@ -1,9 +1,9 @@
 """Do the two engines mean the same by an effect? python -m studies.other_engine.agreement
 
-Each effect is played by the Drake station and by MuJoCo, whose codes share nothing but the contract's words. On a stand, or
-standing on its feet and swaying, the response is what the effect changes: links' angles, their rotation off the servos' axes, and
-the base's place and tilt, with the effect less without. The two responses are compared, not the motions, so that what the engines
-do differently anyway (contact, steps) cancels.
+Each effect is played by the Drake station and by MuJoCo, whose codes share only the contract's words. On a stand, or standing on
+its feet and swaying, the response is the change caused by the effect: links' angles, their rotation off the servos' axes, and the
+base's position and tilt, with the effect less without. The responses are compared, not the motions, so that other differences
+between the engines (contact, steps) cancel.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.concealed_effects.robots import quadruped
@@ -26,11 +25,11 @@ from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import Simulation, SimulationConfig
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 RATE = 200.0
 BASE_SCALE = 10.0
-"""What a metre of the base's path counts for, in radians: a millimetre as half a degree."""
+"""Weight of a metre of the base's path, in radians: a millimetre as half a degree."""
 
 
 def E(effect: str, *where: str, **parameters: float | tuple[float, float, float]) -> EffectSpec:
@@ -67,7 +66,7 @@ FREE = (
 
 @dataclass(frozen=True)
 class Agreement:
-    """response: RMS of what the effect changes in MuJoCo, over time, summed over channels [rad]. difference: of the two engines'
+    """response: RMS of the effect's response in MuJoCo, over time, summed over channels [rad]. difference: of the two engines'
     responses."""
 
     effect: str
@@ -143,12 +142,12 @@ class SideBySide:
         return Agreement(effect.effect, self.base, _size(ours), _size(ours - theirs))
 
     def mujoco(self, model: RobotModel) -> Array:
-        """What is seen of a run here."""
+        """Channels of a run in MuJoCo."""
         run = play(model, self.commands, self.commands.end + 0.3, 0.1, self.base, self.timestep)
         return seen_in_mujoco(run, self.model, self.time)
 
     def drake(self, model: RobotModel) -> Array:
-        """What is seen of a run of the station."""
+        """Channels of a run of the station."""
         take = Simulation(model, self.config).run(self.commands, self.commands.end + 0.3, 0.1)
         return seen_in_drake(take, self.model, self.time)
 

@@ -1,4 +1,4 @@
-"""How fast MuJoCo plays the same robot, and how exactly: what the workbench's bench races against.
+"""Speed and accuracy of MuJoCo on the same robot: the reference of the workbench's bench.
 
 Here MuJoCo runs as fast as it can: the whole rollout in one call of its C code (`mujoco.rollout`), the servo law made of
 MuJoCo's own actuators (`to_mjcf(..., drives=True)`) and no Python between steps. `play`, whose servo is in Python, is slower.
@@ -21,8 +21,8 @@ from studies.other_engine.player import play
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 SETTLE = 2.0
 
 

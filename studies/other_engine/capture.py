@@ -1,4 +1,4 @@
-"""What a motion capture system (OptiTrack) sees of a run."""
+"""Observation of a run by a motion capture system (OptiTrack)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.other_engine.player import Rollout
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _AXES = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 """From the robot's world (x forward, y left, z up) to the capture's (x forward, y up, z right)."""
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Box, Role, SceneGraph, SceneGraphInspector, Sphere
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -16,8 +15,7 @@ from pydrake.multibody.tree import RigidBody
 
 from workbench.files import InputError
 from workbench.robot import ConfigureParser, Ground, Kinematics
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,8 @@ class SeriesJoint:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the robot stands in. friction: of all feet, None where `ground` says it; gravity (3,) [m/s²] and tether (3,) [N], a
-    steady force on the root link's origin, in the world; step: x [m] from which on the floor is higher, and by what [m]."""
+    """The robot's surroundings. friction: of every foot, None to use `ground`; gravity (3,) [m/s²] and tether (3,) [N], a steady
+    force on the root link's origin, in the world; step: x [m] from which on the floor is higher, and its height [m]."""
 
     ground: Ground
     friction: float | None = None
@@ -127,7 +125,7 @@ class Description:
         return Description(tuple(changed if l.name == changed.name else l for l in self.links), self.joints)
 
     def lowest(self) -> float:
-        """Height of the lowest point of all contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""
+        """Height of the lowest point of the contact shapes in the root's frame, joints at zero [m]; 0 without shapes."""
         poses = {self.root.name: (np.zeros(3), np.eye(3))}
         for link in self.links[1:]:
             p, R = poses[link.parent]

@@ -1,4 +1,4 @@
-"""What the firmware sends for a motion table (the thesis's equations 3.1 to 3.4; docs/formats.md, section 2)."""
+"""The firmware's commands for a motion table (the thesis's equations 3.1 to 3.4; docs/formats.md, section 2)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ import csv
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _DEG_PER_COUNT = 300 / 1023
 _RPM_PER_TABLE_COUNT = 114 / 1023
-"""What the conversion takes a count of speed to be."""
+"""Value that the conversion assumes for a count of speed."""
 _SERVO_COUNT = 0.111 * 2 * np.pi / 60
-"""What the servo takes it to be [rad/s]."""
+"""Value that the servo uses [rad/s]."""
 
 
 def read_rows(path: Path) -> tuple[tuple[str, ...], Array, Array]:

@@ -1,7 +1,7 @@
 """Makes a whole session of recordings from a seed: python -m studies.other_engine.make_session OUT [--seed N]
 
-The folder has what a user would send (session.yaml, motions, takes, starts of the takes to predict) and, in answer/,
-what only the judge sees: the takes to predict, the same without noise, and the truth.
+The folder has a user's files (session.yaml, motions, takes, starts of the takes to predict) and, in answer/,
+the judge's: the takes to predict, the same without noise, and the truth.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from studies.other_engine.player import Rollout, play
 from workbench.robot import RobotModel, ServoConstants, data_file, load_servo_constants, puppy_model
 
 REST_AFTER = 0.5
-"""Seconds that a recording goes on after the last command's dwell."""
+"""Duration of a recording after the last command's dwell [s]."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def session_entry(model: RobotModel, robot: str, servos: str) -> dict[str, objec
 
 
 def servo_yaml(model: RobotModel) -> str:
-    """servo.yaml of a robot whose servos are all alike; ValueError if they are not."""
+    """servo.yaml of a robot whose servos are all equal; ValueError if they are not."""
     kinds = {model.servo(j) for j in model.joints}
     if len(kinds) != 1:
         raise ValueError("expected one kind of servo for all joints")

@@ -7,13 +7,11 @@ import xml.etree.ElementTree as ET
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.other_engine.description import ContactShape, Description, LinkPart, Surroundings
 from studies.other_engine.servo import ServoBank
 from workbench.robot import Ground
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 HELD_AT = 1.0
 """Height of the root link's origin on the stand [m]."""

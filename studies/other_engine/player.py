@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.other_engine.description import describe
 from studies.other_engine.hidden import Hidden, hide
@@ -15,8 +14,7 @@ from studies.other_engine.mjcf import compile_model
 from studies.other_engine.servo import Reference
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class Rollout:
 
     time (N,) [s], from -lead, 0 = first command, in steps. q, v (N, n) [rad, rad/s] of the servos (of the links too, but
     where something is between them) and torque (N, n) [N m, of the motors at the joints] by `joints`; sensed (N, n) [rad]:
-    what the servos' sensors say. qpos (N, nq): MuJoCo's configuration. contact: link -> force on it (N, 3) [N], of
+    readings of the servos' sensors. qpos (N, nq): MuJoCo's configuration. contact: link -> force on it (N, 3) [N], of
     the ground and of other links, for links with contact shapes. model: MuJoCo's model, whose bodies are the links.
     """
 
@@ -64,7 +62,7 @@ def play(
     """From neutral: `settle` seconds, `lead` seconds of rest, then `commands` from time 0 to `duration` [s].
 
     base: "free", from the height at which the lowest foot touches, or "fixed", the root link held level on a stand.
-    chance: decides what the model's effects leave to chance. InputError for a base that cannot float; ValueError for an
+    chance: random generator for the effects that are random. InputError for a base that cannot float; ValueError for an
     effect that this engine does not know (`hidden.KNOWN`).
     """
     if base not in ("free", "fixed"):
@@ -77,7 +75,7 @@ def play(
 
 
 class _Run:
-    """MuJoCo's state and the servos' beside it."""
+    """MuJoCo's state and that of the servos."""
 
     def __init__(self, hidden: Hidden, model: mujoco.MjModel) -> None:
         robot = hidden.robot
@@ -94,7 +92,7 @@ class _Run:
         self.friction_of = {int(d): i for i, d in enumerate(self.dof)}
         n = len(self.joints)
         self.load, self.motor, self.rubbed = np.zeros(n), np.zeros(n), np.zeros(n)
-        """Of the last step [N m]: what each servo handed to its link, what its motor gave, and what dry friction did."""
+        """Of the last step [N m]: torque of each servo on its link, torque of its motor, and dry friction."""
         # The angle of a link is the servo's and that of the hinges in series about the same axis.
         self.series = np.zeros((n, model.nq))
         for i, j in enumerate(self.joints):

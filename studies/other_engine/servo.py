@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _COUNT = np.deg2rad(300 / 1023)
 
 
@@ -51,8 +51,8 @@ class ServoBank:
 
 
 class Reference:
-    """What each servo steers to: from its last reference to the goal, at the moving speed (0 = at once) or its own ramp, behind
-    its own low-pass filter. Asked at times that do not go back."""
+    """Reference of each servo: from its last reference to the goal, at the moving speed (0 = at once) or its own ramp, behind
+    its own low-pass filter. Times must not decrease."""
 
     def __init__(self, n: int, ramp: Array | float = np.inf, lag: Array | float = 0.0) -> None:
         self._now, self._goal, self._smooth, self._at = 0.0, np.zeros(n), np.zeros(n), np.zeros(n)

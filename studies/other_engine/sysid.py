@@ -1,6 +1,6 @@
-"""MuJoCo's system identification toolbox (`mujoco.sysid`) on one joint's friction: what the workbench's own fit is set beside.
+"""MuJoCo's system identification toolbox (`mujoco.sysid`) on one joint's friction, for comparison with the workbench's own fit.
 
-The robot is that of `to_mjcf` with the servo law as MuJoCo's own actuators. All is left at the toolbox's defaults (its own
+The robot is that of `to_mjcf` with the servo law as MuJoCo's own actuators. All settings are the toolbox's defaults (its own
 optimiser, differences batched in one call of `mujoco.rollout`, a compiled model for each point), but for one thread.
 """
 
@@ -26,22 +26,21 @@ from mujoco.sysid import (
     create_initial_state,
     optimize,
 )
-from numpy.typing import NDArray
 
 from studies.other_engine.description import Surroundings, describe
 from studies.other_engine.mjcf import to_mjcf
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 HIGHEST = 1.5, 2.0
 """Coulomb friction [N m] and viscous friction [N m s/rad] are sought from zero to here."""
 
 
 @dataclass(frozen=True)
 class Identified:
-    """What the toolbox says. friction: Coulomb [N m] and viscous [N m s/rad]; residual: RMS over joints and time [rad];
+    """Result of the toolbox. friction: Coulomb [N m] and viscous [N m s/rad]; residual: RMS over joints and time [rad];
     rollouts: how many were made."""
 
     friction: tuple[float, float]

@@ -23,7 +23,7 @@ HIDDEN = EffectSpec("coulomb_friction", ("elbow",), {"torque": 0.12})
 STEP = 5e-4
 """Of the other engine [s]."""
 MOUNT = '<joint name="mount" type="fixed"><parent>world</parent><child>base</child></joint>'
-"""The arm stands on a table; the other engine holds its base by itself."""
+"""The arm stands on a table; the other engine holds its base without help."""
 KEPT = {"slow": 5.0, "steps": 5.0}
 """Takes that ship, cut to so many seconds."""
 README = """# The tutorial's data

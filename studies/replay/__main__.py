@@ -1,9 +1,9 @@
-"""Diagnoses of sessions of known truth, this version of the code beside another: python -m studies.replay [--against COMMIT]
+"""Diagnoses sessions of known truth by this version of the code and another: python -m studies.replay [--against COMMIT]
 
 The sessions (practice, and some drawn by a fixed seed; no trial's) are made once in OUT. Each version diagnoses each of them
-once, into OUT/results/VERSION; what a version was asked before is not asked again. Rollouts are remembered in OUT/rollouts by
-what they depend on, so that a change of the search alone replays in seconds. Prints, paired, what was named, placed, sized and
-how surely, what was invented, and how long it took; returns 1 where this version names less or invents more than the other.
+once, into OUT/results/VERSION; a session with a result is not diagnosed again. Rollouts are cached in OUT/rollouts by
+everything they depend on, so that a change of the search alone replays in seconds. Prints, paired, names, places, sizes,
+confidences, false findings and times; returns 1 where this version names less or has more false findings than the other.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main() -> int:
 
 
 def _scores(sessions: Sequence[KnownSession], root: Path, out: Path, version: str, workers: int) -> list[Score]:
-    """What a version of the code, at `root`, says of the sessions."""
+    """Diagnoses of the sessions by a version of the code at `root`."""
     rollouts = out / "rollouts"
     rollouts.mkdir(parents=True, exist_ok=True)
     remembers = "--memory" in (root / "workbench/cli/diagnose.py").read_text(encoding="utf-8")

@@ -25,7 +25,7 @@ def named(s: Score) -> int:
 
 
 def placed(s: Score) -> float:
-    """Effects at their place, shared out."""
+    """Effects at the right place, with divided credit."""
     return float(sum(e.share or 0.0 for e in s.effects))
 
 

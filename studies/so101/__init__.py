@@ -1,1 +1,1 @@
-"""A real arm of STS3215 servos: what each of its joints lacks, from named programmes."""
+"""A real arm of STS3215 servos: deviations of each joint from nominal, from named programmes."""

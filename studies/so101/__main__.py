@@ -1,10 +1,11 @@
-"""A real SO-101 arm, from named programmes: what each joint lacks, where the clock is, what changes with load.
+"""A real SO-101 arm, from named programmes: deviations of each joint, position of the clock, effect of load.
 
     python -m studies.so101 [--data ../shared/data/so101] [--out runs/studies/so101] [--model model.yaml] [--read-off-only]
 
 Writes the arm as a session (robot.sdf, servos, session.yaml of training programmes, validation.yaml), measures it, has the
-workbench diagnose the training programmes, and holds the nominal model, a plain baseline, a model read off the measurements
-and the diagnosed one against the validation programmes. --model: one diagnosed before. --read-off-only: without a diagnosis.
+workbench diagnose the training programmes, and compares the nominal model, a plain baseline, a model estimated from the
+measurements and the diagnosed one on the validation programmes. --model: one diagnosed before. --read-off-only: without a
+diagnosis.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.common import ROOT, publish
 from studies.so101 import page
@@ -36,9 +36,9 @@ from workbench.files import InputError
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
 from workbench.robot.model_file import load_model
+from workbench.types import Array
 from workbench.view.report.page import Picture, Provenance, Report, Section
 
-Array = NDArray[np.float64]
 Say = Callable[[str, float | None], None]
 BESIDE = ROOT.parent / "shared/data/so101"
 SLOW = "friction_gravity"
@@ -86,8 +86,8 @@ def so101(data: Path, out: Path, model_file: Path | None, diagnosing: bool, n_jo
     report.add(Section("While it stands, and under load", [
         page.rest_table(m.resting, m.jaw_range), page.zero_table(list(m.zeros.values()))]))
     report.add(Section("Speed and current", [page.speed_table(m.speeds, m.currents), Picture(
-        figures["current"], "tau_abs goes with the square of the error, alike in all joints: it is the supply's current, duty "
-        "times the motor's, and no torque.")]))
+        figures["current"], "tau_abs is proportional to the square of the error, in every joint: it is the supply's current, "
+        "duty times the motor's, and no torque.")]))
     report.add(Section("Validation", [page.validation_table(joint), Picture(figures["errors"]), page.programme_table(
         validation, each), Picture(figures["overlay"], f"Validation programme {SHOWN}.")]))
     for name in ("read off", "diagnosed"):
@@ -143,7 +143,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=2, metavar="N", help="processes (default: %(default)s)")
     a = parser.parse_args(argv)
     if a.data is None and not BESIDE.is_dir():
-        print(f"studies.so101: nothing done: the recordings lie beside the project, not in it, and {BESIDE} is missing")
+        print(f"studies.so101: nothing done: it needs recordings that are not distributed, and {BESIDE} is missing")
         return 0
     began = time.monotonic()
     try:

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Programme
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DELAYS = np.arange(0.0, 0.2501, 0.005)
 
 
@@ -23,7 +22,7 @@ class Baseline:
     offset: Array
 
     def position(self, p: Programme) -> Array:
-        """What it says of a programme (N, 6)."""
+        """Prediction for a programme (N, 6)."""
         return np.column_stack([self.gain[i] * _late(p, i, self.delay[i]) + self.offset[i] for i in range(p.sent.shape[1])])
 
 

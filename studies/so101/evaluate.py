@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Programme
 from workbench.compare.session import Session
@@ -14,9 +13,8 @@ from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 Paths = dict[str, Array]
 """By programme: positions (N, 6) at the recorded times, JOINTS' order; degrees of the servo in what `degrees` gives."""
 STEP = 4e-3
@@ -50,6 +48,6 @@ def errors(programmes: Sequence[Programme], paths: Mapping[str, Array], unit: Ar
 
 
 def together(each: Array, programmes: Sequence[Programme]) -> Array:
-    """RMS over all programmes (6,), every frame alike."""
+    """RMS over all programmes (6,), every frame with the same weight."""
     n = np.array([len(p.time) for p in programmes])[:, None]
     return np.asarray(np.sqrt((np.square(each) * n).sum(axis=0) / n.sum()))

@@ -6,16 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Programme
 from studies.so101.published import PUBLISHED
 from studies.so101.rest import Current
 from studies.so101.rows import Rows
 from workbench.recording.formats.sage import JOINTS
+from workbench.types import Array
 from workbench.view.figures import style
 
-Array = NDArray[np.float64]
 COLOURS = {"nominal": style.SIMULATED, "delay and gain": style.FLOOR, "read off": style.OTHERS[0], "diagnosed": style.ACCENT,
            **dict(zip((p.name for p in PUBLISHED), style.OTHERS[1:]))}
 

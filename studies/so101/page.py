@@ -1,11 +1,10 @@
-"""The page of the SO-101's study: tables of what was measured, and what it means."""
+"""The page of the SO-101's study: tables of the measurements, and their interpretation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.programmes import Clock, Programme
 from studies.so101.response import Response
@@ -13,9 +12,9 @@ from studies.so101.rest import Current, Fastest, NamePosterior
 from studies.so101.zero import Zero
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.report.page import Table, Text
 
-Array = NDArray[np.float64]
 DEGREES = float(np.degrees(1))
 WHAT = (
     "A six-joint SO-101 arm of Feetech STS3215 servos, 28 named programmes (isaac-sim2real/sage). Fourteen are for training, "
@@ -29,9 +28,9 @@ def clock_text(clock: Clock, count: int) -> Text:
         f"Rows are {1e3 * clock.period:.2f} ms apart (never more than {1e3 * clock.jitter:.1f} ms off), so the {count} "
         f"programmes, written for 50 Hz, take {100 * clock.stretch:.2f} % longer. A row's command and measurement have "
         f"one stamp: they never differ by more than {1e6 * clock.apart:.0f} µs. The recorder's source "
-        "(so101_lerobot_collector.py) says what it is: the time before six goals are written one by one and eighteen registers "
-        "are then read one by one. So positions are read after their stamp, later joints later; how much later the files do not "
-        "say, and a delay in the table below is the servo's own less that.")
+        "(so101_lerobot_collector.py) shows its meaning: the time before six goals are written one by one and eighteen registers "
+        "are then read one by one. So positions are read after their stamp, later joints later; the files do not contain how "
+        "much later, and a delay in the table below is the servo's own less that.")
 
 
 def response_table(moving: Sequence[Response]) -> Table:
@@ -39,7 +38,7 @@ def response_table(moving: Sequence[Response]) -> Table:
     rows = [[r.joint, r.late.text(0, 1e3), r.delay.text(0, 1e3), r.friction.text(2, DEGREES), f"{DEGREES * r.left:.2f}",
              f"{DEGREES * r.spread:.2f}"] for r in moving]
     header = ("joint", "late in all [ms]", "of it pure delay [ms]", "dry friction as error [deg]", "RMS left [deg]", "of [deg]")
-    return Table(header, rows, "Joints that move, by regression; 90 % intervals from programmes drawn anew. Late in all: delay "
+    return Table(header, rows, "Moving joints, by regression; 90 % intervals by bootstrap over programmes. Total delay: delay "
                  "and lag. The jaw's error in shares of its range, as if they were radians.")
 
 
@@ -93,7 +92,7 @@ def _number(value: float) -> str:
 
 
 def effects_table(model: RobotModel) -> Table:
-    """What a model adds to the nominal one."""
+    """Additions of a model to the nominal one."""
     rows = [[e.effect, ", ".join(e.where) or "robot",
              ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in e.parameters.items())]
             for e in model.effects]

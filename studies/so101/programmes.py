@@ -18,8 +18,8 @@ from workbench.files import InputError
 from workbench.recording.formats.read import read_recording
 from workbench.recording.formats.sage import JOINTS, sage_programmes
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FILE = "so101_programmes.npz"
 TRAINING = (
     "frequency_sweep", "backlash_detection", "coupled_joints", "friction_gravity", "step_response", "hover_positions",
@@ -98,7 +98,7 @@ class Clock:
 
 
 def clock(programmes: list[Programme]) -> Clock:
-    """What the stamps say."""
+    """Information from the time stamps."""
     steps = np.concatenate([np.diff(p.time) for p in programmes])
     period = float(np.median(steps))
     whole = sum(p.time[-1] - p.time[0] for p in programmes) / sum((len(p.time) - 1) / NOMINAL_RATE for p in programmes)

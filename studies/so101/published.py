@@ -1,4 +1,4 @@
-"""This arm's servos as other people publish them, to stand beside what was found: a stiffness, damping and friction a joint.
+"""This arm's servos as others publish them, for comparison with the findings: stiffness, damping and friction of each joint.
 
 A simulator's position actuator is the servo law with a gain of kp over the largest torque and a back-EMF of kv.
 """
@@ -48,4 +48,4 @@ PUBLISHED = (
               kp=48.4, kv=3.3, damping=1.59, friction=0.347, armature=0.068, joints=("Rotation",)),
     Published("AnchorBench, by hand", "data card sreetz-nv/so101_vials_actuators_hand_tuned, its pan joint",
               kp=33.0, kv=1.6, damping=0.0, friction=0.0, armature=0.02, joints=("Rotation",)))
-"""Largest torque of all: the makers', as the data cards say none. Bam's servo, published too, is the nominal one."""
+"""Largest torque: the makers', as the data cards give none. Bam's servo, also published, is the nominal one."""

@@ -1,8 +1,8 @@
-"""A model without any search: gain, friction and damping of each joint as the regressions on training programmes say them.
+"""A model without any search: gain, friction and damping of each joint from the regressions on training programmes.
 
 Stiffness is one over the compliance with which gravity shows in the error (joints that gravity does not turn: the mean of the
-others, as all servos are alike), dry friction half the distance of the two errors at rest, damping what makes the joint late;
-all of them over the nominal servo's.
+others, as all servos are of one kind), dry friction half the distance of the two errors at rest, damping follows from the delay
+of the joint; all of them over the nominal servo's.
 """
 
 from __future__ import annotations

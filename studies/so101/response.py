@@ -1,11 +1,11 @@
-"""How each joint answers while it moves: delay, lag, friction and what gravity does, by regression on training programmes.
+"""Response of each joint while it moves: delay, lag, friction and gravity, by regression on training programmes.
 
 A proportional servo has  gain · stall · e = I a + B v + (F0 + F1 |g|) sign v − g  with e the goal less the position, g gravity's
 torque, B all damping, I the inertia. Divided by the stiffness K = gain · stall:
   e = a I/K + T v + (f0 + f1 |g|) sign v − c g + e0.
 The goal is taken `delay` earlier, and half a period for being held. Delay, lag T and I/K differ only while the joint speeds up
-or slows down, and with all three free these recordings do not tell them apart; so I/K is the published servo's, and the delay is
-what remains under it. Intervals are of 90 %, from programmes drawn anew with replacement.
+or slows down, and with all three free these recordings do not separate them; so I/K is the published servo's, and the delay is
+the remainder. Intervals are of 90 %, by bootstrap over programmes.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.robot import ARMATURE, DUTY_PER_RADIAN, KT, RESISTANCE, VOLTAGE
 from studies.so101.rows import LOADED, Rows
 from workbench.recording.formats.sage import JOINTS
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DELAYS = np.arange(-0.040, 0.0601, 0.002)
 DRAWS = 400
 INERTIA = ARMATURE / (DUTY_PER_RADIAN * KT * VOLTAGE / RESISTANCE)

@@ -1,4 +1,4 @@
-"""How each joint stands: what error stays after which approach under which load, and what the current register says of it."""
+"""Each joint at rest: the remaining error by approach and load, and the reading of the current register."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import Rows
 from workbench.recording.formats.sage import JOINTS
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LEAST_HOLDS = 5
 
 

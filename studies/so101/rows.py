@@ -11,8 +11,8 @@ from scipy.signal import savgol_filter
 from studies.so101.programmes import Programme
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import GRAVITY, Kinematics
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LOADED = ("Pitch", "Elbow", "Wrist_Pitch")
 """Joints that gravity turns."""
 EVERY = 5

@@ -1,4 +1,4 @@
-"""Whether the URDF's zeros and signs are the recordings': what gravity does, with each joint's zero moved, against what is seen.
+"""Whether the URDF's zeros and signs are the recordings': predicted gravity, with each joint's zero moved, against the recorded.
 
 As in `response`, without a constant: a servo has none beyond a count, and gravity over a narrow range of poses looks like one.
 """
@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.so101.response import DRAWS, Value
 from studies.so101.rows import LOADED, Rows, gravity
 from workbench.recording.formats.sage import JOINTS
 from workbench.robot import Kinematics
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 OFFSETS = np.radians(np.arange(-60, 61, 5))
 
 
@@ -32,7 +31,7 @@ class Zero:
 
 
 def zeros(training: Sequence[Rows], arm: Kinematics, seed: int = 0) -> list[Zero]:
-    """Of the joints that gravity turns, one offset at a time, judged by the errors of all three."""
+    """For the joints that gravity turns, one offset at a time, judged by the errors of all three."""
     rng = np.random.default_rng(seed)
     draws = rng.integers(0, len(training), (DRAWS, len(training)))
     out = []
@@ -62,7 +61,7 @@ def _moments(r: Rows, arm: Kinematics, moved: str, offset: float, i: int) -> Arr
 
 
 def _cost(moments: Array) -> Array:
-    """What is left of the squares (offsets,), over the three joints' own squares, of moments (offsets, 3, 5, 5)."""
+    """Residual sum of squares (offsets,), over the three joints' own squares, of moments (offsets, 3, 5, 5)."""
     out = np.zeros(len(moments))
     for k, joints in enumerate(moments):
         for m in joints:

@@ -2,9 +2,9 @@
 
     python -m studies.sts3215 --data ../shared/data/sts3215 --out OUT [--quick] [--only NAME ...]
 
-For each session: effects with confidence, size beside the truth, and time. With the law of another session, the first repetition
-of the rig as weighed is diagnosed first, and its model.yaml is what the others are held against (`diagnose --model`). Frequencies
-and sizes are those of one servo; nothing in the diagnosis was set on them.
+For each session: effects with confidence, estimated and true size, and time. With the law of another session, the first
+repetition of the rig as weighed is diagnosed first, and the others are compared with its model.yaml (`diagnose --model`).
+Frequencies and sizes are those of one servo; nothing in the diagnosis was set on them.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from typing import Any
 from studies.common import ROOT, run_study
 from studies.sts3215.sessions import CASES, Case, write_session
 from workbench.compare.session import load_session
-from workbench.compare.session_takes import Progress
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
 from workbench.identify.results.findings import Diagnosis, Finding
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.robot import RobotModel, load_model
+from workbench.types import Progress
 
 SAID = 0.5
 """Confidence from which on a name counts."""
@@ -37,47 +38,61 @@ ALONE, SINCE = "alone", "since another session"
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one session. rightly: the change was named, or, where there is none, nothing; false: names that are no truth; sized: the
-    size is within what the case allows, None where none was told; seconds: of wall time."""
+    """Of one session. rightly: the change was named, alone or in its tie, or, where there is none, nothing; named: alone; false:
+    names that are wrong; value: the estimated size, and `sized` whether it is as close to the truth as the case demands, None
+    without an estimate; seconds: of processor."""
 
     case: str
     since: str
     findings: tuple[Finding, ...]
+    tied: tuple[GravityOverTorque, ...]
     rightly: bool
+    named: bool
     false: tuple[str, ...]
+    value: float | None
     sized: bool | None
     seconds: float
 
     def to_json(self) -> dict[str, object]:
         """As it is kept."""
-        return {"case": self.case, "since": self.since, "rightly": self.rightly, "false": list(self.false), "sized": self.sized,
-                "seconds": round(self.seconds, 1), "findings": [f.to_json() for f in self.findings]}
+        return {"case": self.case, "since": self.since, "rightly": self.rightly, "named": self.named, "false": list(self.false),
+                "value": self.value, "sized": self.sized, "seconds": round(self.seconds, 1),
+                "findings": [f.to_json() for f in self.findings], "tied": [t.to_json() for t in self.tied]}
 
 
 def judged(case: Case, diagnosis: Diagnosis, since: str, seconds: float) -> Outcome:
-    """What a diagnosis said beside what is true."""
+    """A diagnosis compared with the truth."""
     said = [f for f in diagnosis.findings if f.confidence >= SAID]
     named = [f for f in said if f.effect in case.effects]
     false = tuple(f.effect for f in said if f.effect not in case.effects)
-    size = None
-    if named and named[0].effect == case.effects[0]:
-        value = next(iter(named[0].parameters.values())).value
-        size = None if isinstance(value, tuple) else abs(value - case.size) <= case.within * abs(case.size)
-    return Outcome(case.name, since, diagnosis.findings, bool(named) if case.effects else not said, false, size, seconds)
+    ties = [t for t in diagnosis.tied
+            if {n.effect for n in t.names} & set(case.effects) and (t.confidence >= SAID or not t.since)]
+    size, value = None, None
+    if case.moment is not None:
+        value = next((float(t.ratio.value) for t in ties if t.since), None)  # type: ignore[arg-type]
+        size = None if value is None else abs(value - case.moment) <= case.within * abs(case.moment - 1.0)
+    elif named:
+        value = next((float(v.value) for v in named[0].parameters.values() if not isinstance(v.value, tuple)), None)
+        size = None if value is None else abs(value - case.size) <= case.within * abs(case.size)
+    quiet = not said and not any(t.since for t in diagnosis.tied)
+    rightly = bool(named or ties) if case.effects else quiet
+    return Outcome(case.name, since, diagnosis.findings, diagnosis.tied, rightly, bool(named), false, value, size, seconds)
 
 
 def diagnosed(case: Case, data: Path, folder: Path, previous: RobotModel | None, since: str, jobs: int,
-              progress: Progress) -> Outcome:
+              progress: Progress, memory: Path | None = None) -> Outcome:
     """A session written, diagnosed and saved."""
     session = load_session(write_session(folder, data, case))
-    began = time.monotonic()
-    result = diagnose_session(session, progress, jobs, previous=previous)
+    began = time.process_time()
+    result = diagnose_session(session, progress, jobs, memory=memory, previous=previous)
     result.diagnosis.save(folder / "diagnosis")
-    outcome = judged(case, result.diagnosis, since, time.monotonic() - began)
+    outcome = judged(case, result.diagnosis, since, time.process_time() - began)
     print(f"{case.name} ({since}): {'right' if outcome.rightly else 'WRONG'}, {outcome.seconds:.0f} s", flush=True)
     for f in result.diagnosis.findings:
         sizes = ", ".join(f"{k} {_told(e.value)} ({_told(e.low)} to {_told(e.high)})" for k, e in f.parameters.items())
         print(f"    {f.confidence:.2f} {f.effect}: {sizes}", flush=True)
+    for t in result.diagnosis.tied:
+        print(f"    {t.confidence:.2f} {t.said()}", flush=True)
     return outcome
 
 
@@ -89,16 +104,18 @@ def study(args: argparse.Namespace, out: Path, quick: bool, progress: Progress) 
     """All sessions alone, then all with the law of the first."""
     if unknown := set(args.only) - {c.name for c in CASES}:
         raise InputError(None, f"--only: no session is named {min(unknown)!r}; expected of {', '.join(c.name for c in CASES)}")
+    if args.memory is not None:
+        args.memory.mkdir(parents=True, exist_ok=True)
     cases = [replace(c, **QUICK) for c in CASES if c.name in QUICK_CASES] if quick else list(CASES)
     law, outcomes = args.law, []
     if law is None:
-        outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress))
+        outcomes.append(diagnosed(cases[0], args.data, out / "law", None, ALONE, args.jobs, progress, args.memory))
         law = out / "law" / "diagnosis" / "model.yaml"
     known = load_model(law)
     for case in (c for c in cases[1:] if not args.only or c.name in args.only):
         for previous, since in ((known, SINCE), (None, ALONE)):
             folder = out / f"{case.name.replace(', ', '_')}_{'since' if previous else 'alone'}"
-            outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress))
+            outcomes.append(diagnosed(case, args.data, folder, previous, since, args.jobs, progress, args.memory))
     (out / "outcomes.json").write_text(json.dumps([o.to_json() for o in outcomes], indent=1))
     right, false = sum(o.rightly for o in outcomes), sum(len(o.false) for o in outcomes)
     return f"{right} of {len(outcomes)} sessions rightly; {false} false names of {SAID} or more"
@@ -109,7 +126,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the logs")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="of these sessions alone, beside the law's")
+    parser.add_argument("--memory", type=Path, metavar="DIR", help="keeps every rollout there, so that a killed study resumes")
+    parser.add_argument("--only", nargs="*", default=[], metavar="NAME", help="these sessions alone, beyond the law's")
     parser.add_argument("--law", type=Path, metavar="MODEL.YAML", help="law of another session that was diagnosed before")
     args, others = parser.parse_known_args()
     return run_study("sts3215", __doc__, partial(study, args), others)

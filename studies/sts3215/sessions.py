@@ -1,4 +1,4 @@
-"""Sessions of real logs with a change that is known: what the session is told differs from what was recorded.
+"""Sessions of real logs with a known change: the session describes another rig, gain, clock or zero than was recorded.
 
 A pendulum that one Feetech STS3215 swings (kscalelabs/sysid, commit ca1ecb1), on three rigs that its authors weighed.
 """
@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 
-Array = NDArray[np.float64]
 Entry = dict[str, Any]
 JOINT, ARM = "servo", "arm"
 DUTY_PER_UNIT = 0.16489
@@ -67,9 +65,9 @@ RIGS = {r.name: r for r in (Rig("arm150_0.741kg", 0.741, 0.150, 0.018793, 1.1268
 @dataclass(frozen=True)
 class Case:
     """One session. recorded: rig and repetition of the logs; told: the rig that the session describes. gain: by which the told
-    gain is larger than the servo's; edit: what is done to a log's rows. effects: names that say rightly what changed; size: of
-    the first parameter of the first of them, in the unit of docs/formats.md; within: share of it within which an answer is
-    right."""
+    gain is larger than the servo's; edit: applied to a log's rows. effects: names that describe the change rightly; size: of the
+    first number of the first of them, in the unit of docs/formats.md; moment: instead of a size, the true gravity over torque
+    relative to the described rig; within: share of the size, or of the change of `moment`, within which an answer is right."""
 
     name: str
     recorded: str
@@ -79,6 +77,7 @@ class Case:
     edit: Callable[[list[Entry]], list[Entry]] | None = None
     effects: tuple[str, ...] = ()
     size: float = 0.0
+    moment: float | None = None
     within: float = 0.05
     gains: Sequence[int] = GAINS
     programmes: Sequence[str] = PROGRAMMES
@@ -102,8 +101,8 @@ def encoder(degrees: float) -> Callable[[list[Entry]], list[Entry]]:
 CASES = (
     Case("quiet", "arm150_0.741kg"),
     Case("quiet, repeated", "arm150_0.741kg", 2),
-    Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), size=0.228, within=0.2),
-    Case("arm", "arm100_0.741kg", effects=("link_length", "com_shift", "payload"), size=-0.05, within=0.2),
+    Case("mass", "arm150_0.969kg", effects=("payload", "com_shift"), moment=1.46192 / 1.12685, within=0.2),
+    Case("arm", "arm100_0.741kg", effects=("com_shift", "payload"), moment=0.74437 / 1.12685, within=0.2),
     Case("gain", "arm150_0.741kg", 2, gain=2.0, effects=("servo_gain",), size=0.5),
     Case("delay", "arm150_0.741kg", 2, edit=goals_at(0.04), effects=("command_delay",), size=0.04),
     Case("clock", "arm150_0.741kg", 2, edit=goals_at(0.0, 1.01), effects=("clock_rate",), size=1.01, within=0.002),

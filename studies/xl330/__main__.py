@@ -10,7 +10,6 @@ M6 as published and refitted on the same two. Quick: one gain left out, M1 alone
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -25,18 +24,18 @@ from studies.xl330.station import played
 from workbench.compare.session import load_session
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
+from workbench.types import Progress
 
 DATA = ROOT.parent / "shared/data/xl330"
 MODELS = ("m1", "m3", "m4", "m6")
 GAINS = (100, 200, 400)
-Progress = Callable[[str, float | None], None]
 
 
 def xl330(out: Path, quick: bool, progress: Progress) -> str:
     """Runs the study and writes page, figures and numbers."""
     began = time.monotonic()
     if not DATA.is_dir():
-        raise InputError(DATA, "is missing: the recordings lie beside the project, not in it")
+        raise InputError(DATA, "is missing: this study needs recordings that are not distributed")
     found, models = find_logs(DATA), {m: published(DATA, m) for m in MODELS}
     left_out = GAINS[1:2] if quick else GAINS
     logs = bam.even(found)
@@ -58,7 +57,7 @@ def xl330(out: Path, quick: bool, progress: Progress) -> str:
 
 
 def _diagnosed(folder: Path, logs: list[Log], m1: dict[str, float], gain: int, quick: bool, progress: Progress) -> Diagnosed:
-    """The other gains' logs diagnosed, and what that is worth at this one. quick: without the diagnosis."""
+    """Diagnosis of the other gains' logs, and its error on this one. quick: without the diagnosis."""
     session = load_session(write_session(folder, logs, m1, [gain]))
     began = time.monotonic()
     told = None

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.xl330.rig import DUTY_PER_UNIT, Log
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 STEP = 5e-3
 GRAVITY = 9.80665
 BOUNDS = {

@@ -1,4 +1,4 @@
-"""Figures of the rig: what its logs show before any model, and models beside the gain that they did not see."""
+"""Figures of the rig: features of its logs before any model, and predictions of models for the gain that they did not see."""
 
 from __future__ import annotations
 
@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.xl330.rig import Log
 from studies.xl330.station import Played
 from workbench.robot import GRAVITY
+from workbench.types import Array
 from workbench.view.figures import style
 
-Array = NDArray[np.float64]
 SLOW = 1.0
 """[rad/s] below which the arm's weight and the motor's torque nearly balance, but for friction."""
 

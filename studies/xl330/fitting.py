@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
+
 SIGMA = 0.02
 """Error [rad] beyond which a row counts by its size, no longer by its square: what stick and slip leave, 13 ticks; a fit by the
 sensor's own 0.0015 rad would follow a few rows in which the arm happened to stick."""
@@ -49,7 +50,7 @@ class Fitted:
 
 def fit_all(problems: Sequence[Problem], rollout: Rollout, position: Array, neutral: Mapping[str, float],
             iterations: int = ITERATIONS) -> list[Fitted]:
-    """Fits each problem to the positions (T, L) [rad] of its logs. neutral: what a number is that a problem does not have."""
+    """Fits each problem to the positions (T, L) [rad] of its logs. neutral: value of a parameter that a problem does not have."""
     names = tuple(dict.fromkeys([n.name for p in problems for n in p.numbers]))
 
     def residuals(sets: Sequence[tuple[int, Array]]) -> list[Array]:

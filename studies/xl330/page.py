@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from studies.xl330.bam import Logs
 from studies.xl330.station import Played, mean_error
 from workbench.identify.results.findings import Diagnosis
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.report.page import Picture, Provenance, Report, Section, Table, Text
 from workbench.view.report.words import interval, probable, title_of
 
-Array = NDArray[np.float64]
 DIAGNOSED = "`workbench diagnose`"
 
 
@@ -34,7 +33,7 @@ class Diagnosed:
 @dataclass(frozen=True)
 class Results:
     """logs: at BAM's times. published, refitted (by gain left out): mean absolute errors (L,) [rad] of friction models.
-    diagnosed: by gain left out. supply: what the logs say of it [V], idle and standing at full duty, and rows of the latter."""
+    diagnosed: by gain left out. supply: readings of the logs [V], idle and stalled at full duty, and rows of the latter."""
 
     logs: Logs
     published: Mapping[str, Array]
@@ -90,12 +89,12 @@ def page(r: Results, figures: Mapping[str, Figure], model: RobotModel, seconds: 
               emphasis=[i for i, row in enumerate(rows) if row[0] == DIAGNOSED]),
         Picture(figures["validation"], "Rollouts of six seconds from the first row's state, nothing fed back from the log.")]))
     idle, full, count = r.supply
-    report.add(Section("What the two gains say", [
+    report.add(Section("Comparison of the two gains", [
         *(_findings(g, d.diagnosis) for g, d in r.diagnosed.items() if d.diagnosis is not None),
-        Text(f"The servo's register of voltage is at {idle:.1f} V while it idles, and at {full:.1f} V when it stands at full "
+        Text(f"The servo's register of voltage is at {idle:.1f} V while it idles, and at {full:.1f} V when it stalls at full "
              f"duty ({count} rows)."),
-        Picture(figures["balance"], "Slow stretches of all logs. Were the motor M1's and the gear free of friction, all would "
-                "lie on the dashed line. Lifting takes half as much duty again, and the more so the heavier the load; held, the "
+        Picture(figures["balance"], "Slow stretches of all logs. If the motor M1's and the gear were free of friction, all would "
+                "lie on the dashed line. Lifting takes half as much duty again, and more so the heavier the load; at rest, the "
                 "same duty holds a wide range of loads.")]))
     return report.add(Section("Each log", [_per_log(r)]))
 
@@ -120,4 +119,4 @@ def _per_log(r: Results) -> Table:
         rows.append((name.replace("_", " "), *(mrad(e[i]) for e in r.published.values()),
                      *(mrad(e[gain][i]) for e in r.refitted.values()), mrad(r.diagnosed[gain].after[name].error)))
     header = ("log", *(f"{m.upper()}" for m in r.published), *(f"{m.upper()} refitted" for m in r.refitted), "diagnosed")
-    return Table(header, rows, "Mean absolute error [mrad]; what is fitted was fitted on the other gains.")
+    return Table(header, rows, "Mean absolute error [mrad]; fits used the other gains only.")

@@ -13,14 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.recording import read_recording, write_joint_log
 from workbench.recording.recording import Recording
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 DUTY_PER_UNIT = 4096 / (2 * np.pi) / 256 / 885
 """Duty per radian of position error, for each unit of the firmware's position gain."""
@@ -39,7 +37,7 @@ SDF = """<?xml version="1.0"?>
 
 @dataclass(frozen=True)
 class Log:
-    """One recorded log. gain: the firmware's position gain; programme: what it was told to do."""
+    """One recorded log. gain: the firmware's position gain; programme: its command."""
 
     path: Path
     gain: int
@@ -53,7 +51,7 @@ class Log:
         return f"{self.programme}_{self.gain}"
 
     def read(self) -> Recording:
-        """What the file holds."""
+        """Contents of the file."""
         return read_recording(self.path)
 
 
@@ -122,7 +120,7 @@ def _named(recording: Recording) -> dict[str, Array]:
 
 
 def full_duty(logs: Sequence[Log]) -> tuple[float, float, int]:
-    """What the logs say of the supply [V]: median while the motor is idle, median while it stands at full duty, and rows of the
+    """Supply voltage in the logs [V]: median while the motor is idle, median while it is stalled at full duty, and rows of the
     latter."""
     idle: list[Array] = []
     full: list[Array] = []

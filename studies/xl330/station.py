@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.session import Session
 from workbench.compare.session_takes import read_takes
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 STATION = SimulationConfig(base="fixed", contact_period=0)
 
 

@@ -41,6 +41,17 @@ def compiled_by(run, monkeypatch, turned=0.0):
     return roll_out_judged([run], DRAKE, n_jobs=1)[0], steps
 
 
+@pytest.mark.parametrize("rolled", [roll_out, roll_out_judged])
+def test_the_last_of_the_finer_steps_is_the_finest(run, rolled):
+    """Whichever is simulated first: `finer` is half the step, then a quarter of it."""
+    fine = replace(DRAKE, engine="auto")
+    done = rolled([run], fine, n_jobs=1)[0]
+    for take, k in zip(done.finer, (2, 4), strict=True):
+        own = roll_out([run], replace(fine, time_step=fine.time_step / k), n_jobs=1, floors=False)[0].nominal
+        at = np.searchsorted(own.time, take.time[take.time <= own.time[-1]] - 1e-9)
+        np.testing.assert_allclose(take.q[:len(at)], own.q[at], atol=1e-9)
+
+
 def test_finer_steps_are_compiled_and_as_drakes(run, drakes, monkeypatch):
     judged, steps = compiled_by(run, monkeypatch)
     step = DRAKE.time_step

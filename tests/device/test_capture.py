@@ -14,7 +14,7 @@ import pytest
 
 from tests.command import refused, succeeds
 from tests.device.motive import NAMES, MotiveOnSockets, scene
-from workbench.device.capture import Faults, Recorder, VirtualLink, VirtualMotive, finish, record_take
+from workbench.device.capture import Faults, Recorder, UdpLink, VirtualLink, VirtualMotive, finish, record_take
 from workbench.device.capture.journal import Journal
 from workbench.device.capture.ledger import Ledger
 from workbench.device.capture.packets import BrokenPacketError, parse_frame, parse_server_info
@@ -301,3 +301,22 @@ def test_sockets_are_let_go(tmp_path):
         record_take(Recorder(UdpLink("127.0.0.1", command_port=server.port)), tmp_path / "a.csv", lambda: False, 0.3)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
             again.bind(("239.255.42.99", server.data_port))
+
+
+def test_frames_of_a_second_server_on_the_group_are_left_out():
+    with MotiveOnSockets(version=(4, 1)) as server, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        link = UdpLink("127.0.0.1", "127.0.0.1", server.port)
+        other.bind(("127.0.0.2", 0))
+        other.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+        Recorder(link).connect()
+        heard = set()
+        for _ in range(200):
+            received = link.receive(0.05)
+            if received is not None:
+                other.sendto(b"foreign", (server.group, server.data_port))
+                heard.add(received[1] == b"foreign")
+            if len(link.others) and heard:
+                break
+        link.close()
+    assert heard == {False}
+    assert link.others == {"127.0.0.2"}

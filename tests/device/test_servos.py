@@ -118,6 +118,20 @@ def test_write_sets_delay_and_limits_and_nothing_else(tmp_path, family):
     assert list(set_up(bus, r.model, survey(bus, r.model, ids=()))) == []
 
 
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_servo_that_answers_reads_only_is_written_and_then_answers_all(tmp_path, family):
+    r = robot(family, model=arm(tmp_path))
+    r.servos["two"]["status_return_level"] = 1
+    for servo in r.servos.values():
+        servo["return_delay_time"] = 250
+    bus = r.bus()
+    lines = list(set_up(bus, r.model, survey(bus, r.model, ids=())))
+    assert "servo 2 (two): status_return_level 1 -> 2" in lines
+    assert [s["return_delay_time"] for s in r.servos.values()] == [0, 0, 0]
+    assert r.servos["two"]["status_return_level"] == 2
+    assert list(set_up(bus, r.model, survey(bus, r.model, ids=()))) == []
+
+
 def _read(table, servo, name):
     register = servo.profile.by_name[name]
     return int.from_bytes(table[register.address:register.address + register.size], "little")

@@ -71,8 +71,7 @@ def test_answers_find_swapped_ids_and_signs():
     assert answers.findings(IDS) == [
         "servo 2 is three, not two: bus_ids should say three: 2",
         "servo 3 is two, not three: bus_ids should say two: 3",
-        "joint three turns the other way than the model: its axis in the model has the wrong sign, or its servo is mounted the "
-        "other way round"]
+        "joint three turns the other way than in the model"]
     with pytest.raises(InputError, match="'left': expected Enter, -, or the joint that moved: one two three"):
         answers.take("one", "left", IDS)
     fine = Answers()

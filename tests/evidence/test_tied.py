@@ -17,7 +17,7 @@ N = 1600
 
 
 def fitted(sd, size, alike=1.0):
-    """A tilt that does what torque does, but for what is at right angles to it; a unit of it as much as 0.1 of the logarithm."""
+    """A tilt that acts as torque, apart from a part at right angles to it; a unit of it equals 0.1 of the logarithm."""
     tilt = candidate("ground_tilt")
     here = replace(region([tilt]), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
     rng = np.random.default_rng(1)
@@ -64,3 +64,14 @@ def test_a_joint_gets_one_of_a_tie():
     here = region([candidate(name) for name in ("ground_tilt", "supply_voltage", "torque_ceiling", "supply_sag", "backlash")])
     h = start(here.numbers).with_effect(candidate("ground_tilt"), np.ones(2))
     assert {c.name for c in extensions(here, h)} == {"torque_ceiling", "supply_sag", "backlash"}
+
+
+def test_a_size_is_known_no_better_than_the_torques_that_do_the_same():
+    """A tilt of 3 is 0.3 of the logarithm of torque; with 0.06 of that unknown, a fifth of the tilt is."""
+    here, f, c = fitted(sd=0.06, size=3.0)
+    tie = as_torque(here, OPTIONS, f, c)
+    size, vague = f.hypothesis.theta[f.hypothesis.slices()[0]], 4.0 * np.eye(c.size)
+    covariance = tie.covariance(1e-6 * np.eye(c.size), size)
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.2 * 3.0, rel=1e-3)
+    assert np.sqrt(covariance[1, 1]) == pytest.approx(1e-3)
+    assert tie.covariance(vague, size) == pytest.approx(vague)

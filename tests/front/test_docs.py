@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from docs.effects_page import LIMITS, PAGE, SEEN, meanings, page
+from docs.effects_page import LAYERS, LIMITS, PAGE, SEEN, meanings, page
 from workbench.cli.main import make_parser
 from workbench.effects.registry import known_effects
 
@@ -44,6 +44,8 @@ def test_links_lead_somewhere(path: Path) -> None:
             continue
         file, _, anchor = link.partition("#")
         target = (path.parent / file).resolve() if file else path
+        if target == DOCS / PAGE:  # made with the site
+            continue
         assert target.exists(), f"{path.name}: {link}"
         if anchor and target.suffix == ".md":
             headings = re.findall(r"^#+ (.+)$", target.read_text(encoding="utf-8"), re.MULTILINE)
@@ -84,7 +86,8 @@ def test_yaml_blocks_are_yaml(name: str, text: str) -> None:
 def test_the_page_of_effects_is_made_from_the_code_and_names_all() -> None:
     own = {name for name, e in known_effects().items() if type(e).__module__.startswith("workbench.")}
     assert set(SEEN) == own
-    assert PAGE.read_text(encoding="utf-8") == page(), "run: python -m docs.effects_page"
+    assert re.findall(r"^### (.+)$", page(), re.MULTILINE) == [
+        name for layer in LAYERS for name in sorted(own) if known_effects()[name].layer == layer]
     assert set(LIMITS) == {name for name in own if known_effects()[name].reduces_to}
     for seen in SEEN.values():
         assert seen.formula

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from tests.command import refused, succeeds
+from workbench.cli.check import check_table_of
+from workbench.device.tables.table_file import encode_table, table_file
 from workbench.files import InputError
 from workbench.gait.certificate import NAME, check_certificate, has_mark, read_certificate
 from workbench.gait.certify import CertifyOptions, certify
 from workbench.gait.ensemble import load_ensemble
 from workbench.gait.examine import Examiner
 from workbench.gait.machine import GaitMachine
-from workbench.gait.optimize import shape_from, write_gait
+from workbench.gait.optimize import write_gait
 from workbench.gait.request import Request
 from workbench.gait.second_engine import AS_IT_IS, Condition, conditions, margins
 from workbench.gait.shape import GaitShape
@@ -25,7 +27,7 @@ from workbench.view.figures.gait import draw_ranges
 
 SHAPE = GaitShape("trot", (1, 1), 8, 2.2, stride=0.06, duty=0.6, lift=0.02, crouch=0.04, lead=1.0)
 OPTIONS = CertifyOptions(seconds=1.0, draw_seconds=1.0, draws=2, checked=0, floor_seconds=0.3, step=2e-3, compared_seconds=0.3,
-                         variants=("2 ms", "1 ms"), n_jobs=1, watched=8)
+                         variants=("2 ms", "1 ms"), n_jobs=1, watched=8, trimmed=1)
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +36,8 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gait")
     machine = GaitMachine(puppy_model())
     request = Request()
-    lax = replace(request.limits, drift=10.0, spread=10.0, aside=5.0, rms=1.3, torque=2.0, lift=1e-6, slip=5.0, slip_on_draws=9.0)
+    lax = replace(request.limits, drift=10.0, spread=10.0, trimmed=5.0, aside=5.0, rms=1.3, torque=2.0, lift=1e-6,
+                  slip=5.0, slip_on_draws=9.0)
     request = replace(request, limits=lax)  # any gait will do here
     table = gait_table(machine, SHAPE)
     draws = load_ensemble().draws(machine.model, 2, 7, folder)
@@ -70,7 +73,10 @@ def test_says_what_there_is_to_say(made):
     assert all(n is not None and n <= 5 for n in back.values())
     assert c.cycle.heading < 1.0
     assert c.ways.rest.off < 6
-    assert shape_from(json.loads((folder / NAME).read_text())["shape"]) == table.shape
+    assert GaitShape.from_plain(json.loads((folder / NAME).read_text())["shape"]) == table.shape
+    assert Request.from_plain(c.asked) == certified.request
+    assert c.draws["straightened"]["robots"] == 1
+    assert abs(c.draws["straightened"]["after 3 metres deg/m RMS"]) < 6.0
     assert "a claim about the model" in json.loads((folder / NAME).read_text())["claim"]
     assert c.as_text() == certified.certificate.as_text()
 
@@ -122,7 +128,7 @@ def test_export_refuses_what_has_no_valid_certificate_unless_forced(made, tmp_pa
 def test_no_verb_moves_a_robot_by_what_lacks_its_certificate(made, tmp_path, capsys, verb):
     path = tampered(made[0], tmp_path, lambda f: (f / NAME).unlink())
     said = refused(capsys, verb[0], str(path), *verb[1:], "--out", str(tmp_path / "out"))
-    assert "the certificate is missing; --force goes on all the same" in said
+    assert "the certificate is missing; use --force to override" in said
     assert not (tmp_path / "out").exists()
 
 
@@ -180,3 +186,28 @@ def test_engines_that_disagree_anywhere_break_the_certificate(made):
     assert all(m.use <= 1 for m in good)
     assert broken[0].use > 1
     assert broken[0].where == "friction 0.3, in other"
+
+
+def test_a_binary_table_is_checked_against_the_certificate_beside_it(made, tmp_path, capsys):
+    folder, machine, _, _ = made
+    succeeds(capsys, "export", str(folder / "gait.csv"), "--out", str(tmp_path), "--cycles", "1", "--force")
+    table = str(tmp_path / "motion.table")
+    check_table_of("flash", table, machine.model, force=False)
+    (tmp_path / NAME).write_text((tmp_path / NAME).read_text().replace('"seed": 7', '"seed": 8'))
+    with pytest.raises(InputError, match="was changed after it was written; --force"):
+        check_table_of("flash", table, machine.model, force=False)
+    other = load_motion(folder / "gait.csv").as_table()
+    other = replace(other, dwells_ms=other.dwells_ms + 1)
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(other, machine.model)))
+    (tmp_path / NAME).write_text((folder / NAME).read_text())
+    with pytest.raises(InputError, match="another table's"):
+        check_table_of("flash", table, machine.model, force=False)
+
+
+def test_a_binary_table_without_a_certificate_has_its_limits_checked(made, tmp_path):
+    _, machine, table, _ = made
+    whole = table.whole
+    whole.goals[0, whole.joints.index("flm")] = 1000
+    (tmp_path / "motion.table").write_bytes(encode_table(table_file(whole, machine.model)))
+    with pytest.raises(InputError, match="beyond the joint's limit"):
+        check_table_of("flash", str(tmp_path / "motion.table"), machine.model, force=False)

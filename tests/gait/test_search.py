@@ -11,11 +11,11 @@ from workbench.files import InputError
 from workbench.gait.certify import CertifyOptions
 from workbench.gait.ensemble import Ensemble, load_ensemble
 from workbench.gait.evaluate import Evaluator
+from workbench.gait.feasibility import STANDING, out_of_reach
 from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import GaitLimits
 from workbench.gait.machine import GaitMachine
 from workbench.gait.optimize import OptimizeOptions, optimize, options_of
-from workbench.gait.possible import STANDING, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.requirements import drift
 from workbench.gait.search import Budget, Found, search, steered

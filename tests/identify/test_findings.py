@@ -32,11 +32,11 @@ def test_it_is_the_contracts_file(tmp_path: Path) -> None:
             "fit": {"before": 1.9, "after": 0.12, "unit": "deg"}, "validation": {"before": 2.0, "after": 0.11, "unit": "deg"},
             "evidence": "It shows where the load turns."}],
         "rejected": [{"effect": "coulomb_friction", "where": ["flm"],
-                      "reason": "dead_band(flm) takes 900 off chi squared on the choosing stretches, this 40",
+                      "reason": "dead_band(flm) reduces chi squared on the choosing stretches by 900, this one by 40",
                       "validation": {"before": 2.0, "after": 1.9, "unit": "deg"}},
                      {"effect": "payload", "where": ["body_link"], "reason": str(ScreenedOut(12.0, 310.0))}],
         "unexplained": [{"where": ["frb"], "error": 0.6, "floor": 0.2, "unit": "deg",
-                         "description": "a <take>: goes with angle (correlation 0.60)"}],
+                         "description": "a <take>: correlates with angle (0.60)"}],
         "next_experiment": {"motion": "next_experiment.csv", "base": "fixed", "separates": [["backlash", "joint_compliance"]]},
         "provenance": {"seed": 7, "seconds": 94}, "left_out": [{"take": "trot", "reason": "line 9: the file is cut"}]}
     assert load_model(paths[1]).effects == DIAGNOSIS.model.effects
@@ -73,7 +73,7 @@ def test_what_cannot_be_meant_is_refused() -> None:
         Estimate(3.0, 3.1, 3.5, "deg")
     with pytest.raises(ValueError, match="finite"):
         Estimate(inf, 0.0, inf, "N m")
-    with pytest.raises(ValueError, match="alike"):
+    with pytest.raises(ValueError, match="the same shape"):
         Estimate((0.0, 0.0, 0.0), 0.0, 1.0, "m")
     with pytest.raises(ValueError, match="verdict"):
         replace(DIAGNOSIS, verdict="perhaps")  # type: ignore[arg-type]

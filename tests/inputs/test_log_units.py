@@ -72,8 +72,8 @@ def test_a_sensor_that_stands_to_the_end(tmp_path: Path) -> None:
     columns = _two_joints()
     columns["position.knee"][100:] = columns["position.knee"][100]
     (line,) = _told(tmp_path, columns)
-    assert "position.knee: repeats" in line
-    assert "from 2.000 s" in line
+    assert "position.knee: no longer depends on goal.knee from 2.020 s" in line
+    assert "sensor stood still" in line
 
 
 def test_a_weak_servo_is_in_no_other_unit(tmp_path: Path) -> None:

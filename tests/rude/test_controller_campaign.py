@@ -40,14 +40,8 @@ def campaign(count: int, skip: int = 0, step: int = 1) -> list[str]:
     return [f"{i}: {c}" for i in chosen if (c := complaint(i.run(TABLES)))]
 
 
-def test_five_hundred_faults_break_nothing() -> None:
-    assert campaign(500) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("part", range(10))
-def test_a_hundred_thousand_faults_break_nothing(part: int) -> None:
-    assert campaign(100_000, part, 10) == []
+def test_nine_hundred_faults_break_nothing() -> None:
+    assert campaign(900) == []
 
 
 SENT = "    bool sent = r->state == STATE_PLAY"
@@ -201,15 +195,12 @@ def host_session(trouble: Trouble, folder: Path) -> str:
     return "" if said or well else "ended without a word"
 
 
+def host_sessions(count: int, seed: int, folder: Path) -> tuple[int, list[str]]:
+    """Sessions of the host with trouble of each kind in turn; how many, and what is wrong with how they ended."""
+    rng = random.Random(seed)
+    troubles = [Trouble(KINDS[n % len(KINDS)], rng.randrange(150, 5200), rng.randrange(15)) for n in range(count)]
+    return count, [f"{t}: {c}" for t in troubles if (c := host_session(t, folder))]
+
+
 def test_the_host_says_well_only_where_all_was_done_and_leaves_no_torque(tmp_path: Path) -> None:
-    rng = random.Random(5)
-    troubles = [Trouble(kind, rng.randrange(150, 5200), rng.randrange(15)) for kind in KINDS for _ in range(3)]
-    assert {str(t): c for t in troubles if (c := host_session(t, tmp_path))} == {}
-
-
-@pytest.mark.slow
-def test_a_thousand_sessions_of_the_host(tmp_path: Path) -> None:
-    rng = random.Random(6)
-    each = 1000 // len(KINDS) + 1
-    troubles = [Trouble(kind, rng.randrange(150, 5200), rng.randrange(15)) for kind in KINDS for _ in range(each)]
-    assert {str(t): c for t in troubles if (c := host_session(t, tmp_path))} == {}
+    assert host_sessions(3 * len(KINDS), 5, tmp_path)[1] == []

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tests.rude.host_campaign import EVERY, FAULTS, Run, campaign
+from tests.rude.host_campaign import EVERY, Run, campaign
+from tests.rude.host_faults import FAULTS
 from tests.rude.monitor import Monitor, Sample
 
 FOUND = [
@@ -12,9 +13,10 @@ FOUND = [
     ("XL-330", "garbled command", 7, 573),
     ("AX-12A", "short stall", 3, 93),
     ("STS3215", "long stall", 544, 255),
+    ("STS3215", "second program", 450, 3),
 ]
 """Violations that the campaign found, by family, fault, k and seed: late answers in the log as if they were new; poses that got
-lost on the wire, or were sent in a bunch after a stall, and exit code 0."""
+lost on the wire, or were sent in a bunch after a stall, and exit code 0; answers to another program's questions in the log."""
 
 
 @pytest.mark.parametrize("found", FOUND, ids=["-".join(map(str, f)) for f in FOUND])
@@ -22,20 +24,11 @@ def test_what_the_campaign_once_found(found):
     assert Run(*found).play() == []
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 def test_no_fault_makes_the_player_do_harm_or_lie(seed):
-    """1,500 faults in all."""
-    struck, violated = campaign(300, seed)
-    assert struck >= 300
-    assert [f"{run.family}, {run.fault}, {run.k}, {run.seed}: {line}" for run, line in violated] == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 120))
-def test_a_hundred_thousand_faults(seed):
-    """5,000 for each seed."""
-    struck, violated = campaign(5_000, seed)
-    assert struck >= 5_000
+    """600 faults in all."""
+    struck, violated = campaign(200, seed)
+    assert struck >= 200
     assert [f"{run.family}, {run.fault}, {run.k}, {run.seed}: {line}" for run, line in violated] == []
 
 
@@ -45,7 +38,7 @@ def test_faults_strike():
         run = Run("AX-12A", fault, EVERY[2])
         run.play()
         assert len(run.struck) > 10, fault
-    assert len(FAULTS) == len(set(FAULTS)) >= 17
+    assert len(FAULTS) == len(set(FAULTS)) == 26
 
 
 def test_the_monitor_sees_what_it_is_there_for():

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 
 from workbench.effects.apply import physics_of
@@ -18,9 +17,8 @@ from workbench.simulation.compiled.arrays import Log, State, work_for
 from workbench.simulation.compiled.machine import Machine, machine_of
 from workbench.simulation.compiled.run import DONE, TOUCHED, run
 from workbench.simulation.compiled.schedule import schedule_of
-from workbench.simulation.compiled.tables import tables_of
-
-Array = NDArray[np.float64]
+from workbench.simulation.compiled.structures import tables_of
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ class CompiledSteps:
 
     def __init__(self, model: RobotModel, config: SimulationConfig, apart: bool = False) -> None:
         physics, self.free = physics_of(model), config.base == "free"
-        self.tables = tables_of(model, physics.description, self.free)
+        self.tables = tables_of(model, physics.build, self.free)
         self.machine: Machine = machine_of(model, physics, self.tables, self.free, config.time_step, apart)
         self.config, self.zero = config, physics.zero
 

@@ -1,4 +1,4 @@
-"""What this machine has and lacks for the workbench, and how to get what is missing."""
+"""Checks this machine for the workbench, and suggests how to install missing parts."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _compiled() -> Check:
     while not at.exists():
         at = at.parent
     if not os.access(at, os.W_OK):
-        return Check("compiled rollouts", "missing", f"{at} cannot be written", "set NUMBA_CACHE_DIR, or each run compiles anew")
+        return Check("compiled rollouts", "missing", f"{at} cannot be written", "set NUMBA_CACHE_DIR, or each run compiles again")
     return Check("compiled rollouts", "ok", f"not compiled yet; made at first use in {folder}")
 
 

@@ -1,4 +1,4 @@
-"""Inverse dynamics of what a file holds: a take of a session, a rollout, a motion."""
+"""Inverse dynamics of a file: a take of a session, a rollout, a motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from workbench.compare.compare_session import Run, roll_out
 from workbench.compare.session import Base, Session, TakeSpec, load_session
-from workbench.compare.session_takes import Progress, no_progress, read_takes, register_takes
+from workbench.compare.session_takes import read_takes, register_takes
 from workbench.dynamics import InverseDynamics, InverseDynamicsResult, inverse_dynamics
 from workbench.files import InputError
 from workbench.motion import load_motion
@@ -16,6 +16,7 @@ from workbench.recording.formats.rollout_table import load_rollout
 from workbench.robot import RobotModel
 from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.play import play_motion
+from workbench.types import Progress, no_progress
 
 
 def forces_of_take(path: str | Path, name: str, progress: Progress = no_progress, model: RobotModel | None = None,

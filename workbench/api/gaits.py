@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 
-from workbench.api.sessions import Progress
-from workbench.compare.session_takes import no_progress
 from workbench.files import InputError
 from workbench.gait.engines import other_engine
 from workbench.gait.ensemble import Ensemble, load_ensemble
@@ -17,6 +15,7 @@ from workbench.gait.optimize import optimize as seek
 from workbench.gait.request import Request
 from workbench.motion import Motion
 from workbench.robot import RobotModel
+from workbench.types import Progress, no_progress
 from workbench.view.report.gait import write_gait_page
 from workbench.view.report.notebook import gait_html
 

@@ -21,14 +21,13 @@ from workbench.motion import Motion, save_motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_registers import save_registers
 from workbench.simulation.virtual_robot import VirtualRobot
-
-Progress = Callable[[str, float | None], None]
+from workbench.types import Progress
 
 
 @dataclass(frozen=True)
 class RobotRun:
-    """session: its file. takes: as they stand in it. capture: of the cameras, None where there were none. done: whether all was
-    played that was asked for, and torque is off."""
+    """session: its file. takes: as in that file. capture: result of the cameras, None without cameras. done: whether the whole
+    motion was played and torque is off."""
 
     session: Path
     takes: tuple[dict[str, Any], ...]
@@ -65,7 +64,7 @@ def run_on_robot(bus: Bus, model: RobotModel, motion: Motion, cycles: int, folde
     if played.log_problem:
         raise InputError(None, f"stopped: {played.stopped}; there is no joint log: {played.log_problem}")
     if virtual is not None and played.poses:
-        tell("what the cameras saw", None)
+        tell("the cameras' recording", None)
         capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
     save_registers(registers, folder / "registers.yaml")
     save_motion(motion, folder / f"{name}_motion.csv")
@@ -100,7 +99,7 @@ def run_by_controller(port: Any, model: RobotModel, motion: Motion, cycles: int,
     finally:
         capture = None if background is None else background.stop(played.ended if played else None)
     if virtual is not None:
-        tell("what the cameras saw", None)
+        tell("the cameras' recording", None)
         capture = _filmed(virtual, played, folder / f"{name}.csv", seed)
     save_motion(motion, folder / f"{name}_motion.csv")
     table_said = {"motion": f"{name}_motion.csv", "cycles": cycles, "base": base}

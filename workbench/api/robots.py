@@ -16,12 +16,12 @@ from workbench.robot.model_file import load_model as read_model_file
 
 
 def load_model(source: str | PathLike[str], packages: Mapping[str, str] | None = None) -> RobotModel:
-    """A robot, with its servos and the effects that were found in it.
+    """A robot, with its servos and its diagnosed effects.
 
-    source: "puppy" or another robot that ships, by name; a model.yaml, as `diagnose` writes it; a session.yaml (or the folder of
-    one), whose robot, servos and ground are taken; or an SDF, URDF or package:// URL, with AX-12A servos. packages: folder of
-    each ROS package that such a description names. InputError names the
-    file, the key and what was expected, for an effect that is not installed, too.
+    source: "puppy" or another bundled robot, by name; a model.yaml, as `diagnose` writes it; a session.yaml (or its folder),
+    whose robot, servos and ground are taken; or an SDF, URDF or package:// URL, with AX-12A servos. packages: folder of each ROS
+    package that such a description names. InputError names the file, the key and the expected value, also for an effect that is
+    not installed.
     """
     name = fspath(source)
     if name in (PUPPY, "puppy"):

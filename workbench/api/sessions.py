@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -12,7 +11,7 @@ from workbench.compare import compare_session as comparing
 from workbench.compare.prediction import predict_session
 from workbench.compare.results import Comparison
 from workbench.compare.session import Session, load_session
-from workbench.compare.session_takes import LeftOut, no_progress
+from workbench.compare.session_takes import LeftOut
 from workbench.experiment.next_experiment import with_next_experiment
 from workbench.files import InputError
 from workbench.identify.diagnosis import diagnose_session
@@ -23,21 +22,21 @@ from workbench.motion import Motion, save_motion
 from workbench.recording import Take
 from workbench.robot import RobotModel, load_model
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 from workbench.view.report.comparison import headline as comparison_headline
 from workbench.view.report.comparison import write_comparison
 from workbench.view.report.diagnosis import write_diagnosis
 from workbench.view.report.notebook import comparison_html, diagnosis_html, prediction_html
 
-Progress = Callable[[str, float | None], None]
-"""Called with what is being done and the share done (0 to 1; None where it is not known)."""
+"""Called with the current stage and the share done (0 to 1; None where it is not known)."""
 
 
 @dataclass(frozen=True)
 class ComparisonResult:
-    """A session's takes beside their simulation.
+    """A session's takes compared with their simulation.
 
     comparison: errors by take and joint, in SI units and radians (`Comparison.to_json` gives degrees); its `takes` hold the
-    recorded and the simulated trajectories, its `left_out` the damaged takes. session: what was compared.
+    recorded and the simulated trajectories, its `left_out` the damaged takes. session: the session that was compared.
     """
 
     comparison: Comparison
@@ -63,11 +62,11 @@ class ComparisonResult:
 class DiagnoseOptions:
     """How a session is diagnosed.
 
-    jobs: processes that simulate. thorough: search to the end, however long it takes, rather than to a limit of work. resume:
-    folder that keeps every rollout, so that a run that was killed continues; None: nothing is kept. without: names of effects
-    (docs/effects.md) that are known to be absent, and are not searched for. previous: model.yaml of an earlier diagnosis of this
-    robot, which is then nominal: findings are what is new. engine: "auto" (compiled rollouts that Drake judges) or "drake" (all
-    rollouts by Drake, much slower). InputError for fewer than one process or another engine.
+    jobs: number of parallel simulations. thorough: search to the end, however long it takes, instead of stopping at a limit of
+    work. resume: folder for cached rollouts, from which an interrupted run continues; None: nothing is kept. without: names of
+    effects (docs/formats.md, section 7) that are known to be absent; they are not searched for. previous: model.yaml of an
+    earlier diagnosis of this robot, taken as nominal, so that findings are the changes since. engine: "auto" (compiled rollouts,
+    checked by Drake) or "drake" (all rollouts by Drake, much slower). InputError for fewer than one process or an unknown engine.
     """
 
     jobs: int = 2
@@ -86,12 +85,12 @@ class DiagnoseOptions:
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """Which physics the model left out.
+    """The physics that the model left out.
 
     diagnosis: verdict, findings with their parameters (units of docs/formats.md, section 7: degrees, N m, s), errors in deg or m,
-    what stays unexplained, damaged takes that were left out. session: what was diagnosed. takes: recorded and simulated
-    trajectories and residuals, for figures (SI, radians). next_motion: to record next, where the data cannot separate two
-    effects; else None.
+    unexplained residuals, damaged takes that were left out. session: the session that was diagnosed. takes: recorded and
+    simulated trajectories and residuals, for figures (SI, radians). next_motion: to record next, where the data cannot separate
+    two effects; else None.
     """
 
     diagnosis: Diagnosis
@@ -128,11 +127,11 @@ class DiagnosisResult:
 
 @dataclass(frozen=True)
 class PredictionResult:
-    """What a model predicts of takes that it was not fitted to; the files are written already.
+    """Predictions of a model for takes that it was not fitted to; the files are already written.
 
     takes: the simulated takes, in SI units and radians, time zero at the first command. paths: the file of each take, in the same
-    order. left_out: name of each damaged take of the session, and why it was left out (from the others the capture's yaw is
-    found).
+    order. left_out: name of each damaged take of the session, and why it was left out (the capture's yaw is found from the
+    others).
     """
 
     takes: tuple[Take, ...]

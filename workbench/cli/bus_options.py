@@ -1,4 +1,4 @@
-"""Arguments of the verbs that talk to servos, and the bus that they stand for."""
+"""Arguments of the verbs that talk to servos, and the bus that they select."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from workbench.cli.options import load_model
 
@@ -47,20 +47,28 @@ def make_virtual(args: argparse.Namespace, model: RobotModel) -> VirtualRobot | 
 @contextmanager
 def open_bus(args: argparse.Namespace, model: RobotModel, virtual: VirtualRobot | None) -> Iterator[Bus]:
     """The bus, whose port is closed at the end; BusError in one line where there is none."""
-    from workbench.device.bus import Bus, open_port
-    from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
-    from workbench.device.bus.ports import GONE
+    from workbench.device.bus import Bus
     from workbench.device.bus.survey import family_of
     from workbench.robot import bus_ids
 
     profile = family_of(model)
     joints = {i: joint for joint, i in bus_ids(model).items()}
+    with open_servo_port(args, virtual) as port:
+        yield Bus(port, profile, joints, strip_echo=args.echo)
+
+
+@contextmanager
+def open_servo_port(args: argparse.Namespace, virtual: VirtualRobot | None) -> Iterator[Any]:
+    """The port that leads to the servos, through the CM-530 with --bridge; closed at the end."""
+    from workbench.device.bus import open_port
+    from workbench.device.bus.bridge import RATE, enter_bridge, leave_bridge
+    from workbench.device.bus.ports import GONE
+
     port = virtual.port if virtual is not None else open_port(_port_name(args), RATE if args.bridge else args.rate)
     try:
         if args.bridge:
             enter_bridge(port)
-        bus = Bus(port, profile, joints, strip_echo=args.echo)
-        yield bus
+        yield port
         if args.bridge:
             leave_bridge(port)
     finally:

@@ -1,4 +1,4 @@
-"""What every verb says of its files before the long work: their problems, on stderr, and whether so much work is meant."""
+"""Checks of every verb before the long work: problems of its files, on stderr, and whether very long simulations are intended."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 
 def add_yes(parser: argparse.ArgumentParser) -> None:
-    """--yes: long work is meant."""
+    """--yes: long simulations are intended."""
     parser.add_argument("--yes", action="store_true",
                         help="allow simulations longer than ten minutes of robot time")
 
 
 def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[str]:
-    """Warns of a session's problems, and returns the names of the takes of which it said that they are left out; InputError where
-    its takes cannot be used (together), or where one lasts so long that it is mostly a slip, unless `yes`."""
+    """Warns of a session's problems and returns the names of the takes that are left out. InputError where its takes cannot be
+    used, or cannot be used together, or where one is so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import session_check
 
@@ -32,11 +32,11 @@ def check_session(verb: str, session: Session, yes: bool = True) -> frozenset[st
     if found.refused:
         raise InputError(None, found.refused)
     _ask(f"{session.path}: {found.longest_name}", found.longest, yes)
-    return frozenset(t.name for t in session.takes if f"take '{t.name}'" in found.damaged)
+    return found.damaged_takes
 
 
 def say_left_out(verb: str, left_out: Iterable[tuple[str, str]], told: frozenset[str] = frozenset()) -> None:
-    """Names the takes that were left out and why, but for those of which it was `told` before the work."""
+    """Names the takes that were left out and why, except those already reported (`told`) before the work."""
     for name, reason in left_out:
         if name not in told:
             print(f"workbench {verb}: warning: take '{name}' left out: {reason}", file=sys.stderr)
@@ -51,20 +51,20 @@ def check_model(verb: str, model: RobotModel) -> None:
 
 
 def check_motion(verb: str, motion: Motion, cycles: int | None = None, yes: bool = True) -> None:
-    """Warns of a motion's problems; InputError where so many cycles last so long that it is mostly a slip, unless `yes`."""
+    """Warns of a motion's problems; InputError where it lasts so long that it is probably a mistake, unless `yes`."""
     from workbench.files import InputError
     from workbench.inspect.problems import motion_problems, slow_poses, summed_up
 
     problems = motion_problems(motion, cycles)
     warn(verb, [f"{motion.source}: {summed_up(problems)}"] if problems else [])
     if (text := slow_poses(motion)) and not yes:
-        raise InputError(motion.source, f"{text} Say --yes if it is meant")
+        raise InputError(motion.source, f"{text} Add --yes if this is intended")
     _ask(motion.source, motion.seconds(cycles), yes)
 
 
 def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel, force: bool) -> None:
-    """Of a motion that `optimize` made, whether its certificate speaks for it on this robot; InputError where it does not, unless
-    `force`, which warns. Every verb that moves a robot, or writes what moves one, asks this first."""
+    """Checks that the certificate of a motion made by `optimize` is valid for this robot; InputError where it is not, unless
+    `force`, which only warns. Every verb that moves a robot, or writes tables that move one, calls this first."""
     from workbench.files import InputError
     from workbench.gait.certificate import check_certificate, has_mark
 
@@ -74,7 +74,36 @@ def check_certificate_of(verb: str, path: str, motion: Motion, model: RobotModel
         check_certificate(path, motion, model)
     except InputError as e:
         if not force:
-            raise InputError(e.source, f"{e.problem}; --force goes on all the same") from None
+            raise InputError(e.source, f"{e.problem}; use --force to override") from None
+        warn(verb, [str(e)])
+
+
+def check_table_of(verb: str, path: str, model: RobotModel, force: bool) -> None:
+    """The same for a binary table, which does not name its maker: a certificate in its folder must be its own; without one, the
+    joints' limits are checked as for any motion. InputError, unless `force`, which warns."""
+    from dataclasses import replace
+    from pathlib import Path
+
+    from workbench.device.tables.limits import refuse_broken_limits
+    from workbench.device.tables.table_file import read_table_file
+    from workbench.files import InputError
+    from workbench.gait.certificate import NAME, check_certificate
+    from workbench.motion import Motion
+    from workbench.robot import bus_ids
+
+    table = read_table_file(path, {i: joint for joint, i in bus_ids(model).items()}).table
+    known = [table.joints.index(j) for j in model.joints if j in table.joints]
+    if len(known) == len(table.joints):  # a controller's table is in order of names, a motion in the model's
+        table = replace(table, joints=tuple(table.joints[k] for k in known), goals=table.goals[:, known],
+                        speeds=table.speeds[:, known])
+    if not Path(path).with_name(NAME).is_file():
+        warn(verb, [str(v) for v in refuse_broken_limits(table, model, force, None, "not loaded")])
+        return
+    try:
+        check_certificate(path, Motion.from_table(table), model)
+    except InputError as e:
+        if not force:
+            raise InputError(e.source, f"{e.problem}; use --force to override") from None
         warn(verb, [str(e)])
 
 
@@ -103,4 +132,4 @@ def _ask(what: str, seconds: float, yes: bool) -> None:
 
     text = long_work(seconds)
     if text and not yes:
-        raise InputError(None, f"{what}: {text} Say --yes if it is meant")
+        raise InputError(None, f"{what}: {text} Add --yes if this is intended")

@@ -1,10 +1,9 @@
-"""A user's own defaults, of a YAML file: `VERB: {option: value}`, and under `all` what every verb takes that has the option.
-
+"""A user's own defaults, from a YAML file: `VERB: {option: value}`; those under `all` apply to every verb that has the option.
     diagnose: {jobs: 8}
     all: {model: my_robot/model.yaml}
 
-The file is defaults.yaml in the user's configuration folder (`~/.config/workbench`), or what WORKBENCH_DEFAULTS names. What is
-typed on the command line wins.
+The file is defaults.yaml in the user's configuration folder (`~/.config/workbench`), or the one that WORKBENCH_DEFAULTS names.
+Arguments on the command line take precedence.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ def defaults_file() -> Path:
 
 
 def apply_defaults(verbs: Mapping[str, argparse.ArgumentParser]) -> None:
-    """Puts the file's values into the parsers. InputError names the file, the key and what was expected."""
+    """Puts the file's values into the parsers. InputError names the file, the key and the expected value."""
     path = defaults_file()
     if not path.is_file():
         if os.environ.get("WORKBENCH_DEFAULTS"):
@@ -39,7 +38,7 @@ def apply_defaults(verbs: Mapping[str, argparse.ArgumentParser]) -> None:
         _refuse(path, "expected verbs, each with its options, such as 'diagnose: {jobs: 8}'")
     unknown = set(map(str, content)) - {*verbs, "all"}
     if unknown:
-        _refuse(path, f"no verb '{min(unknown)}'; expected some of all, {', '.join(verbs)}")
+        _refuse(path, f"unknown verb '{min(unknown)}'; expected all, {', '.join(verbs)}")
     for option in content.get("all", {}):
         if not any(_action(parser, option) for parser in verbs.values()):
             _refuse(path, f"all: no verb has an option --{option}")

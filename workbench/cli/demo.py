@@ -1,4 +1,4 @@
-"""`workbench demo`: what the workbench does, on bundled data."""
+"""`workbench demo`: compares, diagnoses and optimises on bundled data."""
 
 from __future__ import annotations
 

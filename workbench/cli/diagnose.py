@@ -12,6 +12,7 @@ from workbench.cli.options import add_engine, add_out, positive
 
 if TYPE_CHECKING:
     from workbench.identify.results.findings import Finding
+    from workbench.identify.results.unknown_torque import UnknownTorque
 
 
 STAGES = ("reading", "simulating", "looking again", "numbers", "rolling out whole", "rolling out the fitted", "drawing")
@@ -36,8 +37,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--thorough", action="store_true",
                         help="search to the end, however long it takes (default: stop at a limit of work, and say so)")
     parser.add_argument("--without", metavar="EFFECT", action="append", default=[],
-                        help="exclude this effect (a name from docs/effects.md) from the search, because you know it is absent; "
-                        "repeatable")
+                        help="exclude this effect (a name from section 7 of docs/formats.md) from the search, because you know "
+                        "it is absent; repeatable")
     parser.add_argument("--model", metavar="FILE", dest="previous",
                         help="model.yaml of an earlier diagnosis of this robot: its servos and effects are nominal, as well as "
                         "they were known then, and findings are what is new")
@@ -77,8 +78,19 @@ def diagnose_and_report(path: str | Path, out: Path, jobs: int, *, thorough: boo
     print(f"verdict: {diagnosis.verdict}")
     for finding in diagnosis.findings:
         print(f"  {finding_line(finding)}")
+    for tied in diagnosis.tied:
+        print(f"  {tied.said()}")
+    for unknown in diagnosis.unknown_torques:
+        print(f"  {unknown_line(unknown)}")
     print(f"wrote {out}: {', '.join(p.name for p in paths if p.parent == folder)}")
     return 0
+
+
+def unknown_line(unknown: UnknownTorque) -> str:
+    """One line of the terminal: a torque that no effect describes, how surely, and what it takes off errors."""
+    error = unknown.validation
+    return f"{unknown.evidence} (confidence {unknown.confidence:.2f}; error on unseen stretches " \
+           f"{error.before:.2f} -> {error.after:.2f} {error.unit})"
 
 
 def finding_line(finding: Finding) -> str:

@@ -1,4 +1,4 @@
-"""`workbench doctor`: what this machine has and lacks."""
+"""`workbench doctor`: checks this machine and suggests fixes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "doctor",
         help="check this installation and suggest fixes",
-        description="Looks at versions, cores, memory, disk, the cache of compiled rollouts, Meshcat, the second engine and "
-        "shell completion, and says how to get what is missing. Exits with 2 where something keeps the workbench from working.")
+        description="Checks versions, cores, memory, disk, the cache of compiled rollouts, Meshcat, the second engine and shell "
+        "completion, and suggests how to install anything missing. Exits with 2 where something keeps the workbench from "
+        "working.")
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(run=run)
 

@@ -38,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("points", metavar="X,Y", nargs="*", type=_point,
                         help="way-points [m]: x forward, y left of where the robot stands (put -- before a negative x)")
     parser.add_argument("--gait", metavar="MOTION", required=True,
-                        help="gait.csv of `workbench optimize`, with its certificate in the same folder")
+                        help="gait.csv written by `workbench optimize`, in the same folder as its certificate")
     add_model(parser)
     parser.add_argument("--certify", action="store_true", help="certify the gait's turns over random robots, as --port requires, "
                         "and write family.json into the gait's folder; no way-points")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from workbench.cli.check import add_yes, check_certificate_of, check_model, check_motion
 from workbench.cli.options import add_cycles, add_model, add_out, load_model
@@ -34,6 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from workbench.cli.progress import Progress
     from workbench.device import export
     from workbench.device.tables.firmware_tables import check_servos
+    from workbench.files.reading import read_text, write_whole
+    from workbench.gait.certificate import NAME, has_mark
     from workbench.motion import load_motion
     from workbench.simulation import Simulation, SimulationConfig
     from workbench.simulation.play import play_motion
@@ -51,6 +54,9 @@ def run(args: argparse.Namespace) -> int:
         take = play_motion(Simulation(model, SimulationConfig(base=base)), motion, cycles,
                            progress=lambda done: progress("simulating", done))
         exported = export(motion, model, folder, take, args.force)
+        certificate = Path(args.motion).with_name(NAME)
+        if has_mark(args.motion) and certificate.is_file():  # for `flash`, which takes motion.table too
+            write_whole(folder / NAME, read_text(certificate))
     for violation in exported.violations:
         print(f"workbench export: warning: {violation}", file=sys.stderr)
     print(f"wrote {args.out}: {', '.join(f.name for f in exported.files)}"

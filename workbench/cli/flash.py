@@ -7,7 +7,7 @@ import sys
 import time
 from pathlib import Path
 
-from workbench.cli.check import check_certificate_of
+from workbench.cli.check import check_certificate_of, check_table_of
 from workbench.cli.options import add_model, load_model, positive
 
 
@@ -17,8 +17,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "flash",
         help="build a motion into the controller's program, load and start it",
         description="Turns a motion (CSV, .mtn, or a binary .table) into a table, builds the CM-530's program with it, "
-        "loads that through the controller's own loader and starts it. It replaces the program that is there, "
-        "says so, and goes on only at a yes. Then the robot moves: it goes to neutral.",
+        "loads it through the controller's own boot loader and starts it. This replaces the program on the controller, "
+        "after you confirm. Then the robot moves: it goes to neutral.",
     )
     parser.add_argument("motion", metavar="MOTION")
     add_model(parser)
@@ -26,7 +26,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     how_long = parser.add_mutually_exclusive_group()
     how_long.add_argument("--cycles", type=positive, metavar="N",
                           help="stop in neutral after N cycles (default: the motion's own, or 10)")
-    how_long.add_argument("--endless", action="store_true", help="go on until a person stops it")
+    how_long.add_argument("--endless", action="store_true", help="repeat until a person stops it")
     parser.add_argument("--force", action="store_true", help="although a limit is broken, with a warning")
     parser.add_argument("--yes", action="store_true", help="do not ask before the program in the controller is replaced")
     parser.add_argument("--dry-run", action="store_true", help="do all but open the port, and say what would be sent")
@@ -50,13 +50,15 @@ def run(args: argparse.Namespace) -> int:
     with Progress("flash") as progress:
         progress("building")
         model = load_model(args.model, args.packages)
-        if Path(args.motion).suffix != ".table":
+        if Path(args.motion).suffix == ".table":
+            check_table_of("flash", args.motion, model, args.force)
+        else:
             check_certificate_of("flash", args.motion, load_motion(args.motion, model), model, args.force)
         program = build_program(args.motion, model, profile, args.out, args.cycles, args.force, args.endless)
     for violation in program.violations:
         print(f"workbench flash: warning: {violation}", file=sys.stderr)
     table = program.table.table
-    ends = f"ends after {program.table.cycles} cycles" if program.table.stops else "goes on until a person stops it"
+    ends = f"ends after {program.table.cycles} cycles" if program.table.stops else "repeats until a person stops it"
     print(f"{args.out / 'cm530.bin'}: {len(program.image)} bytes, {len(table)} poses of {len(table.joints)} joints; it {ends}")
     if not profile.confirmed:
         print(f"workbench flash: warning: the workbench has seen no text in {profile.source} on a real controller yet, and "

@@ -1,4 +1,4 @@
-"""`workbench inspect FILE`: what a file is."""
+"""`workbench inspect FILE`: identifies and checks a file."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "inspect",
         help="identify and check a file",
-        description="Says what a file is, recognised by its content: kind, version, units, rate, frames, assets or joints, "
-        "share of gaps, and what is wrong with it. FILE is a recording (Motive CSV, joint log, BAM log, SAGE), "
-        "a motion table, a .mtn file, a rollout, a robot model (SDF, URDF or package://puppy/puppy.sdf), "
-        "a session.yaml, model.yaml or servo.yaml, or a folder of firmware tables.",
+        description="Recognises a file by its content and reports kind, version, units, rate, frames, assets or joints, share of "
+        "gaps, and problems. FILE is a recording (Motive CSV, joint log, BAM log, SAGE), a motion table, a .mtn file, a rollout, "
+        "a robot model (SDF, URDF or package://puppy/puppy.sdf), a session.yaml, model.yaml or servo.yaml, or a folder of "
+        "firmware tables.",
     )
     parser.add_argument("file", metavar="FILE")
     add_packages(parser)

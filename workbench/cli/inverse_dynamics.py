@@ -1,4 +1,4 @@
-"""`workbench inverse-dynamics INPUT`: what a motion asks of servos and ground."""
+"""`workbench inverse-dynamics INPUT`: the torques and contact forces that a motion requires."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "inverse-dynamics",
         help="joint torques, contact forces, base wrench residual, servo margins",
-        description="From a take or a motion: the torque of each joint, contact forces inside the friction cone, the wrench on "
-        "the base that no such contact supplies, and what is left of each servo's torque and speed. A motion on a free base is "
-        "first simulated with ideal joints, because alone it does not say how the body moves.",
+        description="From a take or a motion: the torque of each joint, contact forces inside the friction cone, the residual "
+        "wrench on the base that no such contact explains, and the margin of each servo's torque and speed. A motion on a free "
+        "base is first simulated with ideal joints, since the motion alone does not determine how the body moves.",
     )
     parser.add_argument("input", metavar="INPUT", help="a motion, a rollout, a recording, or a session.yaml with --take")
     parser.add_argument("--take", metavar="NAME", help="take of the session")
-    parser.add_argument("--motion", metavar="FILE", help="motion that was played in the recording, if it does not say itself")
+    parser.add_argument("--motion", metavar="FILE", help="motion played in the recording, if the recording does not name it")
     add_model(parser, "the bundled puppy; with --take the session's own")
     parser.add_argument("--base", choices=("free", "fixed"), default="free", help="base of a motion or recording (default: free)")
     add_cycles(parser, 1)

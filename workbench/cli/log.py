@@ -1,4 +1,4 @@
-"""What a run said and did, written beside its results: OUT/workbench.log."""
+"""The log of a run, written beside its results: OUT/workbench.log."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import workbench
 
 NAME = "workbench.log"
 LOGGER = logging.getLogger("workbench.run")
-"""Where verbs report what they are at. Silent on the terminal, except with --verbose."""
+"""Logger to which verbs report their progress. Silent on the terminal, except with --verbose."""
 
 
 class RunLog(logging.Handler):
@@ -43,7 +43,7 @@ class RunLog(logging.Handler):
 
 
 def speak_up(verbose: bool, quiet: bool) -> logging.Handler | None:
-    """Sets how much is said on stderr: `quiet` no progress, `verbose` each step with its time. Returns what it added."""
+    """Sets the verbosity on stderr: `quiet` no progress, `verbose` each step with its time. Returns the handler it added."""
     LOGGER.setLevel(logging.DEBUG)
     LOGGER.propagate = False
     if not verbose or quiet:

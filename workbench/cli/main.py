@@ -1,6 +1,6 @@
-"""The `workbench` command: finds the verb, runs it, and turns what goes wrong into one line and an exit code.
+"""The `workbench` command: finds the verb, runs it, and turns errors into one line and an exit code.
 
-0: done. 1: a defect of the workbench (traceback). 2: bad input, one line on stderr. 130: interrupted.
+0: success. 1: internal error (traceback). 2: invalid input, one line on stderr. 130: interrupted.
 
 Shell completion (argcomplete): eval "$(register-python-argcomplete workbench)" in ~/.bashrc or ~/.zshrc.
 """
@@ -26,13 +26,13 @@ from workbench.cli.log import LOGGER, RunLog, speak_up
 from workbench.cli.progress import forget_warnings, progress_mode, show_warnings
 
 VERBS = (
-    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "drive", "export",
-    "flash", "servos", "play", "record", "run", "bench", "doctor",
+    "demo", "inspect", "view", "simulate", "inverse-dynamics", "compare", "diagnose", "predict", "optimize", "trim", "drive",
+    "export", "flash", "servos", "play", "record", "run", "bench", "doctor",
 )
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line; the usage is one `--help` away."""
+    """Reports the error in one line; the usage is one `--help` away."""
 
     def error(self, message: str) -> NoReturn:
         """Ends with exit code 2 and one line on stderr."""
@@ -40,7 +40,7 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {text}{self._meant(text)} (see {self.prog} --help)\n")
 
     def _meant(self, message: str) -> str:
-        """A guess at what was meant by a verb or an option that is not known."""
+        """A guess at the verb or option that was meant by an unknown one."""
         options = [o for a in self._actions for o in a.option_strings if o.startswith("--")]
         for pattern, known in ((r"invalid choice: '([^']+)'", list(VERBS)), (r"unrecognized arguments: (--[\w-]+)", options)):
             found = re.search(pattern, message)
@@ -54,8 +54,8 @@ def make_parser() -> argparse.ArgumentParser:
     """The parser with every verb's arguments; imports no other package, so that help comes at once."""
     parser = OneLineParser(
         prog="workbench", description=(workbench.__doc__ or "").partition("\n")[0], allow_abbrev=False,
-        epilog="`workbench VERB --help` explains each. Exit codes: 0 done, 1 a defect of the workbench, 2 bad input (one line: "
-        "file, place, what was expected), 130 interrupted. From Python: `import workbench`.")
+        epilog="`workbench VERB --help` explains each. Exit codes: 0 success, 1 internal error, 2 invalid input (one line: "
+        "file, place, expected value), 130 interrupted. From Python: `import workbench`.")
     parser.add_argument("--version", action="version", version=f"workbench {workbench.__version__}")
     subparsers = parser.add_subparsers(dest="verb", metavar="VERB", required=True, parser_class=OneLineParser)
     for verb in VERBS:
@@ -106,7 +106,7 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
         sys.stdout.flush()
         return code
     except KeyboardInterrupt:
-        again = "; call it again to go on from there" if args.verb == "diagnose" else ""
+        again = "; call it again to continue from there" if args.verb == "diagnose" else ""
         print(f"\nworkbench {args.verb}: interrupted, nothing was written{again}", file=sys.stderr)
         return 130
     except BrokenPipeError:  # the reader of our output has seen enough
@@ -122,8 +122,8 @@ def _run(args: argparse.Namespace, alone: bool) -> int:
 
 
 def _parsed(parser: argparse.ArgumentParser, argv: list[str]) -> argparse.Namespace:
-    """Arguments of a verb; `help` and `help VERB` stand for --help. What a verb does not know it says itself, with its
-    options."""
+    """Arguments of a verb; `help` and `help VERB` are the same as --help. Each verb reports arguments that it does not know,
+    with its options."""
     if argv[:1] == ["help"]:
         argv = [*argv[1:2], "--help"]
     args, unknown = parser.parse_known_args(argv)
@@ -138,7 +138,7 @@ def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser
 
 
 def _refused(name: str, error: OSError | ValueError) -> int:
-    """Says in one line what the user can correct; what is a defect of ours goes on."""
+    """Reports in one line an error that the user can correct; raises internal errors again."""
     problem = _readable(error)
     if problem is None:
         raise error
@@ -151,7 +151,7 @@ def _serious(record: logging.LogRecord) -> bool:
 
 
 def _readable(error: OSError | ValueError) -> str | None:
-    """One line for what the user can correct; None for what is a defect of ours."""
+    """One line for an error that the user can correct; None for an internal error."""
     from workbench.files import InputError
 
     if isinstance(error, InputError):

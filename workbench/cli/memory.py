@@ -1,4 +1,4 @@
-"""What a long run has worked out already, kept beside its results until it ends, so that a killed run resumes."""
+"""Rollouts of a long run, cached beside its results until it ends, so that an interrupted run resumes."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ STAYS = 16
 
 @contextmanager
 def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> Iterator[Path]:
-    """A folder beside `out` for rollouts of this session, the same for the same files and versions; left where the block is
-    interrupted or has a defect, gone once it ends well (with what other versions left there), or its input is refused. kept_in: a
-    folder that stays, in its place."""
+    """A folder beside `out` for rollouts of this session, the same for the same files and versions. It is kept if the block is
+    interrupted or fails with an internal error, and deleted, with those of other versions, once it succeeds or its input is
+    refused. kept_in: a folder to use instead, which is never deleted."""
     if kept_in is not None:
         try:
             Path(kept_in).mkdir(parents=True, exist_ok=True)
@@ -47,7 +47,7 @@ def rollout_memory(out: Path, session: Session, kept_in: str | None = None) -> I
     except OSError as e:
         if e.filename is None and e.errno in (None, errno.ENOSPC, errno.EDQUOT):
             shutil.rmtree(folder, ignore_errors=True)  # it would keep the disk full
-            raise InputError(out, "the disk is full; what was worked out so far is cleared") from None
+            raise InputError(out, "the disk is full; the cached rollouts are deleted") from None
         raise
     for done in beside.parent.glob(f"{glob.escape(kept)}*"):
         shutil.rmtree(done, ignore_errors=True)

@@ -43,6 +43,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--knees", choices=("any", "built"), default="any", help="built: all point back, as the robot has them")
     parser.add_argument("--ensemble", metavar="FILE", help="random variants of the robot on which the gait has to work, as YAML "
                         "(default: the file that ships)")
+    parser.add_argument("--method", choices=("search", "plan", "both"), default="search", help="plan: joint paths of trajectory "
+                        "optimisation as tables, without a search; both: a search that begins at those, too (default: search)")
     parser.add_argument("--effort", type=positive, default=4, metavar="N", help="1: a first look; 4: the default; more: longer")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--jobs", type=positive, default=2, metavar="N", help="number of parallel simulations (default: 2)")
@@ -53,6 +55,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Searches, certifies, writes, and says what came of it."""
+    from dataclasses import replace
+
     from workbench.cli.output import output_directory
     from workbench.cli.progress import Progress
     from workbench.gait.engines import other_engine
@@ -66,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     check_model("optimize", model)
     posterior = load_model_file(args.model).posterior if _is_model_file(args.model) else None
     machine, ensemble = GaitMachine(model), load_ensemble(args.ensemble, posterior)
-    options = options_of(args.effort, args.seed, args.jobs)
+    options = replace(options_of(args.effort, args.seed, args.jobs), method=args.method)
     request = _request(args, model)
     with output_directory(args.out) as folder, Progress("optimize") as progress:
         args.out.mkdir(parents=True, exist_ok=True)

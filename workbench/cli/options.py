@@ -1,4 +1,4 @@
-"""Arguments that several verbs share, and what they stand for."""
+"""Arguments that several verbs share, and the values they give."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ SHORTEST_STEP, LONGEST_STEP = 1e-5, 0.01
 """Of the simulation [s]: a walk of 10 s takes a million of the one, and feet sink in with the other."""
 
 
-def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy") -> None:
-    """--model: which robot; PUPPY where nothing is said. default: what that stands for."""
+def add_model(parser: argparse.ArgumentParser, default: str = "the bundled puppy", unless: str | None = PUPPY) -> None:
+    """--model: which robot; `unless` where the user names none. default: description of that default."""
     parser.add_argument(
-        "--model", metavar="FILE", default=PUPPY,
+        "--model", metavar="FILE", default=unless,
         help="robot: a name (puppy, fox), a model.yaml with its effects, an SDF or URDF, or a session.yaml whose robot, servos "
         f"and ground are taken (default: {default})")
     add_packages(parser)
@@ -47,7 +47,7 @@ def add_out(parser: argparse.ArgumentParser, default: str | None = None) -> None
 
 
 def add_engine(parser: argparse.ArgumentParser, auto: str) -> None:
-    """--engine: whose rollouts; auto: what the default does."""
+    """--engine: which engine rolls out; auto: described by `default`."""
     parser.add_argument("--engine", choices=("auto", "drake"), default="auto",
                         help=f"auto: {auto}; drake: all rollouts by Drake, much slower (default: auto)")
 
@@ -60,7 +60,7 @@ def _folder(text: str) -> Path:
 
 
 def load_model(name: str, packages: Sequence[tuple[str, str]] = ()) -> RobotModel:
-    """The robot that --model names; its effects are checked at once, so that what is wrong is said of their file."""
+    """The robot that --model names; its effects are checked at once, so that errors name their file."""
     from workbench.api.robots import load_model as named
 
     return named(name, dict(packages))

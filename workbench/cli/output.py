@@ -22,10 +22,10 @@ LEFT = ".workbench-"
 
 @contextmanager
 def output_directory(out: Path, need: int = 1 << 20) -> Iterator[Path]:
-    """A folder to fill, on the same disk as `out`; when the block ends well its files appear in `out`, whole.
+    """A folder to fill, on the same disk as `out`; when the block succeeds its files appear in `out`, complete.
 
-    Whether `out` can be written, and `need` bytes are free there, is found out on entry, before the long work; what killed runs
-    left beside it is cleared. If the block raises, nothing remains. Files that already lie in `out` stay, except those of the
+    Whether `out` can be written, and `need` bytes are free there, is checked on entry, before the long work; remains of killed
+    runs are deleted. If the block raises, nothing remains. Files that are already in `out` are kept, except those of the
     same name. InputError, with the user's own path, where `out` cannot be written or the disk is full.
     """
     out = Path(os.path.abspath(out))

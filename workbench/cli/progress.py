@@ -1,4 +1,4 @@
-"""What a long run is busy with, on stderr."""
+"""Progress of a long run, on stderr."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.cli.log import LOGGER
 _WAITING: list[str] = []
 """Warnings that were not shown yet."""
 QUIET = 1.5
-"""Runs shorter than this say nothing [s], so that their errors stand alone."""
+"""Runs shorter than this print nothing [s], so that an error message appears alone."""
 BEAT = 10.0
 """Longest silence [s]."""
 
@@ -50,9 +50,9 @@ class Progress:
     """Call it as `progress(what)` or `progress(what, done)` with done in 0..1, inside its `with` block.
 
     On a terminal one line that is rewritten at most ten times a second and cleared at the end; elsewhere a plain line for each
-    new `what`, one every five seconds within it, and one every `BEAT` seconds in which nothing is said. stages: what the run does
-    one after the other, by how each `what` begins, so that a line says which of how many it is; where `done` is told, it says how
-    long that stage has still to go.
+    new `what`, one every five seconds within it, and one every `BEAT` seconds without news. stages: the stages of the run in
+    order, by how each `what` begins, so that a line can number them; where `done` is given, it also estimates the time that
+    remains for the stage.
     """
 
     def __init__(self, verb: str, stream: TextIO | None = None, quiet: float | None = None, stages: Sequence[str] = ()) -> None:
@@ -85,7 +85,7 @@ class Progress:
                 self._stream.flush()
 
     def __call__(self, what: str, done: float | None = None) -> None:
-        """Says what is being done, and which share of it is."""
+        """Reports the current work and the share of it that is done."""
         with self._lock:
             if what.partition(" ")[0] != self._now[0].partition(" ")[0]:
                 self._entered = time.monotonic()
@@ -99,7 +99,7 @@ class Progress:
                 self._show()
 
     def _speak(self) -> None:
-        """Once the run has turned out to be long: says what it is at, even if that takes a while yet."""
+        """Once the run has turned out to be long: reports its current work, even if that takes much longer."""
         with self._lock:
             self._speaks = not _MODE["silent"]
             show_warnings(self._stream)
@@ -108,17 +108,19 @@ class Progress:
         threading.Thread(target=self._beats, daemon=True).start()
 
     def _beats(self) -> None:
-        """Says from time to time what the run is still at."""
+        """Repeats the current stage from time to time."""
         while not self._ended.wait(BEAT):
             with self._lock:
                 if self._speaks and self._now[0] and time.monotonic() - self._last >= BEAT:
                     self._show(again=True)
 
     def _show(self, again: bool = False) -> None:
-        """Writes the line, not too often; `again`: whatever was written."""
+        """Writes the line: at once where something else is being done (the text up to its first comma), else not too often.
+        `again`: whatever was written."""
         what, done = self._now
         now = time.monotonic()
-        if not again and what == self._shown and now - self._last < (0.1 if self._tty else 5.0):
+        same = what.partition(",")[0] == self._shown.partition(",")[0]
+        if not again and same and now - self._last < (0.1 if self._tty else 5.0):
             return
         self._shown, self._last = what, now
         share = "" if done is None else f" {100 * min(max(done, 0.0), 1.0):.0f} %"

@@ -15,8 +15,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "record",
         help="record a take from Motive (NatNet 2.7 to 4.x)",
         description="Records the rigid bodies that Motive streams into a take (Motive CSV), with the times of mid-exposure, "
-        "until Ctrl-C or --seconds, and writes beside it NAME.capture.json: frames lost, late, doubled and broken, and the "
-        "server's clock. While it runs NAME.natnet holds what has come; after a crash --finish makes the take from it.")
+        "until Ctrl-C or --seconds. Also writes NAME.capture.json: frames lost, late, doubled and broken, and the server's "
+        "clock. While recording, NAME.natnet holds the data received; after a crash --finish makes the take from it.")
     parser.add_argument("host", metavar="HOST", nargs="?", help="name or address of the computer that runs Motive")
     parser.add_argument("--name", default="take", help="name of the take, here and in Motive (default: take)")
     parser.add_argument("--seconds", type=seconds, metavar="S", help="how long (default: until Ctrl-C)")
@@ -42,9 +42,13 @@ def run(args: argparse.Namespace) -> int:
             journal = Path(args.finish)
             capture = finish(journal, args.out / f"{journal.stem}.csv", ended="the recording was cut short")
         else:
-            recorder = Recorder(UdpLink(args.host, args.interface, args.port))
+            link = UdpLink(args.host, args.interface, args.port)
+            recorder = Recorder(link)
             with stop_on_signals() as stop:
                 capture = record_take(recorder, args.out / f"{args.name}.csv", stop, args.seconds, not args.no_motive, progress)
+            for other in sorted(link.others):
+                print(f"workbench record: warning: {other} streams to the same multicast group; its frames were left out",
+                      file=sys.stderr)
     for problem in capture.problems:
         print(f"workbench record: warning: {problem}", file=sys.stderr)
     counts = capture.counts

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"workbench run: warning: {warning}", file=sys.stderr)
         print(f"wrote {done.session}")
         if done.played.stopped:
-            return 130 if done.played.stopped.startswith("Ctrl-C") else 2
+            return 130 if stop.interrupted else 2
         if not done.done:
             return 2
         session = load_session(done.session)

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.cli.bus_options import add_bus, make_virtual, open_bus
-from workbench.cli.options import add_model, load_model
+from workbench.cli.bus_options import VIRTUAL, add_bus, make_virtual, open_bus, open_servo_port
+from workbench.cli.options import PUPPY, add_model, load_model
 
 if TYPE_CHECKING:
     from workbench.device.bus import Bus
@@ -21,12 +21,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     """Registers the verb."""
     parser = subparsers.add_parser(
         "servos",
-        help="list the servos on the bus and every register that differs from the model",
-        description="Looks for a servo at every ID, and reads all registers of each. Shows who answers, in what state, and what "
-        "differs from the model; with --out writes registers.yaml, which a session.yaml may name as evidence. Moves nothing "
-        "without --wiggle.")
+        help="list the servos on the bus and, with --model, every register that differs from the model",
+        description="Looks for a servo at every ID and reads all its registers. Shows each servo's state and, with --model, what "
+        "differs from the model. --out writes registers.yaml, which a session.yaml may name as evidence. Nothing moves without "
+        "--wiggle.")
     add_bus(parser)
-    add_model(parser)
+    add_model(parser, "none: lists what there is; for --write, --wiggle, --set-id and --out the bundled puppy", None)
     parser.add_argument("--write", action="store_true", help="set return delay and angle limits as the model has them; read back")
     parser.add_argument("--set-id", metavar="JOINT", help="give the one servo on the bus the ID of this joint")
     parser.add_argument("--wiggle", metavar="JOINT", help="move this joint, or `all` one after the other, by 3 deg and back, and "
@@ -36,14 +36,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """Surveys, writes what is asked for, and says what there is; 2 where something has to be fixed."""
+    """Surveys the bus, writes the requested files, and prints the servos found; 2 where something has to be fixed."""
     from workbench.cli.progress import Progress
     from workbench.device.bus.setup import set_id, set_up, wider_limits
     from workbench.device.bus.survey import survey
     from workbench.device.bus.wire import slow_adapter
     from workbench.robot.servo_registers import save_registers
 
-    model = load_model(args.model, args.packages)
+    if args.model is None and not (args.write or args.set_id or args.wiggle or args.out):
+        return _list(args)
+    model = load_model(args.model or PUPPY, args.packages)
     with Progress("servos") as progress, open_bus(args, model, make_virtual(args, model)) as bus:
         found = survey(bus, model, progress=progress)
         if args.set_id:
@@ -63,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"wider than the model: {line}; --write narrows it")
     if args.out is not None:
         path = save_registers(registers, args.out / "registers.yaml")
-        print(f"wrote {path}; beside a session.yaml that says `registers: {path.name}`, `diagnose` begins with what differs")
+        print(f"wrote {path}; with `registers: {path.name}` in a session.yaml, `diagnose` starts from these registers")
     if slow_adapter(found.latency):
         print(f"workbench servos: warning: {slow_adapter(found.latency)}", file=sys.stderr)
     for problem in found.problems():
@@ -71,8 +73,29 @@ def run(args: argparse.Namespace) -> int:
     return 2 if found.problems() else 0
 
 
+def _list(args: argparse.Namespace) -> int:
+    """Every servo of every family that is known, without a model; 2 where something is wrong with one."""
+    from workbench.cli.progress import Progress
+    from workbench.device.bus.listing import list_servos
+    from workbench.device.bus.wire import slow_adapter
+
+    virtual = make_virtual(args, load_model(PUPPY, args.packages)) if args.port == VIRTUAL else None
+    with Progress("servos") as progress, open_servo_port(args, virtual) as port:
+        surveys = list_servos(port, args.echo, progress)
+    for found in surveys:
+        _show(found)
+    problems = [problem for found in surveys for problem in found.problems()]
+    late = max(found.latency for found in surveys)
+    if slow_adapter(late):
+        print(f"workbench servos: warning: {slow_adapter(late)}", file=sys.stderr)
+    for problem in problems:
+        print(f"workbench servos: problem: {problem}", file=sys.stderr)
+    print("compare them with a robot: --model NAME")
+    return 2 if problems else 0
+
+
 def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
-    """Moves joints a little and asks what was seen; 2 where something is wrong."""
+    """Moves each joint a little and asks the person what moved; 2 where something is wrong."""
     from workbench.device.play.wiggle import Answers, wiggle
     from workbench.files import InputError
     from workbench.robot import bus_ids
@@ -93,16 +116,19 @@ def _wiggle(bus: Bus, model: RobotModel, found: Survey, which: str) -> int:
         if not line:
             raise InputError(None, "no answer; call it from a terminal")
         answers.take(joint, line, model.joints)
-    for finding in answers.findings(bus_ids(model)):
+    findings = answers.findings(bus_ids(model))
+    for finding in findings:
         print(f"workbench servos: problem: {finding}", file=sys.stderr)
-    return 2 if answers.findings(bus_ids(model)) else 0
+    for key, values in answers.corrected(bus_ids(model), model.mountings).items() if findings else ():
+        print(f"the robot section should say {key}: {{{', '.join(f'{joint}: {v}' for joint, v in values.items())}}}")
+    return 2 if findings else 0
 
 
 def _show(found: Survey) -> None:
     rows = found.found.values()
     joint, model = (max([8, *(len(text) + 2 for text in column)])
                     for column in ((s.joint or "-" for s in rows), (s.model for s in rows)))
-    print(f"{len(found.found)} servos at {found.rate} bit/s")
+    print(f"{len(found.found)} servos at {found.rate} bit/s ({found.profile.name})")
     print(f"{'ID':>3}  {'joint':<{joint}}{'model':<{model}}{'firmware':>8}{'deg':>8}{'V':>6}{'deg C':>6}  alarms")
     for s in found.found.values():
         firmware = s.registers.get("firmware_version", "")

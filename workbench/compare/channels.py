@@ -1,21 +1,20 @@
-"""Channels: what a take shows, as numbers that can be compared frame by frame.
+"""Channels: the observations of a take, as numbers that can be compared frame by frame.
 
-Joint angles enter frame by frame, and beside each what its joint's rotation has across the servo's axis. Of the body, height and
-tilt enter as they are, path and heading as what they gain in a quarter of a second: walking is chaotic over seconds, not over
+Joint angles enter frame by frame, and for each joint its rotation about the axes across the servo's. Of the body, height and tilt
+enter as they are, path and heading as their change over a quarter of a second: walking is chaotic over seconds, not over
 fractions of one.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.options import COMPARE
 from workbench.compare.session_takes import RegisteredTake
 from workbench.recording.take import Take
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 BODY = ("forward", "left", "heading", "height", "roll", "pitch")
 ACROSS = "~"
 """Between a joint's name and the axis (x, y, z of the base in neutral) across its servo's own: "flm~z"."""
@@ -69,7 +68,7 @@ def body_channels(take: Take) -> Array:
 
 
 def channel_names(t: RegisteredTake) -> tuple[str, ...]:
-    """What a take shows: its joints, what lies across them, its body."""
+    """The channels of a take: its joints, their rotation across the axis, its body."""
     joints = t.recorded.joints
     across = []
     if t.recorded.off_axis is not None:

@@ -12,7 +12,7 @@ from workbench.compare.compare_session import Run, provenance, roll_out
 from workbench.compare.comparison import compare_takes
 from workbench.compare.results import Comparison
 from workbench.compare.session import Base, TakeSpec
-from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, readable, register_take
+from workbench.compare.session_takes import ReadTake, RegisteredTake, readable, register_take
 from workbench.files import InputError
 from workbench.motion import load_motion
 from workbench.recording.formats.file_kind import file_kind
@@ -21,6 +21,7 @@ from workbench.recording.mocap.tracks import check_assets
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 
 
 def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: SimulationConfig | None = None, *,
@@ -69,7 +70,7 @@ def compare_files(a: str | Path, b: str | Path, model: RobotModel, config: Simul
 
 
 def recorded_take(path: str | Path, model: RobotModel, base: Base = "free") -> Take:
-    """A recording alone as a take, its start where its first joint leaves rest. InputError names the file and what is wrong."""
+    """A lone recording as a take that starts when its first joint leaves rest. InputError names the file and the problem."""
     return _by_first_motion(_read(Path(path), model, base)).recorded
 
 
@@ -112,6 +113,6 @@ def _read(path: Path, model: RobotModel, base: Base) -> ReadTake:
 
 
 def _run(path: Path, model: RobotModel, cycles: int | None, base: Base, beside: ReadTake | None) -> Run:
-    """A motion's run, as long as the recording beside it."""
+    """A motion's run, as long as the recording with which it is compared."""
     commands = load_motion(path, model).commands(cycles)
     return Run(path.stem, model, commands, commands.end if beside is None else beside.duration, base)

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.comparison import Noise, compare_takes, noise_of
 from workbench.compare.options import COMPARE
 from workbench.compare.results import Comparison, TakeComparison
 from workbench.compare.session import Session
-from workbench.compare.session_takes import Progress, ReadTake, RegisteredTake, no_progress, read_takes, register_takes
+from workbench.compare.session_takes import ReadTake, RegisteredTake, read_takes, register_takes
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -23,13 +22,12 @@ from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, simulate_batch
 from workbench.simulation.compiled import covers
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress, no_progress
 
 
 @dataclass(frozen=True)
 class Rollouts:
-    """One take simulated: as configured, with the step halved and quartered, with the other contact model."""
+    """One take simulated: as configured, with the step halved and then quartered, with the other contact model."""
 
     nominal: Take
     finer: tuple[Take, ...] = ()
@@ -38,7 +36,7 @@ class Rollouts:
 
 @dataclass(frozen=True)
 class Run:
-    """What is to be simulated. start: where it begins other than at rest in neutral; steadied: where its base is put back to."""
+    """One simulation. start: initial state, if not at rest in neutral; steadied: states to which its base is reset."""
 
     name: str
     model: RobotModel
@@ -89,9 +87,8 @@ def roll_out(runs: Sequence[Run], config: SimulationConfig, *, progress: Progres
             variants["other_contact"] = [replace(own, contact="point" if own.contact == "hydroelastic" else "hydroelastic")]
         jobs += [(i, kind, _job(run, c, _instants(run, own) if kind == "finer" else None))
                  for kind, configs in variants.items() for c in configs]
-    jobs.sort(key=lambda job: -_cost(job[2]))  # the longest first, so that no core waits for it at the end
     progress("simulating", 0.0)
-    done = simulate_batch([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
+    done = _longest_first([job for *_, job in jobs], n_jobs, lambda n, of: progress("simulating", n / of))
     out = []
     for i in range(len(runs)):
         mine: dict[str, list[Take]] = {"nominal": [], "finer": [], "other_contact": []}
@@ -114,11 +111,17 @@ def roll_out_judged(runs: Sequence[Run], config: SimulationConfig, *, progress: 
     judged = {i for i, take in takes if _apart(take, done[i].nominal) < COMPARE.engines_apart}
     jobs = [(i, _job(run, c, _instants(run, c))) for i, run in enumerate(runs)
             for c in _finer(replace(config, base=run.base, engine="auto" if i in judged else config.engine))]
-    jobs.sort(key=lambda job: -_cost(job[1]))
     finer: dict[int, list[Take]] = {}
-    for (i, _), take in zip(jobs, simulate_batch([job for _, job in jobs], n_jobs)):
+    for (i, _), take in zip(jobs, _longest_first([job for _, job in jobs], n_jobs)):
         finer.setdefault(i, []).append(take)
     return [replace(r, finer=tuple(finer.get(i, ()))) for i, r in enumerate(done)]
+
+
+def _longest_first(jobs: Sequence[Job], n_jobs: int, progress: Callable[[int, int], None] | None = None) -> list[Take]:
+    """The takes in the order of the jobs, of which the longest begin first, so that no core waits for one at the end."""
+    order = sorted(range(len(jobs)), key=lambda k: -_cost(jobs[k]))
+    done = dict(zip(order, simulate_batch([jobs[k] for k in order], n_jobs, progress)))
+    return [done[k] for k in range(len(jobs))]
 
 
 def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:
@@ -127,14 +130,14 @@ def _job(run: Run, config: SimulationConfig, times: Array | None = None) -> Job:
 
 
 def _finer(config: SimulationConfig) -> list[SimulationConfig]:
-    """Half and a quarter of a step; what is written down stays on the same times."""
+    """The run at half and at a quarter of the step, with the same output times."""
     if config.time_step <= 0:
         return []
     return [replace(config, time_step=config.time_step / k, log_period=config.logged_every) for k in (2, 4)]
 
 
 def _apart(one: Take, other: Take) -> float:
-    """The largest difference of two rollouts' angles and base positions [rad, m]; infinite where they are not alike."""
+    """The largest difference of two rollouts' angles and base positions [rad, m]; infinite where their shapes differ."""
     pairs = [(one.q, other.q), *([] if one.p_WB is None or other.p_WB is None else [(one.p_WB, other.p_WB)])]
     if any(a.shape != b.shape for a, b in pairs):
         return np.inf
@@ -167,7 +170,7 @@ def _cost(job: Job) -> float:
 
 
 def run_of(t: ReadTake, steadied: BaseStates | None = None) -> Run:
-    """What is to be simulated for a take, on a base that goes on from `steadied` states where given."""
+    """The simulation of a take, with the base reset to the `steadied` states where given."""
     return Run(t.spec.name, t.model, t.commands, t.duration, t.spec.base, t.start_state(), steadied)
 
 

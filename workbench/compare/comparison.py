@@ -14,10 +14,9 @@ from workbench.compare.results import NAN, Channel, Comparison, Pair, TakeCompar
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.types import Array
 
 __all__ = ["Channel", "Comparison", "Noise", "Pair", "TakeComparison", "aligned", "compare_takes", "noise_of"]
-
-Array = NDArray[np.float64]
 
 
 def compare_takes(
@@ -74,9 +73,9 @@ def noise_of(takes: Sequence[Take]) -> Noise:
 
 
 def aligned(take: Take, reference: Take) -> Take:
-    """`take` at the times of `reference`, both counted from their first commands, and zeroed where the reference is.
+    """`take` at the times of `reference`, both counted from their first commands, with zeros defined as in the reference.
 
-    Without a known first command a take's first frame stands for it.
+    Without a known first command, time is counted from a take's first frame.
     """
     if reference.zeroed and not take.zeroed:
         take = _zeroed(take)

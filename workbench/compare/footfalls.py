@@ -1,4 +1,4 @@
-"""Which foot stands when: from where the feet are, recorded and simulated alike, or from contact forces."""
+"""Which foot is on the ground when: from the feet's positions, recorded or simulated, or from contact forces."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from scipy.spatial.transform import Rotation
 from workbench.compare.options import COMPARE
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, foot_points
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

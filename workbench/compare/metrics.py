@@ -1,19 +1,17 @@
-"""What one take did, and how two differ, on plain arrays. SI and radians; NaN where nothing can be said."""
+"""Measures of one take, and of the difference of two, on plain arrays. SI and radians; NaN where undefined."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 def rms(x: Array, axis: int = 0) -> Array:
-    """Root of the mean square along `axis` over what is not NaN; NaN where nothing is left."""
+    """Root of the mean square along `axis` over the values that are not NaN; NaN where there are none."""
     seen = np.isfinite(x)
     count = seen.sum(axis=axis)
     total = np.sum(np.square(np.where(seen, x, 0.0)), axis=axis)
@@ -91,7 +89,7 @@ def lag(time: Array, a: Array, b: Array, use: Mask, noise: Array, most: float = 
 def heading(quat_WB: Array) -> Array:
     """Heading of a link about z, positive to the left, continuous (N,) [rad], from quaternions wxyz (N, 4).
 
-    The direction of the link's x axis in the plane: what is left of the rotation when tilt and roll are taken out.
+    The direction of the link's x axis in the plane: the rotation without tilt and roll.
     """
     out = np.full(len(quat_WB), np.nan)
     seen = np.isfinite(quat_WB).all(axis=1)

@@ -8,7 +8,7 @@ from math import radians
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Takes beside each other."""
+    """Options for comparing two takes."""
 
     gain_span: float = 0.25
     """Span over which path and heading are compared [s]: about half a cycle of a gait."""
@@ -33,7 +33,7 @@ class CompareOptions:
 
 @dataclass(frozen=True)
 class FileLimits:
-    """What is taken for a slip of whoever wrote a file."""
+    """Limits beyond which a value in a file is probably a mistake of its author."""
 
     most_seconds: float = 86_400.0
     """Of a start and of a prediction [s]: a day."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.options import COMPARE
 from workbench.compare.session import PredictSpec, Session
-from workbench.compare.session_takes import LeftOut, Progress, capture_yaw, no_progress, read_takes
+from workbench.compare.session_takes import LeftOut, capture_yaw, read_takes
 from workbench.effects.apply import seen
 from workbench.files import InputError
 from workbench.motion import load_motion
@@ -28,13 +27,12 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig, Start
 from workbench.simulation.batch import Job, run_job, simulate_batch
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress, no_progress
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """What was predicted. paths: files, as a recording would look. takes: the simulated take (SI, radians) behind each file, in
+    """The predictions. paths: files, in the format of a recording. takes: the simulated take (SI, radians) behind each file, in
     the same order. left_out: name of each damaged take of the session, and why it was left out."""
 
     paths: tuple[Path, ...]

@@ -1,4 +1,4 @@
-"""What a comparison found, and the `comparison.json` of it (docs/formats.md, section 6)."""
+"""Results of a comparison, and their `comparison.json` (docs/formats.md, section 6)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Channel:
 
     error: RMS of recorded less simulated after the first command. noise: RMS at rest before it, over all takes of a session.
     floor: RMS between the rollout at its step and at half and a quarter of it, the larger. spread: RMS between rollouts with one
-    contact model and the other; all four in rad or m. correlation: Pearson's, -1 to 1. lag: by how much the recording comes
-    later [s].
+    contact model and the other; all four in rad or m. correlation: Pearson's, -1 to 1. lag: delay of the recording behind the
+    simulation [s].
     """
 
     error: float
@@ -55,8 +55,8 @@ class Pair:
 
 @dataclass(frozen=True)
 class TakeComparison:
-    """One take, recorded and simulated, both zeroed alike and on the recording's clock (`Take`: SI, radians, world axes forward,
-    left, up).
+    """One take, recorded and simulated, both zeroed in the same way and on the recording's clock (`Take`: SI, radians, world axes
+    forward, left, up).
 
     joints: a Channel for each joint [rad]. starts_at_sigma: standard deviation of the start [s]. Of the base link: body (its path
     [m], from where it rested), distance (straight, in the plane) and forward [m], heading (change, positive to the left) [rad],
@@ -132,7 +132,7 @@ class Comparison:
         return by_error(ratios, {j: float(np.sqrt(np.mean(np.square(x)))) for j, x in known.items() if x})
 
     def to_json(self) -> str:
-        """Text of `comparison.json`; what is not known is null."""
+        """Text of `comparison.json`; unknown values are null."""
         content = {"format": 1, "takes": [t.as_dict() for t in self.takes], "joints_by_error": self.joints_by_error(),
                    "left_out": [{"name": n, "reason": r} for n, r in self.left_out], "provenance": dict(self.provenance)}
         return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -25,9 +25,9 @@ Base = Literal["free", "fixed"]
 
 @dataclass(frozen=True)
 class TakeSpec:
-    """One take of a session: what was commanded, what was recorded.
+    """One take of a session: its commands and its recording.
 
-    motion: pose table, played `cycles` times (None: as often as it says itself, else once); None where the recording carries its
+    motion: pose table, played `cycles` times (None: as often as its file says, else once); None where the recording carries its
     own commands. starts_at: recording time of the first command [s]; None: estimate it. servos: constants that differ in this
     take. load: a known weight that hangs on the robot in it. use: "fit", "validate" or None.
     """
@@ -91,8 +91,7 @@ class Session:
     yaw: float | None = None
 
     def model_of(self, take: TakeSpec | PredictSpec, model: RobotModel | None = None) -> RobotModel:
-        """The robot as it was in one take: the session's (or another `model`) with what the take's `servos` and `load`
-        change."""
+        """The robot as it was in one take: the session's (or another `model`) with the take's `servos` and `load` applied."""
         return _as_it_was(model or self.model, take)
 
     def with_model(self, model: RobotModel) -> Session:
@@ -103,9 +102,9 @@ class Session:
 
 
 def load_session(path: str | Path) -> Session:
-    """Reads `session.yaml`, or of a folder the one in it.
+    """Reads a `session.yaml`, or the one in a folder.
 
-    InputError names the file, the key and what was expected: an unknown key anywhere, a missing file, a wrong type, a
+    InputError names the file, the key and the expected value: an unknown key anywhere, a missing file, a wrong type, a
     joint or link that the model lacks, a base that cannot float where a take says free, a motion that cannot be played.
     """
     path = Path(path)

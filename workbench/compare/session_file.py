@@ -1,4 +1,4 @@
-"""Writing a session: a robot, and what was recorded of it in one go."""
+"""Writes a session: a robot, and the recordings of one run."""
 
 from __future__ import annotations
 

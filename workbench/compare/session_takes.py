@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,18 +29,14 @@ from workbench.recording.take import Take
 from workbench.recording.take_from import take_from_recording
 from workbench.robot import RobotModel
 from workbench.simulation import Start
+from workbench.types import Progress, no_progress
 
-Progress = Callable[[str, float | None], None]
 LeftOut = tuple[tuple[str, str], ...]
-
-
-def no_progress(what: str, done: float | None = None) -> None:
-    """Says nothing."""
 
 
 @dataclass(frozen=True)
 class ReadTake:
-    """A take as it stands in its file, with the robot as it was then and what went out on the bus."""
+    """A take as read from its file, with the robot as it was then and the commands sent on the bus."""
 
     spec: TakeSpec
     model: RobotModel
@@ -55,9 +51,9 @@ class ReadTake:
         return float(self.recording.time[-1] - begin)
 
     def start_state(self) -> Start | None:
-        """What the joints did at the first command, where a rollout cannot begin at rest in neutral: of a log of a held robot, as
-        its servos told it. None for captured takes, for a robot on the ground, and for a log that begins at rest in neutral to
-        within its resolution."""
+        """The joints' state at the first command, where a rollout cannot begin at rest in neutral: for a log of a held robot,
+        from its servos' readings. None for captured takes, for a robot on the ground, and for a log that begins at rest in
+        neutral to within its resolution."""
         return self._start
 
     @cached_property
@@ -163,7 +159,7 @@ def capture_yaw(session: Session, takes: Sequence[ReadTake]) -> float | None:
 
 
 def register_take(take: ReadTake, predicted: Take | None, yaw: float | None) -> RegisteredTake:
-    """Registers one take against what a simulation (or another recording) says. InputError where it cannot be."""
+    """Registers one take against a simulation (or another recording). InputError where that is impossible."""
     spec, model, recording, commands = take.spec, take.model, take.recording, take.commands
     measurement = register(recording, model, commands, predicted, spec.starts_at, yaw, spec.base)
     recorded = take_from_recording(recording, measurement, model, name=spec.name, base=spec.base)

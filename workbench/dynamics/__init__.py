@@ -1,4 +1,4 @@
-"""What moves the robot: inverse dynamics, contact forces, base wrench residual, servo margins."""
+"""Inverse dynamics, contact forces, base wrench residual, servo margins."""
 
 from workbench.dynamics.inverse import InverseDynamics, inverse_dynamics
 from workbench.dynamics.margins import ServoLoad

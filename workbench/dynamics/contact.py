@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 STICKING = 0.02
 """Slip [m/s] about which friction turns from any direction to against the slip."""
@@ -16,8 +15,8 @@ _ITERATIONS, _HALVINGS = 60, 30
 
 
 def share_forces(wrench: Array, arms: Array, slip: Array, friction: Array, cost: Array, scale: Array) -> tuple[Array, Array]:
-    """Forces f (N, C, 3) [N] in W, each in its cone |f_xy| <= friction f_z, that leave least of a wrench, and what
-    they leave, (N, 6).
+    """Forces f (N, C, 3) [N] in W, each in its cone |f_xy| <= friction f_z, that minimise the residual of a wrench, and that
+    residual, (N, 6).
 
     wrench: (N, 6) [moment N m, force N] about the point from which arms (N, C, 3) [m] lead to the contacts. slip: (N, C, 2)
     [m/s], velocity along the floor. friction: (C,). cost: (N, C) [1/N²] of force at each point; infinite: no contact there.
@@ -28,9 +27,9 @@ def share_forces(wrench: Array, arms: Array, slip: Array, friction: Array, cost:
     the gradient of a strongly convex, piecewise smooth function. Newton's method with a line search finds its zero, for
     all samples at once (Qi and Sun, Math. Programming 58, 1993).
 
-    What is down can push in many ways that move the robot alike. Where a point slides, friction works against the slip: each
-    point has two cones, a cheap one that narrows to the ray against the slip as it gets faster, and the whole one,
-    dearer by AGAINST_SLIP, so that the residual is what the whole cone leaves.
+    Feet on the ground can push in many ways that have the same effect on the robot. Where a point slides, friction acts against
+    the slip: each point has two cones, a cheap one that narrows to the ray against the slip as it gets faster, and the whole one,
+    more expensive by AGAINST_SLIP, so that the residual is that of the whole cone.
     """
     N, C = arms.shape[:2]
     forces, residual = np.full((N, C, 3), np.nan), np.full((N, 6), np.nan)

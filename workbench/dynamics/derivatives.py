@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 ORDER = 3
 _CHUNK = 20_000  # samples at once, so that ten minutes of 14 bodies stay below 100 MB

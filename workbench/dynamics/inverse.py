@@ -21,15 +21,15 @@ from workbench.motion.motion import Motion
 from workbench.motion.smoothing import interpolate_motion
 from workbench.recording import Take, quaternions
 from workbench.robot import GRAVITY, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Stance = Mapping[str, NDArray[np.bool_]]
 
 RECORDED_WINDOW, SIMULATED_WINDOW = 0.1, 0.02
 """Smoothing of takes [s]: the first turns 0.1 deg of noise at 120 Hz into about 2 rad/s², 0.013 N m of an AX-12's rotor; the
 second spans an impact of a simulated foot."""
 REGULARISATION = 1e-6
-"""Cost of contact force against residual, both over the weight: what the residual may be off by, as a share of the weight."""
+"""Cost of contact force against residual, both over the weight: the tolerance of the residual, as a share of the weight."""
 DRAWS = 8
 """Noisy copies of a take from which the uncertainties come."""
 
@@ -171,7 +171,7 @@ class InverseDynamics:
         return motor_torque(self._servos, solution.torque, trajectory.v, trajectory.a, self.servo_friction)
 
     def _margins(self, solution: _Solution, trajectory: RobotTrajectory) -> tuple[Array, Array]:
-        """What is left of torque [N m] and speed [rad/s], (N, n) each."""
+        """Margins of torque [N m] and speed [rad/s], (N, n) each."""
         return (torque_margin(self._servos, self._motor(solution, trajectory), trajectory.v),
                 speed_margin(self._servos, trajectory.v))
 

@@ -1,4 +1,4 @@
-"""The robot's masses and feet: what moves it, without contact, and what contact forces do to its joints."""
+"""The robot's masses and feet: its motion without contact, and the effect of contact forces on its joints."""
 
 from __future__ import annotations
 
@@ -21,8 +21,7 @@ from workbench.recording import quaternions
 from workbench.robot import GRAVITY, ConfigureParser, RobotModel
 from workbench.robot.kinematics import cross, rotation_about
 from workbench.robot.model_source.checks import quiet_drake
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 DEFAULT_FRICTION = 0.5
 """Where neither the model's ground nor the SDF says one: the thesis's kinetic coefficient (section 6.9)."""
@@ -47,8 +46,8 @@ class FootPoints:
 class Machine:
     """A model's rigid bodies on a base that floats, in a continuous Drake plant that is built once.
 
-    Friction and reflected inertia of the servos, and those that the SDF says, are left out: torques are what the links take.
-    Of a model's effects those that change masses are in; left_out names the others.
+    Friction and reflected inertia of the servos, and those in the SDF, are left out: torques are those applied to the links.
+    Of a model's effects those that change masses are included; left_out names the others.
     """
 
     def __init__(self, model: RobotModel, gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)) -> None:

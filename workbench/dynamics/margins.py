@@ -1,4 +1,4 @@
-"""What a motion asks of the servos, and how far they are from what they cannot give."""
+"""The load of the servos in a motion, and their margins of torque and speed."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
-
-Array = NDArray[np.float64]
+from workbench.servo import ServoLaw
+from workbench.types import Array
 
 CREEP = 0.05
 """Joint speed [rad/s] below which Coulomb friction fades to zero with the speed: its direction at rest is not known."""
@@ -44,8 +44,8 @@ class ServoLoad:
 
 
 def motor_torque(servos: Sequence[ServoConstants], torque: Array, v: Array, a: Array, friction: bool = True) -> Array:
-    """What motor and gear must give, back-EMF taken off, so that `torque` (N, n) [N m] reaches the links:
-    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), the last fading
+    """Torque that motor and gear must give, after back-EMF, so that `torque` (N, n) [N m] reaches the links:
+    torque + reflected inertia · a, and with `friction` + viscous · v + Coulomb · sign(v), which fades to zero
     below CREEP (docs/formats.md, section 4)."""
     inertia, viscous, coulomb = (_row(servos, key) for key in ("reflected_inertia", "viscous_friction", "coulomb_friction"))
     needed = torque + inertia * a
@@ -57,13 +57,12 @@ def motor_torque(servos: Sequence[ServoConstants], torque: Array, v: Array, a: A
 def torque_margin(servos: Sequence[ServoConstants], needed: Array, v: Array) -> Array:
     """Motor torque left at full duty (N, n) [N m], negative where the servo cannot: V/V_rated stall − back-EMF · speed along
     the torque − |needed|. A servo that is driven backwards has the back-EMF on its side."""
-    full, back_emf = _row(servos, "torque_at_full_duty"), _row(servos, "back_emf")
-    return np.asarray(full - back_emf * v * np.sign(needed) - np.abs(needed))
+    return np.asarray(ServoLaw.of(servos).line.motor_torque(v * np.sign(needed)) - np.abs(needed))
 
 
 def speed_margin(servos: Sequence[ServoConstants], v: Array) -> Array:
     """Distance (N, n) [rad/s] from the no-load speed at the supply voltage, where full duty gives no torque."""
-    return np.asarray(_row(servos, "torque_at_full_duty") / _row(servos, "back_emf") - np.abs(v))
+    return np.asarray(ServoLaw.of(servos).line.no_load_speed - np.abs(v))
 
 
 def servo_load(servo: ServoConstants, needed: Array, torque_left: Array, speed_left: Array, torque_sigma: Array | None = None,

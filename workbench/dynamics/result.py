@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.margins import ServoLoad
 from workbench.files import InputError
 from workbench.files.reading import read_text, write_whole
 from workbench.recording.formats.numbers import number_columns
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 HEADER = "# workbench inverse dynamics, format 1"
 _WRENCH = tuple(f"{kind}.{axis}" for kind in ("moment", "force") for axis in "xyz")
@@ -32,12 +30,12 @@ class InverseDynamicsResult:
     """Forces and torques that a motion needed. N samples, n joints; NaN where the motion has gaps.
 
     q, v, a: (N, n) smoothed [rad, per s, per s²]. torque: (N, n) [N m], from servo to link. motor_torque: (N, n) [N m],
-    with reflected inertia and the servo's own friction, back-EMF taken off. contact: foot -> ground reaction (N, 3) [N] in
+    with reflected inertia and the servo's own friction, after back-EMF. contact: foot -> ground reaction (N, 3) [N] in
     W, inside the friction cone. base_wrench_residual: (N, 6) [moment about the base link's origin N m, force N] in W that
     no contact inside the cone supplies; zero on a fixed base, whose mount's wrench is `support` (zero on a free one).
     torque_margin (N, n) [N m], speed_margin (N, n) [rad/s]: of the servos at the supply voltage (margins.py). loads: joint ->
-    the same over the whole motion. torque_sigma (N, n), residual_sigma (N, 6): standard deviations that the measurement's
-    noise makes; zero where none was given.
+    the same over the whole motion. torque_sigma (N, n), residual_sigma (N, 6): standard deviations caused by the measurement's
+    noise; zero where none was given.
 
     With more than one foot down, how far feet squeeze against each other leaves no trace in the motion: `torque` and
     `contact` are those of the smallest forces that fit the feet's slip (contact.py). The residual does not depend on it.
@@ -66,15 +64,9 @@ class InverseDynamicsResult:
         """Index of a joint's column."""
         return self.joints.index(joint)
 
-    @property
-    def residual_over_noise(self) -> Array:
-        """Residual (N, 6) in standard deviations; NaN where no noise was given."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(self.residual_sigma > 0, self.base_wrench_residual / self.residual_sigma, np.nan)
-
 
 def save_inverse_dynamics(result: InverseDynamicsResult, path: str | Path) -> Path:
-    """Writes the result as CSV under three comment lines: format, what it is (JSON), units.
+    """Writes the result as CSV under three comment lines: format, contents (JSON), units.
 
     Columns: time; `position.J`, `velocity.J`, `acceleration.J`, `torque.J`, `motor_torque.J`, `torque_margin.J`,
     `speed_margin.J`, `torque.J.sigma` for each joint J; `contact.FOOT.x` …; `residual.moment.x` … `residual.force.z`, the same
@@ -111,7 +103,7 @@ def load_inverse_dynamics(path: str | Path) -> InverseDynamicsResult:
         loads = {joint: ServoLoad(**{k: np.nan if v is None else float(v) for k, v in load.items()})
                  for joint, load in about["loads"].items()}
     except (ValueError, KeyError, TypeError, AttributeError) as e:
-        raise InputError(path, f"line 2: expected what the table is, as JSON ({type(e).__name__}: {e})") from None
+        raise InputError(path, f"line 2: expected a JSON description of the table ({type(e).__name__}: {e})") from None
     table = number_columns(path, lines[3], first_line=4)
     joints = tuple(c.removeprefix("position.") for c in table if c.startswith("position."))
     feet = tuple(dict.fromkeys(c.split(".")[1] for c in table if c.startswith("contact.")))

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.dynamics.machine import FootPoints
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TOUCH = 3e-3
 """Points up to this far above the floor may carry load [m]."""
@@ -36,10 +35,10 @@ def floor_under(places: Array, points: FootPoints) -> Array:
 
 def dearness(places: Array, velocities: Array, points: FootPoints, floor: Array,
              stance: Mapping[str, NDArray[np.bool_]] | None) -> Array:
-    """How dear force is at each point (N, C): 1 on the floor, rising with the height above it, infinite without contact.
+    """Cost of force at each point (N, C): 1 on the floor, rising with the height above it, infinite without contact.
 
     places, velocities: (N, C, 3) [m, m/s] in W. Without `stance` a point is in contact if it is within TOUCH of its foot's
-    floor (F,) [m] and slower than LIFTING. With `stance`, foot -> (N,) bool, a foot is down when it says so, and its floor is
+    floor (F,) [m] and slower than LIFTING. With `stance`, foot -> (N,) bool, a foot is down where that is true, and its floor is
     where its lowest point is.
     """
     height = places[:, :, 2] - floor[points.foot]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,18 +17,18 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import GRAVITY, EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm, nominal_terms
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class Physics:
-    """Nominal physics and effects together. description: SDF text, None where it is the model's file. foot_friction: pair
+    """Nominal physics and effects together. build: the changed SDF, None where it is the model's file. foot_friction: pair
     coefficient by foot, where it differs from the ground's. zero: (n,) [rad] link angle less servo angle.
     tether: (3,) [N]. stages: by servo joint, the joints that were put between servo and link. moved: link lengths changed. ends:
-    hard ends were added, which continuous plants ignore. terms: of the servos, by effects."""
+    hard ends were added, which continuous plants ignore. terms: of the servos, by effects. retimed: whether a servo's delay or
+    an effect changes when commands are heard, or which."""
 
-    description: str | None
+    build: SdfRobot | None
     law: ServoLaw
     ground: Ground
     foot_friction: Mapping[str, float]
@@ -39,6 +40,12 @@ class Physics:
     moved: bool
     ends: bool
     terms: tuple[ServoTerm, ...] = ()
+    retimed: bool = True
+
+    @cached_property
+    def description(self) -> str | None:
+        """SDF text, None where it is the model's file."""
+        return None if self.build is None else self.build.text()
 
     @property
     def servo_terms(self) -> tuple[ServoTerm, ...]:
@@ -47,7 +54,7 @@ class Physics:
 
 
 def resolved(model: RobotModel) -> Iterator[tuple[Effect, EffectSpec, dict[str, float]]]:
-    """Each effect of a model with its spec and its values in SI, checked; InputError names what is wrong."""
+    """Each effect of a model with its spec and its values in SI, checked; InputError names the problem."""
     for spec in model.effects:
         effect = effect_named(spec.effect)
         check_places(effect, spec, model)
@@ -71,11 +78,13 @@ def physics_of(model: RobotModel) -> Physics:
     stiffness: float | None = None
     terms: list[ServoTerm] = []
     sdf: SdfRobot | None = None
+    retimed = any(model.servo(j).goal_delay > 0 for j in model.joints)
     for effect, spec, values in resolved(model):
         columns = _columns(model, spec)
         law = effect.law(law, columns, values)
-        term = effect.servo_term(np.isin(model.joints, spec.where), values)
-        terms += [] if term is None else [term]
+        if type(effect).servo_term is not Effect.servo_term:
+            term = effect.servo_term(np.isin(model.joints, spec.where), values)
+            terms += [] if term is None else [term]
         ground = effect.ground(ground, values)
         gravity = effect.gravity(gravity, values)
         zero[columns] += effect.zero(values)
@@ -84,12 +93,13 @@ def physics_of(model: RobotModel) -> Physics:
         stiffness = stiffness if soft is None else soft
         if slip is not None:
             friction |= dict.fromkeys(spec.where, slip)
+        retimed |= type(effect).commands is not Effect.commands
         if type(effect).description is not Effect.description:
             sdf = sdf or SdfRobot(model.path)
             effect.description(sdf, spec, model)
-    return Physics(sdf.text() if sdf else None, law, ground, friction, stiffness, gravity, tether, zero,
+    return Physics(sdf, law, ground, friction, stiffness, gravity, tether, zero,
                    sdf.stages if sdf else {}, sdf is not None and sdf.moved, sdf is not None and sdf.ends,
-                   tuple(terms))
+                   tuple(terms), retimed)
 
 
 def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
@@ -97,7 +107,7 @@ def _columns(model: RobotModel, spec: EffectSpec) -> NDArray[np.int64]:
 
 
 def played(commands: Commands, model: RobotModel) -> Commands:
-    """What the servos act on of commands that were sent: as late as the nominal law has it, and as effects change it."""
+    """The commands on which the servos act: those sent, delayed as in the nominal law, and changed by effects."""
     late = np.array([model.servo(j).goal_delay for j in commands.joints])
     for delay in np.unique(late[late > 0]).tolist():
         commands = delayed(commands, np.flatnonzero(late == delay).tolist(), delay)

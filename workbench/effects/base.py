@@ -1,9 +1,9 @@
-"""What an effect is: one piece of physics beyond the nominal model, with hooks into what it changes.
+"""The base class of effects: one piece of physics beyond the nominal model, with hooks for everything it may change.
 
-An effect is one file with one subclass of Effect and its instance EFFECT. It is plain: all state is in EffectSpec. A station
-asks for its description (SDF), law (servo constants), servo terms, ground, gravity and forces, a run for its commands, a
-comparison for its measurement. Another package adds effects through entry points in the group "workbench.effects" that name an
-Effect instance.
+An effect is one file with one subclass of Effect and its instance EFFECT. It has no state: all state is in EffectSpec. A station
+calls the hooks for the description (SDF), law (servo constants), servo terms, ground, gravity and forces, a run that for the
+commands, a comparison that for the measurement. Another package adds effects through entry points in the group
+"workbench.effects" that name an Effect instance.
 """
 
 from __future__ import annotations
@@ -21,40 +21,40 @@ from workbench.motion.commands import Commands
 from workbench.recording.recording import Measurement
 from workbench.robot import EffectSpec, Ground, RobotModel
 from workbench.servo import ServoLaw, ServoTerm
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.effects.sdf import SdfRobot
 
-Array = NDArray[np.float64]
 Place = Literal["joint", "foot", "link", "rigid_body", "robot"]
 Layer = Literal["timing", "actuator", "structure", "inertia", "ground", "measurement"]
 Value = float | tuple[float, float, float]
 Family = Literal["electrical", "friction", "timing", "mass", "ground pull"]
 """Effects that do nearly the same, until data separate them: where no member is sure, the family may be."""
 Tie = Literal["gravity against torque", "less torque at full duty"]
-"""What servo logs tell as one number: angles do not change if all torques and inertias grow alike, so that only gravity over
-torque is known; and a torque that ends early, bends or sags with duty does the same."""
+"""Effects that servo logs cannot separate. Scaling all torques and inertias together does not change the angles, so that only the
+ratio of gravity to torque is known; and a torque that saturates, bends or sags with duty has the same effect."""
 Estimator = Literal["end of travel", "play across the axis", "turn of an asset at rest", "missed poses", "length between axes",
                     "turn about an axis"]
 """Ways to read an effect off the recordings (workbench/identify/estimators)."""
 
 DEGREE = math.pi / 180
 REACH = 2.0
-"""Times what one in a hundred passes: further than that no number plausibly goes."""
+"""Multiple of the value that one in a hundred exceeds: larger values are implausible."""
 NEAR, BEYOND = 0.08, 0.8
 """Shares of the robot's own value by which the typical one has to be less, and the one taken instead."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number of an effect, in the unit of docs/formats.md; `si` times it is SI. low, high: what is physically possible.
-    typical: where it starts to be felt on a small robot; fits start there and screening uses it as its step. vector: three of
-    them. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
-    takes the place of a value that the nominal robot has, which is then neutral. resolution: standard deviation that no recording
-    goes below, as every model leaves so much open. option: name of the part of the effect that it belongs to and that may be left
-    out; empty: it is always given. seldom_beyond: what one servo (or robot) in a hundred passes that has the effect at all, of a
-    vector its length, with the reason beside it; priors and reach follow from it. logarithmic: a ratio whose size is its
-    logarithm, so that 2 and 1/2 are as far."""
+    """A parameter of an effect, in the unit of docs/formats.md; multiply by `si` for SI. low, high: physically possible range.
+    typical: size from which it is noticeable on a small robot; fits start there and screening uses it as its step. vector: three
+    numbers. shapes: it only shapes the effect (the speed at which friction fades), neutral being its typical value. replaces: it
+    replaces a value of the nominal robot, which is then neutral. resolution: least standard deviation that any recording can
+    give, since every model leaves that much open. option: name of the optional part of the effect to which it belongs; empty: it
+    is always given. seldom_beyond: value that one in a hundred servos (or robots) with the effect exceeds, for a vector its
+    length, with the reason in a comment; priors and reach follow from it. logarithmic: a ratio whose size is its logarithm, so
+    that 2 and 1/2 are equally large."""
 
     name: str
     unit: str
@@ -83,9 +83,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Registers:
-    """What the servos' own registers said in one log, NaN where they said nothing. duty, nominal_duty: by joint, (N,), what a
-    servo's H-bridge did, and what the nominal law does at the logged error, before it is cut at 1. voltage (N,) [V], None where
-    it was not logged."""
+    """Readings of the servos' own registers in one log, NaN where there are none. duty, nominal_duty: by joint, (N,), duty of the
+    servo's H-bridge, and of the nominal law at the logged error, before it is limited to 1. voltage (N,) [V], None where it was
+    not logged."""
 
     duty: Mapping[str, Array]
     nominal_duty: Mapping[str, Array]
@@ -93,9 +93,9 @@ class Registers:
 
 
 class Effect:
-    """Base of all effects; hooks do nothing unless overridden. `values` are in SI, by parameter name.
+    """Base class of effects; hooks do nothing unless overridden. `values` are in SI, by parameter name.
 
-    What an effect must say: name, layer, places, parameters and `sentence`. What it may say of itself to the search, which knows
+    An effect must define name, layer, places, parameters and `sentence`. It may describe itself to the search, which knows
     no effect by its name: the class variables from `under_load` on, `as_other`, `could_act` and `reach`.
     """
 
@@ -108,27 +108,29 @@ class Effect:
     family: ClassVar[Family | None] = None
     """The effects with which it is easily confused; None: it has no family."""
     under_load: ClassVar[bool] = False
-    """Whether it shows only where joints carry load: a stand that lets the legs hang may hide what a walk shows."""
+    """Whether it is observable only where joints carry load: a stand on which the legs hang may hide an effect seen in a walk."""
+    needs_steady_load: ClassVar[bool] = False
+    """Whether a servo log tells it from inertia and friction only where gravity loads the joint."""
     observable_when_fixed: ClassVar[bool] = True
     """Whether a robot whose base is held can show it; not what only the floor does to feet."""
     hidden_by_zeroing: ClassVar[bool] = False
     """Whether it leaves no trace in the angles of its own joint where these are zeroed in neutral, only in what gravity and
     ground make of it."""
     like_a_late_start: ClassVar[bool] = False
-    """Whether, of the whole robot, it does what a later first command does: only a known start separates the two."""
+    """Whether, acting on all joints, it looks like a later first command: only a known start separates the two."""
     reduces_to: ClassVar[str] = ""
     """The nested effect, of no more numbers, that it becomes: where a number that only shapes it comes to its end, or, if none
     does, where it is small."""
     equivalent_to: ClassVar[tuple[str, ...]] = ()
-    """Observationally equivalent effects: no walk separates it from them, as both move the robot alike, by less apart than
-    engines are."""
+    """Observationally equivalent effects: no walk separates it from them, as their motions differ by less than those of two
+    simulators do."""
     includes: ClassVar[tuple[str, ...]] = ()
-    """Effects at the same place whose freedom it has, so that these say nothing beside it."""
+    """Effects at the same joint or link that are special cases of it, and so are never added to it."""
     tied: ClassVar[Tie | None] = None
     """Where a servo's own angles cannot tell it from others of that tie, of which a joint is given one at most."""
     steady_pull: ClassVar[bool] = False
-    """Whether it pulls at the robot with a steady force: of several such, beside the one the others only make up for how roughly
-    that was fitted."""
+    """Whether it is a steady force on the robot: of several such effects all but one only compensate for the imperfect fit of
+    that one."""
     point_mass: ClassVar[bool] = False
     """Whether its numbers are a mass and where it sits on a link, which are fitted as mass and moments."""
     moves_center: ClassVar[bool] = False
@@ -145,7 +147,7 @@ class Effect:
     be known first. If not, it needs an estimator."""
 
     def sentence(self, spec: EffectSpec) -> str:
-        """For a person: what is different about this robot."""
+        """One sentence for a person: how this robot differs from nominal."""
         raise NotImplementedError
 
     def neutral(self, model: RobotModel) -> tuple[float, ...]:
@@ -163,9 +165,10 @@ class Effect:
         return True
 
     def reach(self, sdf: SdfRobot, model: RobotModel, where: tuple[str, ...]) -> float:
-        """How far its numbers may lie from neutral on this robot (`Parameter.distance`), in the units of docs/formats.md, a
-        vector by its length: a search moves no number further, and of servo logs it refutes what wants to go there. REACH times
-        what one in a hundred passes, where all parameters say that; an effect that vanishes at infinity has no end."""
+        """Largest plausible distance of its parameters from neutral on this robot (`Parameter.distance`), in the units of
+        docs/formats.md, for a vector its length: a search moves no parameter further, and rejects it for servo logs if it would
+        go beyond. REACH times the value that one in a hundred exceeds, where all parameters define that; unlimited for an effect
+        that vanishes at infinity."""
         neutral = iter(self.neutral(model))
         away = []
         for p in self.parameters:
@@ -224,7 +227,7 @@ class Effect:
 
 
 def mean_of_logs(values: Sequence[float], least: float) -> tuple[float, float] | None:
-    """Of what each log says, and its standard error, at least `least`; None of fewer than two logs."""
+    """Mean of the logs' values, and its standard error, at least `least`; None for fewer than two logs."""
     if len(values) < 2:
         return None
     return float(np.mean(values)), max(float(np.std(values, ddof=1) / math.sqrt(len(values))), least)
@@ -269,7 +272,7 @@ def vector(values: Mapping[str, float], name: str) -> Array:
 
 
 def check_places(effect: Effect, spec: EffectSpec, model: RobotModel) -> None:
-    """InputError unless `where` names what the model has and the effect can act on."""
+    """InputError unless `where` names parts that the model has and the effect can act on."""
     k = model.kinematics
     known: dict[str, tuple[str, ...]] = {
         "joint": model.joints, "foot": tuple(model.foot_links), "link": k.links, "rigid_body": tuple(model.rigid_bodies),

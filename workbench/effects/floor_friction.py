@@ -1,4 +1,4 @@
-"""What friction between feet and floor has in common, of all feet or of one."""
+"""Common base of the effects on the friction between feet and floor, for every foot or for one."""
 
 from __future__ import annotations
 

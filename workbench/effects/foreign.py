@@ -1,4 +1,4 @@
-"""Effects of other packages: what they say of themselves is checked as they load, and what their hooks raise names them."""
+"""Effects of other packages: their declarations are checked as they load, and exceptions in their hooks name them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HOOKS = tuple(name for name, value in vars(Effect).items() if callable(value) an
 
 
 def check_effect(effect: Effect) -> None:
-    """InputError names the class variable that is missing or wrong, and what was expected."""
+    """InputError names the class variable that is missing or wrong, and the expected value."""
     problem = next(_problems(effect), None)
     if problem is not None:
         raise InputError(None, f"effect '{getattr(effect, 'name', type(effect).__name__)}': {problem}")
@@ -33,7 +33,7 @@ def _problems(effect: Effect) -> Iterator[str]:
     if not isinstance(effect.places, tuple) or not effect.places or not set(effect.places) <= set(get_args(Place)):
         yield f"places: expected a tuple of some of {', '.join(get_args(Place))}, got {effect.places!r}"
     if type(effect).sentence is Effect.sentence:
-        yield "sentence: is missing; expected a method that says what is different about this robot"
+        yield "sentence: is missing; expected a method that describes how this robot differs from nominal"
     if not isinstance(effect.parameters, tuple) or not all(isinstance(p, Parameter) for p in effect.parameters):
         yield f"parameters: expected a tuple of Parameter, got {effect.parameters!r}"
     for p in effect.parameters:

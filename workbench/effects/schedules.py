@@ -10,8 +10,8 @@ import numpy as np
 from workbench.motion.commands import Commands
 
 LOOP = 2e-3
-"""Between a command's stated time and what the servo's loop makes of it [s]: engines and firmwares differ by that, so that every
-model may set out that much sooner or later, and no delay is known better."""
+"""Uncertainty of the time between a command's stated time and its use in the servo's loop [s]: simulators and firmwares differ by
+that much, so that every model may start that much sooner or later, and no delay is known better."""
 
 SAME = 1e-9
 """Instants no further apart are one [s]."""

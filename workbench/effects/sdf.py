@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.sdf_values import numbers, read_inertia, set_child, shift_pose, write_inertia, write_pose, written
 from workbench.files import InputError
 from workbench.robot import JointFrame, Kinematics
 from workbench.robot.model_source import named
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 GEAR_MASS, GEAR_INERTIA = 1e-4, 1e-8
-"""Of the link between servo and link [kg, kg m^2]: small beside any robot, large enough for the solver. What a gear weighs at the
-joint is the servo's reflected inertia, which stays on the servo's joint."""
+"""Mass and inertia of the link between servo and link [kg, kg m^2]: small compared with any robot, large enough for the solver.
+The gear's inertia at the joint is the servo's reflected inertia, which stays on the servo's joint."""
 SPRING_TIME = 1e-3
 """Damping of a gear's spring over its stiffness [s]. Drake steps springs explicitly and joint damping implicitly; together
 they are stable for any stiffness k on any inertia I up to a step h of twice this: h^2 k/I < 4 + 2 h d/I with d = k SPRING_TIME.
@@ -40,8 +40,8 @@ class SdfRobot:
     def __init__(self, path: Path) -> None:
         self.path, self.source = path, named(path)
         ElementTree.register_namespace("drake", "http://drake.mit.edu")
-        self._tree = ElementTree.parse(path)
-        model = self._tree.getroot().find("model")
+        self.root = deepcopy(_parsed(path, path.stat().st_mtime_ns))
+        model = self.root.find("model")
         if model is None:
             raise InputError(self.source, "no <model>: effects that change the robot's build need an SDF file")
         self._model = model
@@ -54,7 +54,7 @@ class SdfRobot:
         for uri in self._model.iter("uri"):
             if uri.text and "://" not in uri.text:  # of a text without a file Drake takes neither relative nor absolute paths
                 uri.text = f"file://{(self.path.parent / uri.text.strip()).resolve()}"
-        return ElementTree.tostring(self._tree.getroot(), encoding="unicode")
+        return ElementTree.tostring(self.root, encoding="unicode")
 
     def add_play(self, joint: str, gap: float) -> None:
         """The link turns freely by `gap` in all about the joint's axis, half to each side of the servo."""
@@ -225,6 +225,12 @@ class SdfRobot:
         if inertial is None:
             raise InputError(self.source, f"link '{link}' has no <inertial>, to which mass could be added")
         return inertial
+
+
+@lru_cache(maxsize=8)
+def _parsed(path: Path, changed: int) -> Element:
+    """The root of a file, which has to be copied; changed: when the file was, so that it is read again."""
+    return ElementTree.parse(path).getroot()
 
 
 def _parallel(mass: float, d: Array) -> Array:

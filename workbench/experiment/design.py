@@ -1,10 +1,10 @@
-"""The next experiment: a motion, within the servos' limits, that tells apart what a session could not.
+"""The next experiment: a motion, within the servos' limits, that separates explanations which a session could not separate.
 
-Pieces of motion that load, reverse, jerk or hold what the rivals speak of are rolled out with both. A piece counts by what is
-left of the difference between the two, over sigma, once the better imitator has moved its own numbers to come as near as it
-can: where a somewhat softer spring imitates a flatter servo law, nothing is left. Pieces are then put together, greedily, so
-that what imitates in one gives itself away in the next; the motion that comes of it is rolled out as a whole and each rival
-fitted to the other.
+Segments of motion that load, reverse, jerk or hold the joints concerned are rolled out with both rivals. A segment is scored by
+the residual difference between the two, over sigma, after the better imitator has adapted its own parameters as closely as
+possible: where a somewhat softer spring imitates a flatter servo law, the score is zero. Segments are then combined greedily, so
+that a rival which can imitate the other in one segment cannot in the next; the resulting motion is rolled out as a whole and each
+rival is fitted to the other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import effect_named
 from workbench.experiment.limits import Reach
@@ -23,26 +22,26 @@ from workbench.experiment.moves import JointMoves, long_runs
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.projection import ObservationModel, Shown, channels, fitted_to_each_other, reshown, seen, shown
 from workbench.experiment.rivals import Pair
-from workbench.experiment.runs import Progress, Runs, spans
+from workbench.experiment.runs import Runs, spans
 from workbench.experiment.segment import Segment
 from workbench.experiment.stance import BodyMoves
 from workbench.identify.results.findings import NextExperiment
 from workbench.motion import Motion
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, legs
+from workbench.types import Array, Progress, no_progress
 
 __all__ = ["Experiment", "ObservationModel", "Separation", "design_experiment"]
 
-Array = NDArray[np.float64]
 Base = Literal["free", "fixed"]
 
 
 @dataclass(frozen=True)
 class Separation:
-    """How far a motion keeps two rivals apart after each was fitted to the other, the better imitator counting.
+    """How far a motion separates two rivals after each was fitted to the other, by the better imitator.
 
-    effects: the names of the two. where: the channel (joint, or of the body) that shows it best; in_sigma: RMS difference there,
-    over sigma. log_likelihood_ratio: expected, of the true one over the other; frames that err alike count as one.
+    effects: the names of the two. where: the channel (joint, or of the body) that separates them best; in_sigma: RMS difference
+    there, over sigma. log_likelihood_ratio: expected, of the true one over the other; frames with correlated errors count as one.
     """
 
     effects: tuple[str, str]
@@ -69,10 +68,6 @@ class Experiment:
         told = [s for s in self.separations if s.separated]
         return NextExperiment(file, self.base, tuple(s.effects for s in told), tuple(s.log_likelihood_ratio for s in told)
                               ) if told else None
-
-
-def no_progress(what: str, done: float | None = None) -> None:
-    """Says nothing."""
 
 
 def design_experiment(nominal: RobotModel, rivals: Sequence[tuple[RobotModel, RobotModel]],
@@ -103,7 +98,8 @@ def _worth(separations: Iterable[Separation]) -> float:
 
 
 def _better_base(pair: Pair, nominal: RobotModel) -> Base:
-    """The ground, and what the base itself carries, show on a free base alone; what acts in a joint shows best on a fixed one."""
+    """The ground, and masses on the base itself, are observable on a free base alone; effects in a joint are best on a fixed
+    one."""
     ground = any(effect_named(e.effect).layer == "ground" for e in pair.effects)
     carried = any(w in (nominal.base, *_trunk(nominal)) for e in pair.effects for w in e.where)
     return "free" if ground or carried else "fixed"
@@ -171,7 +167,7 @@ class _Bench:
                 for (s, of, _), more, fine in zip(best, beside, finer) if self.runs.sound(more)}
 
     def _proved(self, pair: Pair, chosen: Sequence[Segment], tried: Mapping[str, Shown]) -> Separation:
-        """What is left between two rivals on the whole motion, each fitted to the other by rollouts."""
+        """Residual difference of two rivals on the whole motion, each fitted to the other by rollouts."""
         named = [s.name for s in chosen if s.name in tried]
         if not named:
             return Separation(pair.names, "", 0.0, 0.0)
@@ -191,7 +187,7 @@ class _Bench:
 
 
 def _chosen(pieces: Mapping[str, Segment], tried: Sequence[Mapping[str, Shown]]) -> list[str]:
-    """Which pieces to play, one after the other; tried: what they show of each pair."""
+    """Chooses the segments to play, in order; tried: how well each separates each pair."""
 
     def value(names: Sequence[str]) -> float:
         shows = [[of[name] for name in names if name in of] for of in tried]

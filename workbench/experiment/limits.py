@@ -1,4 +1,4 @@
-"""What a robot may be asked to do: joint ranges, speeds, and links that stay clear of each other."""
+"""Limits of the motions that a robot may be sent: joint ranges, speeds, and links that stay clear of each other."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from workbench.motion import Motion
 from workbench.robot import RobotModel
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import units_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 class Reach:
@@ -42,7 +41,7 @@ class Reach:
         )
 
     def allows(self, segment: Segment) -> bool:
-        """Whether a motion table (docs/formats.md, section 2), ranges and speeds hold what is asked."""
+        """Whether a motion table (docs/formats.md, section 2), ranges and speeds allow these segments."""
         try:
             table = Motion(segment.name, segment.times, self.model.joints, segment.angles, units=self.units).as_table()
         except InputError:
@@ -107,13 +106,11 @@ def _distance(a: Array, b: Array) -> Array:
 
 def _reached(model: RobotModel, joint: str) -> float:
     servo = model.servo(joint)
-    surplus = max(servo.torque_at_full_duty - servo.coulomb_friction, 0.0)
-    no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
-    return EXPERIMENT.speed_share * min(surplus / (servo.back_emf + servo.viscous_friction), no_load, _told(servo.model))
+    return EXPERIMENT.speed_share * min(float(servo.line.reachable_speed), _register_limit(servo.model))
 
 
-def _told(servo: str) -> float:
-    """Highest speed [rad/s] that a servo's register holds; infinite where nobody knows its registers."""
+def _register_limit(servo: str) -> float:
+    """Highest speed [rad/s] that the servo's moving-speed register can hold; infinite for an unknown family."""
     try:
         family = servo_profile(servo)
     except InputError:

@@ -8,14 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.experiment.limits import Reach
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import GRAVITY, RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass
@@ -31,7 +29,8 @@ class Path:
         self.poses.append(np.zeros(len(self.joints)))
 
     def to(self, pose: Mapping[str, float], speed: float = math.inf, least: float = 0.05) -> Path:
-        """Goes on to angles of the joints named, the others as they are, at `speed` or the most, in `least` seconds or more."""
+        """Moves the named joints on to these angles, the others staying, at `speed` or the maximum, in at least `least`
+        seconds."""
         angles = self.poses[-1].copy()
         for joint, angle in pose.items():
             angles[self.joints.index(joint)] = angle
@@ -54,7 +53,7 @@ class Path:
 
 
 class JointMoves:
-    """Segments for joints of a robot whose base is fixed, that show what acts in the joints of `focus`."""
+    """Segments for a robot whose base is fixed, that make effects in the joints of `focus` observable."""
 
     def __init__(self, model: RobotModel, reach: Reach, focus: Sequence[str]) -> None:
         self.model, self.reach, self.focus = model, reach, tuple(focus)

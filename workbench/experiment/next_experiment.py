@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from workbench.compare.session_takes import Progress, no_progress
 from workbench.experiment.design import design_experiment
 from workbench.identify.diagnosis import DiagnosisResult
 from workbench.identify.results.findings import Diagnosis
 from workbench.motion import Motion
+from workbench.types import Progress, no_progress
 
 MOTION = "next_experiment.csv"
 """The motion's file, beside findings.json."""
@@ -16,8 +16,8 @@ MOTION = "next_experiment.csv"
 
 def with_next_experiment(result: DiagnosisResult, n_jobs: int = 2, progress: Progress = no_progress
                          ) -> tuple[Diagnosis, Motion | None]:
-    """The diagnosis with its next experiment, and that experiment's motion; as it was, and None, where nothing is tied or no
-    motion separates what is. progress: called with what is tried and the share done."""
+    """The diagnosis with its next experiment, and that experiment's motion; the unchanged diagnosis and None where nothing is
+    tied or no motion separates the tie. progress: called with the current stage and the share done."""
     if not result.ties:
         return result.diagnosis, None
     rivals = [(tie.found, tie.rival) for tie in result.ties]

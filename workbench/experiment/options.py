@@ -13,7 +13,7 @@ class ExperimentOptions:
     """Design of the next experiment."""
 
     longest: float = 12.0
-    """Of the motion [s]: what a person still records with pleasure."""
+    """Longest motion [s] that a person can reasonably be expected to record."""
     separated: float = 5.0
     """Log-likelihood ratio from which on names count as separated: odds of 150 to 1."""
     worth: float = 0.2
@@ -29,7 +29,7 @@ class ExperimentOptions:
     clear: float = 0.02
     """Distance that links keep from each other, where they have it in neutral [m]."""
     nearer: float = 0.6
-    """Else this share of what they have there."""
+    """If they are closer than that in neutral, this share of their distance there."""
     points: int = 4
     """On each bone of a link, from its joint to the next ones, at which distances are taken."""
     rounds: int = 2
@@ -37,7 +37,7 @@ class ExperimentOptions:
     settled: float = 0.99
     """Of chi squared: a round that leaves more of it has converged."""
     together: float = 0.05
-    """Frames within so many seconds err alike and count as one [s]."""
+    """Frames within this time have correlated errors and count as one [s]."""
     zero: float = math.radians(0.3)
     """How far dry friction lets a joint stand from where it is thought to stand when angles are zeroed [rad]."""
     start: float = 0.01

@@ -17,18 +17,19 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.results.ties import ObservationModel
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Imitator = Literal["a", "b"]
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What takes of a pair's cast show, over sigma, flat, frames that err alike weighed down so that they count as one.
+    """The channels of a pair's takes, over sigma, flattened, with frames whose errors are correlated weighted to count as one.
 
-    a, b (m,): of each rival. of_a, of_b (m, p): sensitivities of each to its own numbers; nuisance (m, k): to what any recording
-    leaves open, in units of its standard deviation. channel (m,): index of each entry's channel. weight (m,): by which what is
-    seen over sigma stands in a and b; counts (m,): its part that is owed to frames that err alike, the rest to the floor.
+    a, b (m,): of each rival. of_a, of_b (m, p): sensitivities of each to its own parameters; nuisance (m, k): to the unknowns of
+    any recording, per standard deviation. channel (m,): index of each entry's channel. weight (m,): factor applied to the
+    observations over sigma in a and b; counts (m,): the part of it that accounts for correlated errors, the rest for the
+    numerical floor.
     """
 
     a: Array
@@ -46,7 +47,7 @@ class Shown:
         return Shown(*(np.concatenate([getattr(s, f.name) for s in parts]) for f in fields(Shown)))
 
     def chi_squared(self) -> float:
-        """What the better imitator has to pay: for what is left, and for going far from where the session put it."""
+        """Cost of the better imitator: of the residual, and of moving far from the session's estimate."""
         return min(self.closest("a").cost, self.closest("b").cost)
 
     def closest(self, imitator: Imitator, x: Array | None = None, moving: bool = True) -> Closest:
@@ -64,13 +65,13 @@ class Shown:
         return Closest(at, left / self.counts, float(left @ left + at @ at + y[p:] @ y[p:]))
 
     def rms(self, left: Array) -> Array:
-        """RMS of what is left (m,) in each channel, over sigma."""
+        """RMS residual (m,) in each channel, over sigma."""
         return np.array([np.sqrt(np.mean(np.square(left[self.channel == c]))) for c in range(int(self.channel.max()) + 1)])
 
 
 @dataclass(frozen=True, eq=False)
 class Closest:
-    """Numbers x (p,) in units of their freedom; what is left of the difference (m,), over sigma; chi squared of it and of x."""
+    """Parameters x (p,) in units of their freedom; the residual difference (m,), over sigma; chi squared of both."""
 
     x: Array
     left: Array
@@ -106,8 +107,8 @@ def shown(pair: Pair, takes: Sequence[Take], sight: ObservationModel, finer: Tak
 
 
 def left_open(y: Array, sight: ObservationModel) -> list[Array]:
-    """What a recording leaves open of channels (N, c) over sigma, each (N, c) by one standard deviation: before cameras, when the
-    first command came, and where each joint stood when its angle was called zero."""
+    """Unknowns of a recording, as changes of the channels (N, c) over sigma, each (N, c) by one standard deviation: the time of
+    the first command, and the angle at which each joint was zeroed."""
     if not sight.captured:
         return []
     out = [np.gradient(y, axis=0) * sight.rate * EXPERIMENT.start]
@@ -124,7 +125,8 @@ def reshown(known: Shown, y: Array, imitator: Imitator) -> Shown:
 
 
 def _counts(sight: ObservationModel, count: int) -> Array:
-    """Of each channel (c,): the root of one over the number of frames that err alike; the body's are gains over a span."""
+    """For each channel (c,): the root of one over the number of frames with correlated errors; the body's are gains over a
+    span."""
     counts = np.full(count, 1 / np.sqrt(max(1.0, EXPERIMENT.together * sight.rate)))
     counts[len(sight.sigma):] = 1 / np.sqrt(max(1.0, COMPARE.gain_span * sight.rate))
     return counts

@@ -1,4 +1,4 @@
-"""Two models that a session cannot tell apart, and what each may adapt."""
+"""Two models that a session cannot separate, and the parameters that each may adapt."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.registry import effect_named
 from workbench.experiment.options import EXPERIMENT
 from workbench.robot import EffectSpec, RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)

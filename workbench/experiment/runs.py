@@ -1,12 +1,11 @@
-"""Rolls out what is tried, and sees whether the robot bears it."""
+"""Rolls out proposed segments, and checks that the robot can execute them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.experiment.limits import Reach
@@ -18,9 +17,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
+from workbench.types import Array, Progress
 
 
 class Runs:
@@ -37,8 +34,8 @@ class Runs:
 
     def played(self, models: Sequence[RobotModel], motions: Sequence[Sequence[Segment]], what: str = "",
                time_step: float = EXPERIMENT.time_step) -> list[list[Take]]:
-        """For each motion, given as its segments, the takes of all models. A model's jobs follow each other, so that its station
-        is kept. Frames are at the same times within a segment whether it stands alone or among others."""
+        """For each motion, given as its segments, the takes of every model. A model's jobs are consecutive, so that its station
+        is reused. Frames are at the same times within a segment whether it is rolled out alone or among others."""
         config = replace(self.config, time_step=time_step, log_period=self.config.logged_every)
         jobs = []
         for model in models:

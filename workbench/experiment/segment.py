@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
     """A piece of a motion: rows of angles (K, n) [rad] in the model's order of joints at times (K,) [s], from neutral to neutral.
 
-    base: on which it is played. long: it needs its length, as what it shows grows with time; such a one stands alone.
+    base: on which it is played. long: it needs its length, as its signal grows with time; such a segment is played alone.
     """
 
     name: str

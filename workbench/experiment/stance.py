@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
@@ -16,8 +15,8 @@ from workbench.experiment.moves import Path
 from workbench.experiment.options import EXPERIMENT
 from workbench.experiment.segment import Segment
 from workbench.robot import RobotModel, foot_points, legs
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Body = tuple[float, float, float, float, float, float]
 """Displacement of the base: forward, left, up as shares of the legs' length; roll, pitch, yaw [deg]."""
 
@@ -73,7 +72,8 @@ class BodyMoves:
         return of if all(len(joints) >= 2 for joints in of.values()) else {}
 
     def _pose(self, body: Body) -> dict[str, float] | None:
-        """Angles of the legs' joints that move the base so, its feet where they stand in neutral; None where they cannot."""
+        """Angles of the legs' joints that move the base like this, with the feet where they are in neutral; None if
+        unreachable."""
         k = self.model.kinematics
         out: dict[str, float] = {}
         length = self._length
@@ -96,7 +96,7 @@ class BodyMoves:
         return out
 
     def _opposed(self, foot: str, joints: tuple[str, ...]) -> float:
-        """-1 where hip and knee turn about the same axis, so that one has to go back as the other goes on; else 1."""
+        """-1 where hip and knee turn about the same axis, so that one has to move back as the other moves forward; else 1."""
         k = self.model.kinematics
         poses = k.forward(np.zeros((1, len(k.joints))))
         hip, knee = (poses[k.frames[j].parent][1][0] @ k.frames[j].axis_of_parent for j in joints[-2:])

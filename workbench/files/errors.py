@@ -5,13 +5,13 @@ from __future__ import annotations
 from os import PathLike
 
 _LONGEST = 1000
-"""Letters of a problem; what a library says of a damaged file may go on for pages."""
+"""Longest problem text [characters]; a library's message about a damaged file may fill pages."""
 
 
 class InputError(ValueError):
-    """Bad input, in one readable line: which file, where in it, what was expected. The command line prints it and exits with 2.
+    """Bad input, in one readable line: file, place in it, expected value. The command line prints it and exits with 2.
 
-    source: the file, None where there is none. problem: the place in it, and what was expected.
+    source: the file, None where there is none. problem: the place in it, and the expected value.
     """
 
     def __init__(self, source: str | PathLike[str] | None, problem: str) -> None:
@@ -22,9 +22,13 @@ class InputError(ValueError):
         super().__init__(f"{self.source}: {self.problem}" if self.source else self.problem)
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str | None, str]]:
-        return type(self), (self.source, self.problem)  # so that it comes back whole from another process
+        return type(self), (self.source, self.problem)  # so that it can be pickled to another process
+
+
+class UnknownFolderError(InputError):
+    """A folder that holds no recording of a known format."""
 
 
 class MistypedError(InputError):
-    """What a person wrote wrongly (an unknown joint, a word where a number belongs): a file with it is refused, not left out as
+    """A mistake made by a person (an unknown joint, a word where a number belongs): such a file is refused, not left out as
     damaged."""

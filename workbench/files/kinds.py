@@ -1,4 +1,4 @@
-"""Kinds of files that people bring, by how they begin: what each is, and how to get from it what the workbench reads."""
+"""Kinds of files that people bring, by their first bytes: the name of each, and how to convert it for the workbench."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _LFS = b"version https://git-lfs"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that is not read. name: what it is. remedy: how to get what is read."""
+    """A kind of file that is not read. name: of the kind. remedy: how to convert it."""
 
     name: str
     remedy: str
@@ -67,7 +67,7 @@ _SUFFIXES = {
 
 
 def kind_of_file(head: bytes, suffix: str = "") -> Kind | None:
-    """What a file is that begins with `head` (at least 300 bytes, or all) and has this suffix; None where neither says it."""
+    """The kind of a file that begins with `head` (at least 300 bytes, or all) and has this suffix; None if neither tells."""
     for at, beginning, kind in _BEGINNINGS:
         if head[at:at + len(beginning)] == beginning:
             return kind
@@ -80,4 +80,4 @@ def lfs_pointer(head: bytes) -> str | None:
     """What to say of a file that begins with `head` where that is Git LFS's pointer and not the file itself; else None."""
     if not head.startswith(_LFS):
         return None
-    return "a Git LFS pointer stands in place of the file: run `git lfs pull` where the repository was cloned"
+    return "the file is a Git LFS pointer: run `git lfs pull` where the repository was cloned"

@@ -1,4 +1,4 @@
-"""Checks of the fields of options objects; each raises InputError with the field's name and what was expected."""
+"""Checks of the fields of options objects; each raises InputError with the field's name and the expected value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be added from outside (effects, formats of recordings, servo families): found and checked in one way."""
+"""Plug-ins from other packages (effects, formats of recordings, servo families): all found and checked in the same way."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ S = TypeVar("S")
 
 
 def of_folder(folder: ModuleType, attribute: str, kind: type[T]) -> Iterator[T]:
-    """What the modules of a package offer under one name, a file each."""
+    """The objects of one name that the modules of a package define, one per file."""
     for module in iter_modules(folder.__path__):
         offered = getattr(import_module(f"{folder.__name__}.{module.name}"), attribute, None)
         if isinstance(offered, kind):
@@ -25,11 +25,11 @@ def of_folder(folder: ModuleType, attribute: str, kind: type[T]) -> Iterator[T]:
 
 def with_plug_ins(own: Mapping[str, T], group: str, kind: type[S], called: str, make: Callable[[S, str], tuple[str, T]]
                     ) -> dict[str, T]:
-    """What ships with the workbench, by name, and what the entry points of a group add.
+    """The workbench's own objects, by name, and those that the entry points of a group add.
 
-    kind: what an entry point has to name; make: its name and what it stands for, given where it comes from, for messages; called:
-    the word for one in messages. InputError names package and entry point of what cannot be loaded, is none, or takes a name that
-    is known already.
+    kind: type that an entry point has to name; make: returns the name and the object, given its origin for messages; called:
+    the word for one in messages. InputError names package and entry point of anything that cannot be loaded, has another type,
+    or takes a name that is already known.
     """
     found = dict(own)
     for entry in entry_points(group=group):

@@ -22,7 +22,7 @@ MOST_JSON = 32 << 20
 
 
 def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], T]], Callable[Concatenate[Path, P], T]]:
-    """`lru_cache` for functions of a file (its path comes first): one that was written anew is read anew."""
+    """`lru_cache` for functions of a file (its path comes first): a file that has changed is read again."""
 
     def decorate(read: Callable[Concatenate[Path, P], T]) -> Callable[Concatenate[Path, P], T]:
         @lru_cache(maxsize=maxsize)
@@ -42,8 +42,8 @@ def cached_by_content(maxsize: int) -> Callable[[Callable[Concatenate[Path, P], 
 
 
 def regular_file(path: str | Path, most: int | None = None) -> Path:
-    """The path, where a file lies of at most `most` bytes; InputError for what never ends or waits (devices, pipes), for a folder
-    and for what is not there."""
+    """The path of a file of at most `most` bytes; InputError for files that never end or that wait (devices, pipes), for a folder
+    and for a missing file."""
     path = Path(path)
     try:
         found = path.stat()
@@ -73,7 +73,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def parse_json(path: str | Path, text: str, place: str = "") -> Any:
-    """As `read_json`, of a text that stands at `place` in the file."""
+    """As `read_json`, for a text at `place` in the file."""
     try:
         return json.loads(text, parse_int=_bounded_int, parse_float=_finite_float, parse_constant=_finite_float)
     except json.JSONDecodeError as e:
@@ -108,8 +108,8 @@ def write_whole(path: str | Path, content: str | bytes) -> Path:
 def write_together(folder: str | Path, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Writes files that belong together: all of them, or none. Returns their paths, in the order given.
 
-    What can fail on a full or protected disk is done on temporary names. Old files of these names go before the first
-    new one appears, so that even a power cut leaves no mixture of old and new. InputError names the file.
+    Everything that can fail on a full or protected disk is done under temporary names. Old files of these names are deleted
+    before the first new one appears, so that even a power cut leaves no mixture of old and new. InputError names the file.
     """
     folder = Path(folder)
     paths = [folder / name for name in contents]

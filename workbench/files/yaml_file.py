@@ -1,4 +1,4 @@
-"""YAML that a person wrote, read strictly: what is unknown, missing or of the wrong type is named with its place."""
+"""YAML written by people, read strictly: every unknown, missing or mistyped key is reported with its place."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from workbench.files.reading import read_text
 MOST_BYTES = 1 << 20
 """Largest YAML file that is read [bytes]; a fitted model of a hundred parameters has 0.2 MB."""
 MOST_VALUES = 100_000
-"""Values in one file with every alias written out: a few hundred bytes of aliases of aliases stand for billions."""
+"""Values in one file with every alias expanded: a few hundred bytes of aliases of aliases can expand to billions."""
 MOST_DEPTH = 50
 """Levels of nesting; the deepest file of the workbench has six."""
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -53,8 +53,8 @@ _CoreLoader.add_constructor(f"{_CORE}int", lambda loader, node: int(node.value))
 
 
 def _checked(node: Any, depth: int = 0, sizes: dict[int, int] | None = None) -> int:
-    """How many values a node stands for, its aliases written out; MarkedYAMLError where that, or its depth, is too large, where
-    it holds itself, or a value is not what its tag says."""
+    """Number of values that a node expands to, with its aliases; MarkedYAMLError where that, or its depth, is too large, where
+    it contains itself, or a value does not match its tag."""
     sizes = {} if sizes is None else sizes
     if id(node) in sizes:
         if sizes[id(node)] < 0:
@@ -119,9 +119,9 @@ def read_yaml(path: str | Path) -> Any:
 
 
 class Fields:
-    """A mapping inside a YAML file whose keys are taken one by one; `done` refuses what nobody took.
+    """A mapping inside a YAML file whose keys are taken one by one; `done` rejects keys that nobody took.
 
-    Every error names the file, the place in it (`takes[2].base`) and what was expected.
+    Every error names the file, the place in it (`takes[2].base`) and the expected value.
     """
 
     def __init__(self, path: Path, content: Any, place: str = "") -> None:
@@ -220,7 +220,7 @@ class Fields:
         return [Fields(self.path, v, f"{self.at(key)}[{i}]") for i, v in enumerate(value)]
 
     def only(self, *keys: str) -> None:
-        """InputError at a key that is none of these: a misspelled one is told as such, and not as another that is missing."""
+        """InputError at a key that is none of these: a misspelled key is reported as such, not as another one that is missing."""
         for key in self._left:
             if key not in keys:
                 raise self.error(str(key), f"unknown key; expected one of {', '.join(keys)}")
@@ -259,8 +259,8 @@ def top_of(path: Path, *keys: str) -> Fields:
     """The file's keys, of which none is unknown; its `format` is 1."""
     content = read_yaml(path)
     if not isinstance(content, Mapping):
-        raise InputError(path, "top level: expected a mapping, as a session.yaml or a model.yaml has; this is none "
-                               "(`workbench inspect` says what it is)")
+        raise InputError(path, "top level: expected a mapping, as in a session.yaml or a model.yaml "
+                               "(`workbench inspect` recognises other files)")
     top = Fields(path, content)
     said = top.raw("format")
     if said is None:

@@ -25,6 +25,8 @@ CLAIM = "All numbers are the model's: a speed here is a claim about the model un
 PUPPY_CLAIM = f"{CLAIM} On this model the ROBOTIS walk goes 15.6 cm in six seconds, where the thesis's robot went 37."
 
 
+ADDED = ("asked",)
+"""Fields that the first certificates of format 1 have not."""
 RECORDS: dict[str, type[Any]] = {"nominal": Nominal, "ways": Ways, "cycle": Steadiness}
 """Fields that are records of their own."""
 
@@ -33,12 +35,13 @@ RECORDS: dict[str, type[Any]] = {"nominal": Nominal, "ways": Ways, "cycle": Stea
 class Certificate:
     """What was found out about a gait. Angles in degrees.
 
-    kept: whether every limit is kept. request: in words. tables: sha256 of the tables, by name (gait). margins: of
-    limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the quantiles 0, 5, 50, 95, 100 % over the
-    ensemble (null where there are fewer than 20); falls, how many robots were drawn, and what happened to which. floor: by which
-    steps and contact models move speed and heading. other_engine: the same table elsewhere; empty where there was none. ways: the
-    way in and out. cycle: how steady the gait is from cycle to cycle, and after how many cycles it walks as before where it was
-    entered otherwise or disturbed. provenance: versions, seeds, time.
+    kept: whether every limit is kept. request: in words; asked: the same as `Request.from_plain` reads it. tables: sha256 of the
+    tables, by name (gait). margins: of limits and advice. nominal: numbers on the nominal robot. draws: of each quantity the
+    quantiles 0, 5, 50, 95, 100 % over the ensemble (null where there are fewer than 20); falls, how many robots were drawn, what
+    happened to which, and what is left of their heading once they are straightened. floor: by which steps and contact models move
+    speed and heading. other_engine: the same table elsewhere; empty where there was none. ways: the way in and out. cycle: how
+    steady the gait is from cycle to cycle, and after how many cycles it walks as before where it was entered otherwise or
+    disturbed. provenance: versions, seeds, time.
     """
 
     kept: bool
@@ -54,6 +57,7 @@ class Certificate:
     cycle: Steadiness
     shape: Mapping[str, Any]
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """What the file holds, in plain types, with the sha256 of all the rest."""
@@ -79,6 +83,7 @@ class Certificate:
             falls = f"{d['falls']} fell (below {100 * d['falls at most']:.2g} % at 95 %)"
             lines = [f"{self.request}: {low} {unit} of {d['count']} random variants of the robot, {nominal}",
                      f"{falls}; heading {d['heading deg/m RMS']:.2g} deg/m RMS over them"]
+            lines += _straightened(d.get("straightened"))
             lines += [f"draw {i['draw']} ({i['robot']}): {i['what']}" for i in d["incidents"]]
         worst = max((m for m in self.margins if not m.advice), key=lambda m: m.use)
         lines.append(f"binds: {worst}")
@@ -93,6 +98,15 @@ class Certificate:
             lines.append(f"{e['name']}: {100 * e['speed kept']:.0f} % of the speed, {apart}; over friction, supply and entry "
                          f"speeds differ by {100 * e['largest speed apart']:.0f} % at most")
         return "\n".join(lines)
+
+
+def _straightened(found: Mapping[str, Any] | None) -> list[str]:
+    """What is left of headings after recordings, in a line; nothing where nobody looked."""
+    if not found or found["after one metre deg/m RMS"] is None:
+        return []
+    one, three = found["after one metre deg/m RMS"], found["after 3 metres deg/m RMS"]
+    return [f"straightened by `workbench trim`: {one:.2g} deg/m RMS after one recorded metre, {three:.2g} after three "
+            f"({found['robots']} robots)"]
 
 
 def _returns(cycle: Steadiness) -> str:
@@ -114,7 +128,7 @@ def read_certificate(path: str | Path) -> Certificate:
         good = content["format"] == 1 and digest == _digest(content)
         margins = tuple(Margin(**m) for m in content.pop("margins"))
         kept = {k: from_plain(RECORDS[k], content[k]) if k in RECORDS else content[k]
-                for k in Certificate.__dataclass_fields__ if k != "margins"}
+                for k in Certificate.__dataclass_fields__ if k != "margins" and (k in content or k not in ADDED)}
     except (ValueError, KeyError, TypeError, AttributeError) as e:
         raise InputError(path, f"not a certificate ({type(e).__name__}: {e})") from None
     if not good:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.gait.certificate import Certificate, hashes
@@ -29,15 +28,16 @@ from workbench.gait.requirements import direction_margins, drift, floor_margins,
 from workbench.gait.second_engine import conditions
 from workbench.gait.second_engine import margins as engine_margins
 from workbench.gait.second_engine import summary as engines_summary
+from workbench.gait.straighten import Straightener, heading_gain, trim_margin
+from workbench.gait.straighten import told as straightened
 from workbench.gait.table import GaitTable
 from workbench.motion import PoseTable, load_motion
 from workbench.recording.take import Take
 from workbench.robot import GRAVITY, RobotModel, data_file
+from workbench.types import Progress
 
 __all__ = ["Certified", "CertifyOptions", "OtherEngine", "Progress", "certify"]
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 Work = tuple[str, Callable[..., Any], tuple[Any, ...]]
 """What it is, in words, and what is called with what."""
 
@@ -47,11 +47,12 @@ TOGETHER = 4
 
 @dataclass(frozen=True)
 class Certified:
-    """A certificate and the take of the nominal robot that it speaks of, from power-on to standstill, and its cycles."""
+    """A certificate, the take of the nominal robot that it speaks of, its cycles from power-on to standstill, and the request."""
 
     certificate: Certificate
     take: Take
     cycles: int
+    request: Request
 
 
 def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Sequence[RobotModel], options: CertifyOptions,
@@ -60,7 +61,9 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     began = time.monotonic()
     examiner = Examiner(request.on_slope(machine.model), machine.legs, table, options)
     robots = [request.on_slope(d) for d in draws[:options.draws]]
-    groups = [robots[k:k + TOGETHER] for k in range(0, len(robots), TOGETHER)]
+    groups = _groups(robots)
+    straightener = _straightener(machine, request, table, options) if robots and options.trimmed else None
+    trimmed = _groups(robots[:options.trimmed]) if straightener is not None else []
     variants = sorted(options.variants, key=lambda v: v != "hydroelastic")  # longest first, so that all cores end together
     work: list[Work] = [("nominal robot", examiner.nominal, ())]
     work += [(f"numerics, {v}", examiner.variant, (v,)) for v in variants]
@@ -69,6 +72,7 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     work += [(f"robot {k + 1} of {len(robots)} in Drake", examiner.checked, (r,)) for k, r in enumerate(robots[:options.checked])]
     work += [("back to its cycle", examiner.limit_cycle, (_vendor_table(machine),))] if options.watched else []
     work += [(f"robot {k * TOGETHER + 1} of {len(robots)}", examiner.robots, (g,)) for k, g in enumerate(groups)]
+    work += [(f"robots straightened, {len(g)}", straightener.robots, (g,)) for g in trimmed if straightener]
     results = _all(work, options.n_jobs, progress)
     run: NominalRun = next(results)
     nominal = run.measure
@@ -76,24 +80,42 @@ def certify(machine: GaitMachine, request: Request, table: GaitTable, draws: Seq
     pairs = {c.name: next(results) for c in conditioned}
     checks = _taken(results, len(robots[:options.checked]))
     cycle: LimitCycle | None = next(results) if options.watched else None
-    robots_drawn = [d for group in results for d in group]
+    robots_drawn = [d for group in _taken(results, len(groups)) for d in group]
+    walks = [w for group in results for w in group]
     told, on_draws = draw_summary(request, robots_drawn), [d.measure for d in robots_drawn]
+    if straightener is not None:
+        told["straightened"] = straightened(walks, straightener.gain)
     if checks:
         told["the same in Drake"] = _checked(request, checks, options)
     margins = [*table_margins(machine, table, request.limits), contact_margin(run.near, request.limits),
                *run_margins(machine, nominal, request.limits), slip_margin(machine, request, nominal),
                *direction_margins(request, nominal), *speed_margins(request, nominal, on_draws),
                *draw_margins(machine, request, on_draws), *floor_margins(request, nominal, floor),
-               *([] if cycle is None else [return_margin(cycle, request.limits)])]
+               *([] if cycle is None else [return_margin(cycle, request.limits)]),
+               *([trim_margin(request, walks)] if robots and options.trimmed and request.way != "turn" else [])]
     elsewhere = {} if other is None else engines_summary(request, other[0], pairs)
     margins += [] if other is None else engine_margins(request, other[0], pairs, options.compared)
     certificate = Certificate(
         kept=violation(margins) == 0.0, request=str(request),
-        tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
+        asked=request.to_plain(), tables=hashes(gait=table.whole), model_sha256=machine.model.sha256,
         margins=tuple(margins), nominal=_numbers(machine, request, nominal, run.feet), draws=told, floor=floor,
         other_engine=elsewhere, ways=run.ways, cycle=_cycle(cycle, run.measure, on_draws), shape=asdict(table.shape),
         provenance={**provenance, "certified in": round(time.monotonic() - began, 1)})
-    return Certified(certificate, run.take, run.cycles)
+    return Certified(certificate, run.take, run.cycles, request)
+
+
+def _groups(robots: Sequence[RobotModel]) -> list[Sequence[RobotModel]]:
+    """By TOGETHER."""
+    return [robots[k:k + TOGETHER] for k in range(0, len(robots), TOGETHER)]
+
+
+def _straightener(machine: GaitMachine, request: Request, table: GaitTable, options: CertifyOptions) -> Straightener | None:
+    """What straightens robots that walk this table; None for a gait that cannot be steered."""
+    try:
+        gain, speed = heading_gain(machine, request, table.shape, options.step)
+    except InputError:
+        return None
+    return Straightener(machine.model, request, table.shape, speed, gain, request.limits.spread, options.step)
 
 
 def _taken(results: Iterator[Any], count: int) -> list[Any]:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.sdf import SdfRobot
 from workbench.effects.sdf_values import read_inertia, write_inertia
@@ -19,8 +18,6 @@ from workbench.files.yaml_file import Fields, read_yaml
 from workbench.gait.legs import legs_of
 from workbench.robot import EffectSpec, RobotModel, data_file
 from workbench.robot.model_file import Posterior, parameter_names
-
-Array = NDArray[np.float64]
 
 BUNDLED = "gait_ensemble.yaml"
 RANGES = ("friction", "supply_voltage", "supply_sag", "backlash", "command_delay")

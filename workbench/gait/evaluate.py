@@ -21,7 +21,7 @@ from workbench.gait.requirements import cost as cost_of
 from workbench.gait.requirements import direction_margins, speed_margins
 from workbench.gait.rollouts import Rollouts
 from workbench.gait.shape import GaitShape
-from workbench.gait.table import AT_ONCE, GaitTable, Paths, gait_table, paths_of, table_of
+from workbench.gait.table import GaitTable, Paths, gait_table, paths_of, table_of
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
@@ -119,10 +119,15 @@ class Evaluator:
                                                                             c.nominal, measures)
         return out
 
+    def measured(self, runs: Sequence[tuple[GaitShape, RobotModel]]) -> list[GaitMeasure]:
+        """What each shape does on a robot of its own, which is on the slope already. InputError where a goal is beyond the
+        registers."""
+        return self._measures([(gait_table(self.machine, shape), robot) for shape, robot in runs])
+
     def _table(self, paths: Paths) -> tuple[GaitTable | None, list[Margin]]:
         limits = self.request.limits
         try:
-            table = table_of(self.machine, paths, ways=AT_ONCE, led=bool(paths.off.max() <= limits.reach))
+            table = table_of(self.machine, paths, led=bool(paths.off.max() <= limits.reach))
         except InputError:
             return None, []
         margins = table_margins(self.machine, table, limits)
@@ -133,7 +138,7 @@ class Evaluator:
     def _candidate(self, table: GaitTable | None, margins: list[Margin], nominal: GaitMeasure | None) -> Candidate:
         if table is None:
             beyond = Margin("range", "robot", math.inf, 1.0, "registers", 100.0)
-            return Candidate(gait_table(self.machine, GaitShape(), ways=AT_ONCE), (beyond,))
+            return Candidate(gait_table(self.machine, GaitShape()), (beyond,))
         if nominal is None:
             return Candidate(table, tuple(margins))
         return self._judge(table, margins, nominal, ())

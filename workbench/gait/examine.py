@@ -26,8 +26,8 @@ from workbench.motion import Commands, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 OtherEngine = Callable[[RobotModel, Commands, float], Take]
 """Plays commands for so many seconds on a robot, in an engine that shares no simulation code with this one."""
 Measured = tuple[GaitMeasure, FeetMeasure]
@@ -57,7 +57,8 @@ class CertifyOptions:
     same discrete step is compared. compared_seconds: of walking in each condition in which another engine plays the table too
     [s]; compared: by which share of the nominal speed the two may differ there: contact models differ by a tenth where feet
     slide. variants: of VARIANTS, ways to compute the same, which give the numerical floor, floor_seconds each [s]. watched:
-    cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. n_jobs: processes."""
+    cycles of each run that tells whether the gait comes back to its cycle; 0: nobody looks. trimmed: how many of the draws are
+    straightened by what they record of themselves, metre by metre; 0: none. n_jobs: processes."""
 
     seconds: float = 6.0
     draw_seconds: float = 3.0
@@ -70,11 +71,12 @@ class CertifyOptions:
     compared: float = 0.15
     floor_seconds: float = 2.0
     watched: int = 12
+    trimmed: int = 24
     variants: tuple[str, ...] = tuple(VARIANTS)
     n_jobs: int = 2
 
     def __post_init__(self) -> None:
-        check_whole(self, draws=0, checked=0, watched=0, n_jobs=1)
+        check_whole(self, draws=0, checked=0, watched=0, trimmed=0, n_jobs=1)
         check_positive(self, "seconds", "draw_seconds", "step", "checked_seconds", "checked_step", "floor_seconds",
                        "compared_seconds", "compared")
         for name in self.variants:

@@ -12,8 +12,7 @@ from workbench.gait.legs import Leg
 from workbench.recording import quaternions
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TOUCHING = 1e-3
 """Height of a foot's lowest point [m], over where it stands at rest, below which it carries load: there points of 1e4 N/m give

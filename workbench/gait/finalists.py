@@ -11,9 +11,10 @@ from workbench.gait.examine import CertifyOptions
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.requirements import FALLS
-from workbench.gait.search import Found, Progress, steered
+from workbench.gait.search import Found, steered
 from workbench.gait.space import space_of
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 
 @dataclass(frozen=True)

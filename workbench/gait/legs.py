@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics.machine import Machine
 from workbench.files import InputError
 from workbench.robot import RobotModel
 from workbench.robot.kinematics import Kinematics, cross, rotation_about
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 _STEPS = 12
 """Of Newton's method; the guess is within a few degrees, so that four usually do."""

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.cycles import Scatter, cycles_of, scatter_of
 from workbench.gait.rollouts import Rollouts
@@ -17,8 +16,7 @@ from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
 from workbench.simulation.rollout import BaseState, Start
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 PUSH = 0.1
 """Sideways velocity [m/s] that a push gives the body: a third of a fast gait's speed, 0.15 N s on the puppy."""

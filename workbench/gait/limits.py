@@ -30,13 +30,13 @@ class GaitLimits:
     links [m]: 2 mm for cables and screw heads. lift: height of each foot above the ground, at least once in each cycle [m]: 3 mm,
     twice what a degree of play in a knee lets it hang; where feet drag, the floor decides how they move. slip: speed over the
     ground of feet that touch it, by the body's, on the nominal robot: 0.3; a gait that slides hangs on friction, which is known
-    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.36
-    of the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where
-    the feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot
-    [rad/m]: 3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and
-    latency is seen on its first metre, and another `turn` corrects it: 0.06 rad a stance took 25 and 40 deg/m out of two gaits,
-    one forward and one backward. aside: sideways speed by forward speed. back: cycles within which the gait walks as before
-    when it was entered or disturbed otherwise: 8, two to four seconds.
+    least. slip_on_draws: the same on other robots: 0.6; zero offsets of 1.5 deg and a friction of 0.3 make feet slide at 0.36 of
+    the speed or more in every one of 100 gaits. bus: bit rate of the servo bus [1/s]. tilt: of the base [rad], 30 deg, where the
+    feet's track no longer holds the centre of mass over them. drift: change of heading by distance on the nominal robot [rad/m]:
+    3 deg. spread: the same, RMS over draws [rad/m]: 45 deg. A turn that comes from a robot's own zero offsets and latency is seen
+    on its first metre, and another `turn` corrects it. trimmed: what three recorded metres and three corrections leave of it, RMS
+    over draws [rad/m]: 10 deg; a tenth of a right angle in a metre is for a controller. aside: sideways speed by forward speed.
+    back: cycles within which the gait walks as before when it was entered or disturbed otherwise: 8, two to four seconds.
     """
 
     rms: float | None = None
@@ -51,6 +51,7 @@ class GaitLimits:
     tilt: float = float(np.radians(30))
     drift: float = float(np.radians(3))
     spread: float = float(np.radians(45))
+    trimmed: float = float(np.radians(10))
     aside: float = 0.1
     back: int = 8
 
@@ -103,7 +104,7 @@ def table_margins(machine: GaitMachine, table: GaitTable, limits: GaitLimits) ->
             k = int(np.argmax(np.where(angles[:, i] > 0, angles[:, i] / r.upper, angles[:, i] / r.lower)))
             bound = r.upper if angles[k, i] > 0 else r.lower
             out.append(_of("range", joint, np.degrees(angles[k, i]), np.degrees(bound), "deg", float(angles[k, i] / bound)))
-    no_load = machine.law.full_torque / machine.law.back_emf
+    no_load = machine.law.line.no_load_speed
     for i, joint in enumerate(model.joints):
         asked = float(table.cycle.rates()[:, i].max())
         out.append(_of("moving speed", joint, asked, float(no_load[i]), "rad/s"))

@@ -19,14 +19,11 @@ from workbench.robot import GRAVITY, RobotModel
 from workbench.robot.ranges import JointRange, joint_ranges
 from workbench.robot.servo_units import ServoUnits, units_of
 from workbench.servo import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 CREEP = 0.3
 """Joint speed [rad/s] about which Coulomb friction changes sign in the inverse servo law, so that a pose at a turning point asks
 for none of it."""
-STANDING_KNEES = 1
-"""Which way knees point when the robot folds up, where a robot's neutral does not tell: back."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +96,7 @@ class GaitMachine:
     @cached_property
     def fastest(self) -> NDArray[np.int64]:
         """Moving speed (n,) [counts] that full duty just reaches against the servo's own friction: the most that is asked."""
-        law = self.law
-        reached = np.floor(np.maximum(law.full_torque - law.coulomb, 0) / law.damping / self.speed_unit).astype(np.int64)
+        reached = np.floor(self.law.line.reachable_speed / self.speed_unit).astype(np.int64)
         return np.minimum(reached, [u.fastest for u in self.units])
 
     def angles(self, shape: GaitShape, phases: Array, size: Array | float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d, uniform_filter1d
 
 from workbench.effects.apply import law_of, played
@@ -15,8 +14,7 @@ from workbench.gait.cycles import cycles_of, scatter_of
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.servo import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 FALLEN_TILT, FALLEN_HEIGHT = np.radians(35), 0.55
 """A fall: the base tilts by more [rad], or sinks below this share of its height at rest."""
@@ -170,11 +168,8 @@ def from_plain(content: Mapping[str, object]) -> GaitMeasure:
 
 
 def _torque_use(law: ServoLaw, torque: Array, v: Array, every: float) -> Array:
-    """Largest share (n,) of what a servo has at its speed that is asked for LASTING or longer: full duty less back-EMF, and where
-    the load drives it backwards its friction helps to hold."""
-    along = v * np.sign(torque)
-    line = law.full_torque - law.back_emf * along + np.where(along < 0, law.coulomb - law.viscous * along, 0.0)
-    share = np.abs(torque) / np.maximum(line, 0.02 * law.full_torque)
+    """Largest share (n,) of the torque available at the servo's speed that is needed for LASTING or longer."""
+    share = np.abs(torque) / np.maximum(law.line.available(torque, v), 0.02 * law.full_torque)
     return _lasting(share, every)
 
 

@@ -9,22 +9,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from workbench.files import InputError
-from workbench.files.option_checks import check_whole
+from workbench.files.option_checks import check_choice, check_whole
 from workbench.files.reading import write_together
 from workbench.gait.certificate import MARK, NAME
-from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, Progress, certify
+from workbench.gait.certify import Certified, CertifyOptions, OtherEngine, certify
 from workbench.gait.draws import FEWEST
 from workbench.gait.ensemble import Ensemble
 from workbench.gait.evaluate import Candidate, Evaluator
+from workbench.gait.feasibility import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.finalists import Screening, finalists
 from workbench.gait.limits import Margin, binding, violation
 from workbench.gait.machine import GaitMachine
 from workbench.gait.measure import GaitMeasure, measure
+from workbench.gait.plan_compare import PlanComparison, compare_plan
+from workbench.gait.plan_method import Plans, chosen, plans_of, told_of_plan
 from workbench.gait.planned import planned_seeds
-from workbench.gait.possible import WITHOUT_NEAREST, out_of_reach
 from workbench.gait.request import Request
 from workbench.gait.search import Budget, Found, keeps_all_but_speed, search
 from workbench.gait.shape import GaitShape
@@ -33,9 +35,11 @@ from workbench.motion import Motion, load_motion
 from workbench.motion.files import motion_text
 from workbench.robot import RobotModel, data_file
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Progress
 
 WALK = "robotis_walk.csv"
 """The vendor's walk, whose speed is the one to keep where a request does not say another."""
+Method = Literal["search", "plan", "both"]
 MEMORY = ".rollouts.jsonl"
 """Where a folder remembers what its searches have simulated."""
 
@@ -57,8 +61,9 @@ class OptimizeOptions:
     """How long and from where a gait is searched for. budget: size of the search. certify: the examination at the end. seed: of
     the search; the draws of the search and those of the certificate come from it and differ. n_jobs: threads and processes that
     simulate. given: gaits to start from; planned: whether the search also starts from solved kino-centroidal programmes.
-    screening: how the search's best are tried on fresh robots before the certificate.
-    InputError for a number out of range."""
+    screening: how the search's best are tried on fresh robots before the certificate. method: "search"; "plan": the joint paths
+    of solved programmes as tables, without a search; "both": a search that begins at those, too.
+    InputError for a number out of range, or a method that is not known."""
 
     budget: Budget = field(default_factory=Budget)
     certify: CertifyOptions = field(default_factory=CertifyOptions)
@@ -67,9 +72,11 @@ class OptimizeOptions:
     given: tuple[GaitShape, ...] = ()
     planned: bool = True
     screening: Screening = field(default_factory=Screening)
+    method: Method = "search"
 
     def __post_init__(self) -> None:
         check_whole(self, seed=0, n_jobs=1)
+        check_choice("method", self.method, get_args(Method))
 
 
 @dataclass(frozen=True)
@@ -80,6 +87,7 @@ class Optimized:
     a line: which limit binds, and what works. table: poses in counts and milliseconds (`cycle`, `start` from neutral, `stop`);
     certified: its certificate and the takes of the nominal robot; both of the gait, or of the nearest that keeps every limit, or
     None where there is none. found: how the search ended (best gait, generations, rollouts); None where no search was needed.
+    plan: of a planned gait, what was planned beside what it does.
     """
 
     request: Request
@@ -88,6 +96,7 @@ class Optimized:
     table: GaitTable | None
     certified: Certified | None
     found: Found | None
+    plan: PlanComparison | None = None
 
 
 def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options: OptimizeOptions, progress: Progress,
@@ -101,19 +110,25 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
         draws = _Draws(ensemble, machine.model, options, Path(folder))
         began = time.monotonic()
         evaluator = Evaluator(machine, sought(request), draws.searched(), memory, options.n_jobs)
-        if options.planned:
-            progress("planning seeds", 0.0)
-        planned = planned_seeds(machine, request) if options.planned else ()
-        found = search(evaluator, options.budget, options.seed, progress, (*options.given, *planned))
+        plans = Plans() if options.method == "search" else plans_of(evaluator, progress)
+        found = _sought(evaluator, options, plans, progress)
+        if found is None:
+            return Optimized(request, False, f"{request}: none of {plans.asked} programmes has a table", None, None, None)
         provenance: dict[str, Any] = {
             "workbench": version("drake-workbench"), "drake": version("drake"), "seed": options.seed, "ensemble": ensemble.source,
-            "ensemble_sha256": ensemble.sha256, "generations": found.generations, "rollouts": found.rollouts,
-            "searched in": round(time.monotonic() - began, 1)}
+            "ensemble_sha256": ensemble.sha256, "method": options.method, "generations": found.generations,
+            "rollouts": found.rollouts, "searched in": round(time.monotonic() - began, 1)}
 
-        def examine(shape: GaitShape, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
-            table = gait_table(machine, shape)
-            said = {**provenance, "finalist": finalist}
+        def examine(c: Candidate, examined: CertifyOptions, finalist: int) -> tuple[GaitTable, Certified]:
+            table = gait_table(machine, c.shape)
+            said = {**provenance, "finalist": finalist, **told_of_plan(c, plans)}
             return table, certify(machine, request, table, draws.certifying(), examined, progress, said, other)
+
+        def finished(met: bool, said: str, table: GaitTable, certified: Certified, found: Found) -> Optimized:
+            planned = plans.of(table.shape)
+            comparison = (None if planned is None else
+                          compare_plan(machine, planned, table, certified.take, certified.cycles))
+            return Optimized(request, met, said, table, certified, found, comparison)
 
         refused: list[Candidate] = []
         certified: list[tuple[GaitTable, Certified]] = []
@@ -123,20 +138,30 @@ def optimize(machine: GaitMachine, request: Request, ensemble: Ensemble, options
             if not walked.good:
                 refused.append(walked)
                 continue
-            certified.append(examine(walked.shape, options.certify, k + 1))
+            certified.append(examine(walked, options.certify, k + 1))
             if certified[-1][1].certificate.kept:
-                return Optimized(request, True, "", *certified[-1], replace(found, best=walked))
+                return finished(True, "", *certified[-1], replace(found, best=walked))
             if len(certified) == options.screening.certified:
                 break
         if certified:
             table, best = min(certified, key=lambda c: violation(c[1].certificate.margins))
-            return Optimized(request, False, _unmet(request, best.certificate.margins, None), table, best, found)
+            return finished(False, _unmet(request, best.certificate.margins, None), table, best, found)
         binds = min(refused, key=Candidate.rank, default=found.best)
         nearest = _nearest(found, refused)
         said = _unmet(request, binds.margins, nearest)
         if nearest is None:
             return Optimized(request, False, said, None, None, found)
-        return Optimized(request, False, said, *examine(nearest.shape, _briefly(options.certify), 0), found)
+        return finished(False, said, *examine(nearest, _briefly(options.certify), 0), found)
+
+
+def _sought(evaluator: Evaluator, options: OptimizeOptions, plans: Plans, progress: Progress) -> Found | None:
+    """What a method finds; None where nothing was planned that has a table."""
+    if options.method == "plan":
+        return chosen(evaluator, plans, progress)
+    if options.planned:
+        progress("planning seeds", 0.0)
+    planned = planned_seeds(evaluator.machine, evaluator.request) if options.planned else ()
+    return search(evaluator, options.budget, options.seed, progress, (*options.given, *plans.shapes, *planned))
 
 
 @dataclass(frozen=True)
@@ -189,7 +214,7 @@ def _instead(machine: GaitMachine, request: Request, impossible: Margin, ensembl
     said = f"cannot be met by any gait: {impossible}"
     if impossible.name in WITHOUT_NEAREST:
         return Optimized(request, False, said, None, None, None)
-    look = replace(options, budget=FIRST_LOOK, certify=_briefly(options.certify))
+    look = replace(options, method="search", budget=FIRST_LOOK, certify=_briefly(options.certify))
     nearest = optimize(machine, replace(request, speed=None, aim="speed"), ensemble, look, progress, None, other)
     if nearest.found is not None and nearest.found.best.good:
         said += f"; the nearest table that a first look found goes {_speed(request, nearest.found.best)}"
@@ -223,11 +248,6 @@ def gait_files(table: GaitTable, certified: Certified) -> dict[str, str]:
 def write_gait(folder: Path, table: GaitTable, certified: Certified) -> list[Path]:
     """Writes them, all or none."""
     return write_together(folder, gait_files(table, certified))
-
-
-def shape_from(content: dict[str, Any]) -> GaitShape:
-    """The shape that a certificate holds."""
-    return GaitShape(**{**content, "knees": tuple(content["knees"])})
 
 
 def _unmet(request: Request, margins: Sequence[Margin], nearest: Candidate | None) -> str:

@@ -4,33 +4,67 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.shape import KNEES, GaitShape
-from workbench.gait.trajopt import Task, plan
+from workbench.gait.table import paths_of
+from workbench.gait.trajopt import Planned, Task, plan
 
 MODEST, MODEST_TURN = 0.2, 0.5
-"""Speeds [m/s, rad/s] of seeds where a request says none: CMA-ES goes on from there."""
+"""Speeds [m/s, rad/s] of seeds where a request has none: CMA-ES continues from there."""
+PLANNED = ((2.4, 1.0), (2.4, 1.2), (3.0, 1.0), (3.0, 1.2), (3.0, 1.4))
+"""Frequencies [Hz] and shares of the required speed of the programmes that a request is planned by; tables go a tenth slower than
+their plans."""
 LIFT, CROUCH = 0.11, 0.15
-"""By leg length: low enough that bent hind knees keep their range with what the inverse servo law asks beyond."""
+"""By leg length: low enough that bent hind knees keep their range with the lead that the inverse servo law adds."""
 
 
 def planned_seeds(machine: GaitMachine, request: Request) -> tuple[GaitShape, ...]:
     """Shapes of solved programmes for a request: trots at the speed asked for, or at MODEST, knees both back, and the front ones
     forward if that is allowed."""
     speed = request.speed if request.speed is not None else MODEST_TURN if request.way == "turn" else MODEST
-    ways = {"forward": (speed, 0.0), "arc": (speed, 0.0), "backward": (-speed, 0.0), "sideways": (0.0, request.side * speed),
-            "turn": (0.0, 0.0)}
-    velocity = ways[request.way]
-    turn = request.side * (speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius)
+    velocity, turn = motion_of(request, speed)
     knees = KNEES[:1] if request.built_knees else (KNEES[0], KNEES[2])
     length = machine.leg_length
     trot = GaitShape("trot", poses=12, frequency=2.4, duty=0.6, lift=LIFT * length, crouch=CROUCH * length)
     plans = [plan(machine, Task(str(k), replace(trot, knees=k), velocity, turn, request.slope)) for k in knees]
     return tuple(p.shape for p in plans if p.solved)
+
+
+def table_shape(machine: GaitMachine, planned: Planned) -> GaitShape:
+    """The shape whose table goes through the programme's own joint path, a pose for each knot: offsets are the difference
+    from the nearest foot path. Goals lead by the inverse servo law, as those of any shape do."""
+    shape = replace(planned.shape, poses=len(planned.q), lead=1.0, offsets=())
+    (paths,) = paths_of(machine, [shape])
+    extra = np.roll(planned.q, -1, axis=0) - paths.q  # a cycle's poses begin to arrive a knot after its start
+    return replace(shape, offsets=tuple(tuple(row) for row in extra.tolist()))
+
+
+def tasks_of(request: Request, machine: GaitMachine) -> list[Task]:
+    """The programmes that a request is planned by: trots and walks at its speed and beyond it, of several frequencies and ways of
+    the knees."""
+    speed = request.speed if request.speed is not None else MODEST_TURN if request.way == "turn" else MODEST
+    knees = KNEES[:1] if request.built_knees else (KNEES[0], KNEES[2])
+    length = machine.leg_length
+    out = []
+    for way, (frequency, more) in product(knees, PLANNED):
+        trot = GaitShape("trot", way, poses=12, frequency=frequency, duty=0.6, lift=LIFT * length, crouch=CROUCH * length)
+        velocity, turn = motion_of(request, more * speed)
+        name = f"trot of {frequency:g} Hz, knees {way}, {more:g} of the speed"
+        out.append(Task(name, trot, velocity, turn, request.slope))
+    return out
+
+
+def motion_of(request: Request, speed: float) -> tuple[tuple[float, float], float]:
+    """Velocity forward and left [m/s] and rate of turning [rad/s] of a request at a speed [m/s, for a turn rad/s]."""
+    ways = {"forward": (speed, 0.0), "arc": (speed, 0.0), "backward": (-speed, 0.0), "sideways": (0.0, request.side * speed),
+            "turn": (0.0, 0.0)}
+    turn = request.side * (speed if request.way == "turn" else 0.0 if request.radius is None else speed / request.radius)
+    return ways[request.way], turn
 
 
 def bundled_tasks() -> Sequence[Task]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal, get_args
 
 from workbench.files import InputError
 from workbench.files.option_checks import check_choice
@@ -24,9 +25,11 @@ class Request:
 
     way: "forward", "backward", "sideways", "turn" (in place) or "arc" (forward, curved); the last three to the left, or with
     `right` to the right. speed: at least that much [m/s, for a turn rad/s]; None: as fast as possible. radius: of an arc [m], of
-    nothing else. slope: uphill [rad], negative downhill, within 60 deg. aim: what is optimised once all limits and the speed are
-    kept: "speed", "gentleness" (largest RMS torque by its limit), "energy" (electrical power) or "smoothness" (jerk of the base);
-    all but "speed" need a speed. built_knees: whether knees bend only as in the robot's neutral pose. limits: to keep.
+    nothing else. slope: uphill [rad], negative downhill, within 60 deg. aim: quantity that is optimised once all limits and the
+    speed are kept: "speed", "gentleness" (largest RMS torque by its limit), "energy" (electrical power) or "smoothness" (jerk of
+    the base); all but "speed" need a speed. built_knees: whether knees bend only as in the robot's neutral pose. bias: change of
+    heading by distance [rad/m], to the left, that the robot at hand has of its own: a motion that is trimmed for it turns by as
+    much to the other side on a robot that has none. limits: to keep.
     """
 
     way: Way = "forward"
@@ -36,6 +39,7 @@ class Request:
     slope: float = 0.0
     aim: Aim = "speed"
     built_knees: bool = False
+    bias: float = 0.0
     limits: GaitLimits = field(default_factory=GaitLimits)
 
     def __post_init__(self) -> None:
@@ -51,8 +55,19 @@ class Request:
             raise InputError(None, f"right: expected {', '.join(SIDED[:-1])} or {SIDED[-1]}, got {self.way}")
         if not -math.pi / 3 < self.slope < math.pi / 3:
             raise InputError(None, f"slope: expected within 60 deg, got {math.degrees(self.slope):g}")
+        if not abs(self.bias) < math.inf or (self.bias and self.way == "turn"):
+            raise InputError(None, f"bias: expected a finite number, and none of a turn in place, got {self.bias:g}")
         if self.speed is None and self.aim != "speed":
-            raise InputError(None, f"what is made best is {self.aim}: expected a speed to keep")
+            raise InputError(None, f"the aim is {self.aim}: expected a speed to keep")
+
+    def to_plain(self) -> dict[str, Any]:
+        """Plain types, for a certificate."""
+        return asdict(self)
+
+    @staticmethod
+    def from_plain(content: Mapping[str, Any]) -> Request:
+        """What `to_plain` gave. InputError, TypeError or KeyError where it holds another thing."""
+        return Request(**{**content, "limits": GaitLimits(**content["limits"])})
 
     @property
     def side(self) -> float:
@@ -87,6 +102,8 @@ class Request:
             asked = f"{way}{f' at {self.speed:g} m/s' if self.speed else ' as fast as can be'}"
         asked += " to the right" if self.right else ""
         asked += f", {'up' if self.slope > 0 else 'down'} {math.degrees(abs(self.slope)):g} deg" if self.slope else ""
+        own = f"{math.degrees(abs(self.bias)):.3g} deg/m to the {'left' if self.bias > 0 else 'right'}"
+        asked += f", trimmed for a robot that turns by {own}" if self.bias else ""
         asked += f", RMS torque at most {self.limits.rms:g} N m" if self.limits.rms is not None else ""
         best = {"speed": "", "gentleness": "", "energy": ", least electrical energy", "smoothness": ", smoothest"}
         return asked + best[self.aim]

@@ -1,4 +1,4 @@
-"""How far runs of a gait are from what a request requires, and the cost that a search makes small."""
+"""Distance of a gait's runs from the requirements of a request, and the cost that a search minimises."""
 
 from __future__ import annotations
 
@@ -44,19 +44,22 @@ def direction_margins(request: Request, m: GaitMeasure) -> list[Margin]:
 
 
 def drift(request: Request, m: GaitMeasure) -> float:
-    """Change of heading by distance beyond what the request requires [rad/m]; of a turn, 0."""
+    """Change of heading by distance in excess of the request's [rad/m]; of a turn, 0."""
     if request.way == "turn":
         return 0.0
     return excess_turning(request, m) / max(abs(request.progress(m)), SLOWEST)
 
 
 def excess_turning(request: Request, m: GaitMeasure) -> float:
-    """Rate of turning beyond what the request requires [rad/s], to the left; of a turn, 0."""
+    """Rate of turning in excess of the request's [rad/s], to the left; of a turn, 0."""
     if request.way == "turn":
         return 0.0
-    if request.radius is None:
-        return m.turn_rate
-    return m.turn_rate - request.side * max(abs(request.progress(m)), SLOWEST) / request.radius
+    return m.turn_rate - curvature(request) * max(abs(request.progress(m)), SLOWEST)
+
+
+def curvature(request: Request) -> float:
+    """Change of heading by distance that the request requires of the nominal robot [rad/m], to the left."""
+    return (0.0 if request.radius is None else request.side / request.radius) - request.bias
 
 
 def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> list[Margin]:
@@ -70,13 +73,13 @@ def speed_margins(request: Request, nominal: GaitMeasure, draws: Sequence[GaitMe
             out.append(least("speed of the worse half of draws", "robot", worse_half([request.progress(m) for m in draws]),
                               ROBUST * request.speed, request.unit, "speed"))
         if request.way != "turn":
-            spread = float(np.sqrt(np.mean([min(drift(request, m), 10.0) ** 2 for m in draws])))
+            spread = float(np.sqrt(np.mean([min(abs(drift(request, m)), 10.0) ** 2 for m in draws])))
             out.append(_margin("drift over draws", np.degrees(spread), np.degrees(request.limits.spread), "deg/m RMS"))
     return out
 
 
 def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, Any]) -> list[Margin]:
-    """The required speed again, less what the step moves it. floor: of a certificate."""
+    """The required speed again, after subtracting the numerical floor of the time step. floor: of a certificate."""
     if request.speed is None:
         return []
     surely = request.progress(nominal) - float(floor["steps"])
@@ -84,7 +87,7 @@ def floor_margins(request: Request, nominal: GaitMeasure, floor: Mapping[str, An
 
 
 def cost(machine: GaitMachine, request: Request, nominal: GaitMeasure, draws: Sequence[GaitMeasure]) -> float:
-    """What is made small among gaits that keep all limits, without unit: speed by the robot's natural one, power by weight times
+    """Cost of gaits that keep all limits, to be minimised, without unit: speed by the robot's natural one, power by weight times
     that, jerk by gravity times that by leg length, RMS torque by its limit; and how much headings differ over draws."""
     spread = SPREAD_COST * heading_spread(request, nominal, draws)
     natural, gravity = machine.natural_speed, GRAVITY

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cma
@@ -18,6 +18,7 @@ from workbench.gait.request import Request
 from workbench.gait.requirements import excess_turning
 from workbench.gait.shape import GaitShape
 from workbench.gait.space import Space, seeds, space_of
+from workbench.types import Array, Progress
 
 STEERED = 2
 """How often a gait is steered before the next generation."""
@@ -30,7 +31,6 @@ ALIKE = 4
 """How many seeds of one family and one way of the knees are tried on the ensemble's robots."""
 IN_TURN = 3
 """Generations of each start before the best of them goes on alone."""
-Progress = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)
@@ -207,18 +207,24 @@ class _Refiner:
     """One CMA-ES over the ensemble: what was tried on it comes first, by cost and what it breaks."""
 
     def __init__(self, run: _Run, start: Candidate, seed: int) -> None:
-        self._run, self._family, self._knees = run, start.shape.family, start.shape.knees
+        self._run, self._start = run, start.shape
+        self._family, self._knees = start.shape.family, start.shape.knees
         self.best = start
         options = {"popsize": run.budget.population, "seed": seed, "bounds": [0.0, 1.0], "verbose": -9, "verb_log": 0,
                    "integer_variables": [], "maxiter": 10**6, "tolstagnation": 10**6, "tolfun": 0, "tolx": 0, "tolfunhist": 0}
         x0 = np.clip(run.space.point(start.shape), 0.02, 0.98)
         self._strategy = cma.CMAEvolutionStrategy(x0, run.budget.width, options)
 
+    def _shape(self, x: Array) -> GaitShape:
+        """At a point of the unit cube; what was added to a planned start's angles at its poses stays."""
+        shape, start = self._run.space.shape(x, self._family, self._knees), self._start
+        return replace(shape, poses=start.poses, offsets=start.offsets) if start.offsets else shape
+
     def generation(self) -> None:
         """One generation on the nominal robot, and its better part on the ensemble."""
         run = self._run
         points = [np.asarray(x) for x in self._strategy.ask()]
-        judged = run.evaluator.judged([run.space.shape(x, self._family, self._knees) for x in points], 0)
+        judged = run.evaluator.judged([self._shape(x) for x in points], 0)
         judged = steered(run.evaluator, run.space, judged)
         better = sorted(range(len(judged)), key=lambda k: judged[k].merit)[:math.ceil(TRIED * len(judged))]
         better = [k for k in better if judged[k].nominal is not None]

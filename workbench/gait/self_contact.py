@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Role, SceneGraph
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
 from workbench.robot import ConfigureParser, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FAR = 0.02
 """Distance [m] from which it is not looked closer."""
 

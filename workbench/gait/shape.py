@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from workbench.gait.legs import Leg
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 FAMILIES = MappingProxyType({
     "trot": (0.0, 0.5, 0.5, 0.0), "walk": (0.0, 0.5, 0.75, 0.25), "crawl": (0.0, 0.5, 0.75, 0.25), "bound": (0.0, 0.0, 0.5, 0.5),
@@ -27,13 +27,14 @@ KNEES = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 class GaitShape:
     """One gait. Lengths m, angles rad, shares of a cycle 0 to 1.
 
-    family: of FAMILIES. knees: of KNEES. poses: in a cycle. frequency: cycles a second [Hz].
-    stride: forward, and side: to the left, that a foot goes back over the ground in one stance [m]; turn: by which the body turns
-    meanwhile [rad]. duty: share of the cycle on the ground. lift: of the foot. crouch: of the body below neutral. nose: by which
-    the front stands higher than the hind [m]. front, hind: where the feet's paths are centred, forward of neutral. spread: feet
-    apart, outwards. sway: of the body to the side, with `sway_phase` of the cycle. apex: early or late swing. push: of the
-    foot into the ground in mid stance. difference: stride of front feet more than hind. lag: of the hind feet's phase.
-    lead: share of what the inverse servo law asks beyond the angles. hurry: moving speed over travel by dwell.
+    family: of FAMILIES. knees: of KNEES. poses: in a cycle. frequency: cycles a second [Hz]. stride: forward, and side: to the
+    left, that a foot goes back over the ground in one stance [m]; turn: by which the body turns meanwhile [rad]. duty: share of
+    the cycle on the ground. lift: of the foot. crouch: of the body below neutral. nose: by which the front stands higher than the
+    hind [m]. front, hind: where the feet's paths are centred, forward of neutral. spread: feet apart, outwards. sway: of the body
+    to the side, with `sway_phase` of the cycle. apex: early or late swing. push: of the foot into the ground in mid stance.
+    difference: stride of front feet more than hind. lag: of the hind feet's phase. lead: share of the lead over the angles that
+    the inverse servo law gives. hurry: moving speed over travel by dwell. offsets: angles [rad] added to those of the foot path,
+    a row of all the model's joints for each pose; empty: none.
     """
 
     family: str = "trot"
@@ -58,6 +59,7 @@ class GaitShape:
     lag: float = 0.0
     lead: float = 0.0
     hurry: float = 1.0
+    offsets: tuple[tuple[float, ...], ...] = ()
 
     @property
     def phases(self) -> Array:
@@ -68,6 +70,15 @@ class GaitShape:
     def period(self) -> float:
         """Of a cycle [s]."""
         return 1 / self.frequency
+
+    @staticmethod
+    def from_plain(content: Mapping[str, Any]) -> GaitShape:
+        """The shape that a certificate holds. KeyError, TypeError or ValueError where it holds another thing."""
+        known = {f.name for f in fields(GaitShape)}
+        if "family" not in content or not set(content) <= known:
+            raise KeyError("family")
+        rows = tuple(tuple(float(a) for a in row) for row in content.get("offsets", ()))
+        return GaitShape(**{**content, "knees": tuple(content["knees"]), "offsets": rows})
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,7 @@ class FootPath:
 def foot_path(shape: GaitShape, legs: Sequence[Leg], phases: Array, size: Array | float = 1.0) -> FootPath:
     """Of a shape at phases (N,), with strides and lifts times `size`, one for each or one for all.
 
-    On the ground a foot goes straight back at an even pace, by what the body advances and turns at its place; in the air it comes
+    On the ground a foot goes straight back at an even pace, as the body advances and turns above it; in the air it comes
     forward on half a cosine and up on half a sine. Which foot is which follows from where it is in neutral.
     """
     neutral, size = np.array([leg.neutral for leg in legs]), np.broadcast_to(size, np.shape(phases))[:, None]

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.machine import GaitMachine
 from workbench.gait.request import Request
 from workbench.gait.shape import FAMILIES, KNEES, GaitShape
 from workbench.gait.table import Paths, paths_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 LENGTHS: Mapping[str, tuple[float, float]] = {
     "lift": (0.03, 0.28), "crouch": (0.05, 0.45), "nose": (-0.12, 0.12), "front": (-0.25, 0.25), "hind": (-0.25, 0.25),

@@ -8,17 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files import InputError
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape
 from workbench.motion import Commands, PoseTable
+from workbench.types import Array
 
-Array = NDArray[np.float64]
-
-GENTLY = (700, 300)
-"""Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.7 s are 1 rad/s, a fifth of
-what the servos reach, so that the robot is not thrown."""
-AT_ONCE = (250, 50)
-"""The same where nothing but the gait that follows is looked at."""
+WAYS = (600, 150)
+"""Dwells [ms] of the way between neutral and the gait's stance, and of the rest in it: 40 deg in 0.6 s are 1.2 rad/s, a fifth of
+the servos' fastest, so that the robot is not thrown. Search and certificate play the same bytes."""
 HALF = 0.5
 """Size of strides and lifts in the first and the last cycle."""
 
@@ -38,7 +36,7 @@ class GaitTable:
 
     @property
     def whole(self) -> PoseTable:
-        """What is played from power-on to standstill, as one table of three sections: what a certificate speaks of."""
+        """The motion from power-on to standstill as one table of three sections, which is the one that is certified."""
         return PoseTable.in_sections(self.start, self.cycle, self.stop)
 
     def commands(self, cycles: int, whole: bool = False) -> Commands:
@@ -56,11 +54,10 @@ class GaitTable:
         return float(self.cycle.dwells_ms.sum()) / 1000
 
 
-def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait", ways: tuple[int, int] = GENTLY) -> GaitTable:
-    """The table of a shape, rounded to counts and milliseconds. ways: dwells [ms] from neutral to the gait's stance, and in it.
-    InputError where a goal is beyond the registers."""
+def gait_table(machine: GaitMachine, shape: GaitShape, source: str = "gait") -> GaitTable:
+    """The table of a shape, rounded to counts and milliseconds. InputError where a goal is beyond the registers."""
     (paths,) = paths_of(machine, [shape])
-    return table_of(machine, paths, source, ways)
+    return table_of(machine, paths, source)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,20 +79,29 @@ def paths_of(machine: GaitMachine, shapes: Sequence[GaitShape]) -> list[Paths]:
     for shape in shapes:
         sizes = np.repeat([1.0, HALF, 0.0], [shape.poses, shape.poses, 1])
         wanted.append((shape, np.concatenate([shape.phases, shape.phases, [0.0]]), sizes))
-    return [Paths(shape, every[:shape.poses], every[shape.poses:2 * shape.poses], every[2 * shape.poses:], off[:shape.poses],
-                  stances[:shape.poses]) for shape, (every, off, stances) in zip(shapes, machine.angles_of(wanted))]
+    return [_paths(shape, every, off, stances) for shape, (every, off, stances) in zip(shapes, machine.angles_of(wanted))]
 
 
-def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tuple[int, int] = GENTLY, led: bool = True
-             ) -> GaitTable:
-    """`gait_table` of paths that are known. led: whether goals are ahead of the angles by what the inverse servo law requires;
+def _paths(shape: GaitShape, every: Array, off: Array, stances: NDArray[np.bool_]) -> Paths:
+    """Of one shape, from its angles at the poses of the cycle, of the small cycle, and in its stance. InputError for offsets of
+    another number of poses or joints."""
+    P, extra = shape.poses, np.array(shape.offsets)
+    if not shape.offsets:
+        extra = np.zeros_like(every[:P])
+    if extra.shape != every[:P].shape:
+        raise InputError(None, f"offsets: expected {P} rows of {every.shape[1]} angles, got {extra.shape}")
+    return Paths(shape, every[:P] + extra, every[P:2 * P] + HALF * extra, every[2 * P:], off[:P], stances[:P])
+
+
+def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", led: bool = True) -> GaitTable:
+    """`gait_table` of paths that are known. led: whether goals lead the angles as the inverse servo law requires;
     that takes most of the time, and no path that feet cannot reach is worth it."""
     shape, q, small, stand = paths.shape, paths.q, paths.small, paths.stand
     goals = _within(machine, q, q + shape.lead * machine.droop(shape, q, paths.stance)) if led and shape.lead else q
     dwells = _dwells(shape)
     cycle = _table(machine, goals, np.vstack([goals[-1:], goals[:-1]]), dwells, shape.hurry, source)
     neutral = np.zeros_like(stand)
-    there, back = np.array(ways), np.array(ways[::-1])
+    there, back = np.array(WAYS), np.array(WAYS[::-1])
     start = [_table(machine, np.vstack([stand, stand]), np.vstack([neutral, stand]), there, 1.0, source),
              _table(machine, small, np.vstack([stand, small[:-1]]), dwells, shape.hurry, source)]
     stop = [_table(machine, small, np.vstack([goals[-1:], small[:-1]]), dwells, shape.hurry, source),
@@ -104,7 +110,7 @@ def table_of(machine: GaitMachine, paths: Paths, source: str = "gait", ways: tup
 
 
 def _within(machine: GaitMachine, q: Array, goals: Array) -> Array:
-    """Goals no farther than joints turn, unless the path itself is: what is commanded beyond the angles ends there."""
+    """Goals no farther than joints turn, unless the path itself is: a lead beyond the angles ends there."""
     lower, upper = machine.bounds
     half = np.array([u.count for u in machine.units]) / 2
     return np.clip(goals, np.minimum(q, lower + half), np.maximum(q, upper - half))
@@ -126,7 +132,7 @@ def _table(machine: GaitMachine, goals: Array, before: Array, dwells: NDArray[np
 
 
 def joined(parts: list[PoseTable], source: str) -> PoseTable:
-    """One table without sections, of the poses of all parts in turn; of the same joints."""
+    """One table without sections: the poses of one part after the other, all of the same joints."""
     first = parts[0]
     goals, speeds, dwells = (np.concatenate([getattr(p, f) for p in parts]) for f in ("goals", "speeds", "dwells_ms"))
     return PoseTable(first.joints, goals, speeds, dwells, source, first.units)

@@ -20,8 +20,7 @@ from workbench.gait.legs import Leg
 from workbench.gait.machine import GaitMachine
 from workbench.gait.shape import GaitShape, foot_path
 from workbench.robot import GRAVITY
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 KNOTS = 16
 TORQUE_SHARE = 0.8
@@ -31,7 +30,6 @@ FRICTION_SHARE = 0.9
 LARGEST_TILT = 0.25
 """[rad] up to which the programme's small rotations are right to 1 %."""
 MOST_ITERATIONS = 300
-
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,8 @@ class Task:
 @dataclass(frozen=True)
 class Planned:
     """What came out. solved: whether a solver says so; solver, seconds: which, and how long. q (N, n) [rad] at the knots, of all
-    joints; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m] of the base off the frame that goes along; shape: the gait nearest
-    to it in numbers, a seed."""
+    joints; stance (N, F); forces (N, F, 3) [N]; p (N, 3) [m], tilt (N, 3) [rad] of the base off the frame that goes along; shape:
+    the gait nearest to it in numbers, a seed."""
 
     task: Task
     solved: bool
@@ -60,6 +58,7 @@ class Planned:
     stance: NDArray[np.bool_]
     forces: Array
     p: Array
+    tilt: Array
     shape: GaitShape
 
 
@@ -202,7 +201,7 @@ class _Programme:
         p, tilt, place = get(self.p), get(self.tilt), get(self.place)
         forces = get(self.f).reshape(self.N, len(self.legs), 3)
         return Planned(self.task, bool(told.is_success()), told.get_solver_id().name(), seconds, q,  # type: ignore[attr-defined]
-                       self.path.stance, forces, p, self._nearest(p, tilt, place))
+                       self.path.stance, forces, p, tilt, self._nearest(p, tilt, place))
 
     def _nearest(self, p: Array, tilt: Array, place: Array) -> GaitShape:
         neutral = np.array([leg.neutral for leg in self.legs])

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.fitting.fit import Fit
@@ -28,13 +27,13 @@ from workbench.identify.results.reasons import Dependence, Outdone, Reason, Scre
 from workbench.identify.results.ties import Tie
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.model_file import Posterior, parameter_names
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.selection.candidate_fit import CandidateFit
     from workbench.identify.selection.model_comparison import NamePosterior, Rival
     from workbench.identify.selection.record import SelectionStep
 
-Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 
 
@@ -43,7 +42,7 @@ class ReadOff(Protocol):
 
     @property
     def spec(self) -> EffectSpec:
-        """What was found, as the model takes it."""
+        """The estimate as an effect of the model."""
     @property
     def mean(self) -> float:
         """Of its first parameter."""
@@ -52,8 +51,9 @@ class ReadOff(Protocol):
         """Of that mean."""
 
 
-def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[Unexplained]) -> Verdict:
-    """The word for it in docs/formats.md; what has a name that is less likely than not is not explained by it."""
+def verdict_of(gap: bool, findings: Sequence[Finding], left: Sequence[object]) -> Verdict:
+    """The verdict's word in docs/formats.md; a finding that is less probable than not explains nothing. left: unexplained
+    residuals."""
     if not gap:
         return "no_gap"
     if not findings:
@@ -82,7 +82,8 @@ def finding(evidence: Sequence[TakeEvidence], fit: Fit, i: int, posterior: NameP
 
 
 def _family(c: Candidate, confidence: float, others: Sequence[Rival]) -> FamilyBelief | None:
-    """An effect's family, if it has one, with what rivals of the same family at its place, or of the whole robot, add."""
+    """An effect's family, if it has one, with the probability of rivals of the same family at its joint or link, or of the whole
+    robot, added."""
     family = c.effect.family
     if family is None:
         return None
@@ -151,7 +152,7 @@ def rejected(
     posteriors: Sequence[NamePosterior],
     before: Residuals,
 ) -> tuple[Rejected, ...]:
-    """Rivals that were fitted and lost, and why: those put in a finding's place with what they leave on unseen stretches."""
+    """Rivals that were fitted and lost, and why: each replacement of a finding with its residuals on unseen stretches."""
     unseen = any(e.uses["validate"].any() for e in evidence)
     kept = {c.key for c in fit.effects} | {r.candidate.key for c, s in zip(fit.effects, posteriors) for r in _elsewhere(c, s)}
     out: dict[object, Rejected] = {}
@@ -181,10 +182,10 @@ def _why_not(r: SelectionStep, t: CandidateFit) -> Reason:
 
 
 def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-    """Channels that stay beyond 1.3 times noise, floor and spread on stretches that nothing saw, with what they depend on.
+    """Channels that exceed 1.3 times noise, floor and spread on unseen stretches, with the signal they correlate with.
 
     residuals: of takes that are judged. floors: by take, numerical floor (c,) over sigma of the fitted model, which may be
-    rougher than the nominal one's."""
+    larger than the nominal one's."""
     out = []
     for i in sorted(residuals):
         e = evidence[i]
@@ -200,7 +201,7 @@ def unexplained(evidence: Sequence[TakeEvidence], residuals: Residuals, floors: 
 
 
 def _dependence(e: TakeEvidence, residual: Array, channel: str) -> Dependence:
-    """What a residual goes with most: its joint's angle, speed, direction, or time."""
+    """The signal with which a residual correlates most: its joint's angle, speed, direction, or time."""
     signals: dict[Signal, Array] = {"time": e.take.recorded.time}
     if channel not in BODY:
         q = e.take.recorded.q[:, e.take.recorded.column(joint_of(channel))]
@@ -224,8 +225,8 @@ def ties(nominal: RobotModel, fit: Fit, posteriors: Sequence[NamePosterior]) -> 
 
 
 def posterior(fit: Fit, read_off: Sequence[ReadOff] = ()) -> Posterior:
-    """Of all numbers in the units of docs/formats.md; variances by the local slope between a size and its value. read_off:
-    effects of one number that no fit identified."""
+    """Joint posterior in the units of docs/formats.md; variances by the local slope between a size and its value. read_off:
+    effects of one parameter that were estimated directly."""
     if not fit.effects and not read_off:
         return Posterior()
     names = list(parameter_names([c.spec(x) for c, x in fit.sizes()]))

@@ -14,7 +14,7 @@ from workbench.compare.channels import ACROSS
 from workbench.compare.compare_session import provenance
 from workbench.compare.logged import how_logged
 from workbench.compare.session import Base, Session
-from workbench.compare.session_takes import Progress, ReadTake, no_progress, read_takes
+from workbench.compare.session_takes import ReadTake, read_takes
 from workbench.effects.registry import effect_named
 from workbench.identify.conclusions import Residuals, change, verdict_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed
@@ -23,7 +23,6 @@ from workbench.identify.estimators.registers import read_off_registers
 from workbench.identify.estimators.stops_and_mounts import read_off_candidates
 from workbench.identify.evidence.explain import explained_by_evidence, is_by_logs
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
-from workbench.identify.explained import Explained, Problem
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
 from workbench.identify.judge import COMPILED, EnginesPartError, judged
@@ -36,11 +35,13 @@ from workbench.identify.results.findings import Diagnosis
 from workbench.identify.results.take_report import TakeReport
 from workbench.identify.results.ties import ObservationModel, Tie, observation_models
 from workbench.identify.rollouts.evaluator import RolloutEvaluator
+from workbench.identify.search_result import Problem, SearchResult
 from workbench.identify.selection.explanation import explained_by_selection
 from workbench.identify.subset import subset_used
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 
 BESIDE_DRAKE = "{} model apart from Drake [sigma]"
 
@@ -78,7 +79,7 @@ class _Settings:
         return EvidenceOptions(drift=None if self.previous is None else SinceThen())
 
     def provenance(self) -> dict[str, object]:
-        """What the results say of them."""
+        """These options, as the results record them."""
         since = {} if self.previous is None else {"model before": self.previous.sha256}
         return since | ({"without": sorted(self.without)} if self.without else {})
 
@@ -86,13 +87,12 @@ class _Settings:
 def diagnose_session(session: Session, progress: Progress = no_progress, n_jobs: int = 2, memory: Path | None = None,
                      thorough: bool = False, without: Sequence[str] = (), previous: RobotModel | None = None,
                      engine: str = "auto") -> DiagnosisResult:
-    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that keeps every
+    """Diagnoses a session. Damaged takes are left out and named; InputError where none remains. memory: folder that caches every
     rollout's channels, so that a killed run resumes. thorough: searches to the end, however long it takes. without: names of
-    effects that are known not to be there, and are not looked for; InputError where one is no effect. previous: the robot as an
-    earlier diagnosis left it, whose servos and effects are then nominal, so that findings are what is new; InputError where that
-    is another robot. Rollouts are the compiled
-    station's where it knows the physics, unless Drake says otherwise of the nominal or of the final model, or `engine` is
-    "drake"."""
+    effects that are known to be absent, and are not searched for; InputError for an unknown effect. previous: the robot of an
+    earlier diagnosis, whose servos and effects are taken as nominal, so that findings are the changes since; InputError where
+    that is another robot. Rollouts are compiled where the compiled station supports the model, unless Drake disagrees on the
+    nominal or on the final model, or `engine` is "drake"."""
     config = SimulationConfig(settle=0.6, contact_period=0, time_step=PROBLEM.time_step)
     absent = frozenset(effect_named(name).name for name in without)
     settings = _Settings(progress, n_jobs, memory, thorough, absent, time.monotonic(), previous)
@@ -140,7 +140,7 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     pool = [c for c in pool if settings.searches(c.effect.name)]
 
     # 4. Which effects explain it: servo logs by evidence, filmed takes by forward selection
-    search: Callable[[Problem], Explained] = explained_by_selection
+    search: Callable[[Problem], SearchResult] = explained_by_selection
     if gap and is_by_logs(evidence):
         search = explained_by_evidence
     found = search(Problem(evaluator, known.model, begun.residuals, pool, replace(played, missed=missed), settings.thorough,
@@ -155,28 +155,31 @@ def _diagnosed(session: Session, config: SimulationConfig, settings: _Settings, 
     findings = (*(m.finding(*(change(evidence, (m.where,), nominal.residuals, after, use) for use in ("fit", "validate")))
                   for m in build.measured), *(m.finding() for m in found.missed),
                 *found.findings(evidence, nominal.residuals, after))
+    unknown = found.unknown_torques(evidence, nominal.residuals, after)
     left = found.unexplained(evidence, after, floors) if gap else ()
 
     # 6. Conclusions
     # what no effect could be told from, and unseen stretches do not show, is in the ledger, but is no gap
-    slight = not findings and not left and found.is_slight()
+    slight = not findings and not unknown and not left and found.is_slight()
     progress("rolling out the fitted model", None)
     diagnosis = Diagnosis(
-        verdict=verdict_of(bool(gap) and not slight, findings, left),
+        verdict=verdict_of(bool(gap) and not slight, findings, (*left, *unknown)),
         model=found.calibrated.with_effects((*fitted.effects, *(m.spec for m in found.missed))), nominal=session.model,
         gap=gap, findings=findings, rejected=found.rejected(nominal.residuals), unexplained=left,
         posterior=found.posterior((*build.measured, *found.missed)),
         provenance=provenance(session.model, config, time.monotonic() - settings.began) | settings.provenance()
         | {"seed": 0, "rollouts": evaluator.rollouts, "engine": {**engine, **apart}}
         | subset_used(found.looked_at) | how_logged([e.take for e in evidence]),
-        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated)
-    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if findings or found.recalibrated else None)
+        stopped=found.stopped, left_out=unreadable + seen.left_out, recalibrated=found.recalibrated,
+        unknown_torques=unknown, tied=found.tied)
+    changed = bool(findings or unknown or found.recalibrated)
+    reports = _reports(evaluator, seen.nominal, nominal.residuals, after, fitted if changed else None)
     return DiagnosisResult(diagnosis, reports, found.ties(), observation_models(evidence))
 
 
 def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, nominal: Fit) -> Geometry:
-    """What was measured of the robot's geometry, unless with that in the model the takes are told worse; not always better, as
-    beside what else is missing the right leg may walk the wrong way."""
+    """The measured geometry of the robot, unless it makes the residuals larger; it need not make them smaller, since combined
+    with other missing effects even the right leg length may walk the wrong way."""
     if not build.measured:
         return build
     there = Search(evaluator, build.added_to(model)).evaluated([])
@@ -185,7 +188,7 @@ def _believed(build: Geometry, evaluator: RolloutEvaluator, model: RobotModel, n
 
 
 def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake], progress: Progress) -> RolloutEvaluator:
-    """Rollouts beside the robot with its measured geometry: what steps and contact models leave open is another robot's."""
+    """Rollouts of the robot with its measured geometry, whose numerical floor and contact spread are its own."""
     read = [replace(t, model=known.model_of(t.spec)) for t in takes]
     return evaluator.on(prepared(known, read, evaluator.config, evaluator.n_jobs, progress).evidence)
 
@@ -193,7 +196,7 @@ def _again(evaluator: RolloutEvaluator, known: Session, takes: Sequence[ReadTake
 def _reports(
     evaluator: RolloutEvaluator, nominal: Mapping[str, Take], before: Residuals, after: Residuals, fitted: RobotModel | None
 ) -> tuple[TakeReport, ...]:
-    """What each take was and is. fitted: the model with its effects; None: nothing was found."""
+    """Each take before and after. fitted: the model with its effects; None: nothing was found."""
     was = [e.take.observed(nominal[e.name]) for e in evaluator.evidence]
     now = was if fitted is None else evaluator.observed(fitted, evaluator.config)
     out = []

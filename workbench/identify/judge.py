@@ -1,6 +1,6 @@
-"""Drake judges what the compiled station says.
+"""Drake checks the compiled station.
 
-Every diagnosis rolls its nominal and its final model out by both. Where they part, its rollouts are Drake's from the start.
+Every diagnosis rolls out its nominal and its final model in both engines. If they disagree, it starts again with Drake alone.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ COMPILED = "the compiled station"
 
 
 class EnginesPartError(ArithmeticError):
-    """The compiled station and Drake part on a model; the text says by how much."""
+    """The compiled station and Drake disagree on a model; the text gives the difference."""
 
 
 def judged(evaluator: RolloutEvaluator, model: RobotModel, name: str) -> float:
-    """By how much the engine of a search and Drake part on a model, RMS over sigma of the worst channel, of one take nearly whole
-    and of the others' beginnings. 0 where rollouts are Drake's already. EnginesPartError beyond `ProblemOptions.engines_apart`;
-    name: of the model, for its text."""
+    """Difference between the engine of a search and Drake on a model, RMS over sigma of the worst channel, of one take nearly
+    whole and of the others' beginnings. 0 where rollouts are Drake's already. EnginesPartError beyond
+    `ProblemOptions.engines_apart`; name: of the model, for its text."""
     if evaluator.config.engine == "drake":
         return 0.0
     drake = RolloutEvaluator(evaluator.evidence, replace(evaluator.config, engine="drake"), evaluator.n_jobs, evaluator.memory)

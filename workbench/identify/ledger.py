@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS, BODY, joint_of
 from workbench.compare.footfalls import foot_phases
@@ -13,16 +12,15 @@ from workbench.effects.base import Layer
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps, in_file_units, ratios, smoothed
 from workbench.identify.results.findings import GapEntry
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def ledger(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> tuple[GapEntry, ...]:
     """The entries, the largest first.
 
-    A joint is booked in the layer that its residual speaks of: timing where it goes with a lag that grows, or that most joints
-    share; structure where it lies across the servo's axis; ground where it is well on a fixed base; else actuator. The body is
-    booked where no joint explains it: as inertia where it leans or sinks, as ground where it goes or turns another way.
+    A joint is booked in the layer that its residual points to: timing where it correlates with a lag that grows, or that most
+    joints share; structure where it lies across the servo's axis; ground where it has no gap on a fixed base; else actuator. The
+    body is booked where no joint explains it: as inertia where it leans or sinks, as ground where it moves or turns another way.
     """
     ill = {i: channel_gaps(e, residuals[i]) for i, e in enumerate(evidence)}
     fixed = [i for i, e in enumerate(evidence) if e.take.spec.base == "fixed"]
@@ -60,7 +58,7 @@ def layer_of(channel: str, late: bool, only_on_the_ground: bool) -> Layer:
 
 
 def _late(e: TakeEvidence, residual: Array, joints: Sequence[str]) -> set[str]:
-    """Joints whose residual is mostly a lag, where most ill joints are alike in that: sent late, not moved wrongly."""
+    """Joints whose residual is mostly a lag, where most joints with a gap share it: commands sent late, not wrong motion."""
     time = e.take.recorded.since_start
     mostly = set()
     for c in joints:
@@ -90,7 +88,7 @@ def _when(e: TakeEvidence, residual: Array) -> tuple[tuple[float, float], ...]:
 
 def _phase(e: TakeEvidence, residual: Array, channel: str) -> str:
     """Stance or swing of the joint's leg on the ground, moving or holding on a fixed base: where the error is at least twice
-    as strong; empty where both alike."""
+    as large; empty where both are similar."""
     if channel in BODY:
         return ""
     if e.take.spec.base == "free":

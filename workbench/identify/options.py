@@ -11,7 +11,7 @@ class ProblemOptions:
     """From recordings to residuals: rollouts, windows, stretches, gaps."""
 
     time_step: float = 2e-3
-    """Of the rollouts [s]. What this step is wrong by on the nominal robot, as finer ones tell, is taken off all of them."""
+    """Time step of the rollouts [s]. Its error on the nominal robot, from finer steps, is subtracted from every residual."""
     coarse: float = 2.0
     """Time step of a first look, in search steps: good for differences alone."""
     fine: float = 0.25
@@ -28,35 +28,41 @@ class ProblemOptions:
     settles: float = 0.1
     """After a base reset, until feet have found the floor again [s]: a millimetre's fall takes 15 ms."""
     forgets: float = 0.3
-    """For so long after the first command of a log that does not begin at rest in neutral nothing is judged [s]: its velocity
-    there is told by a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
+    """Time after the first command of a log that does not begin at rest in neutral which is not judged [s]: its initial velocity
+    is estimated from a few noisy positions, and a servo takes two or three times its rise time to forget an error of it."""
     pose_frames: int = 7
     """Frames over which the recorded base's pose and velocity are read, by a parabola: 60 ms at 120 Hz."""
     state_span: float = 0.06
-    """Of positions of a servo log from which a state is told that a window starts from [s]: about a servo's rise time."""
+    """Span of the positions of a servo log from which the state at a window's start is estimated [s]: about a servo's rise
+    time."""
     state_order: int = 3
     """Of the polynomial through them: over so long a servo's acceleration changes."""
     states_kept: int = 256
     """Takes and horizons of which states are kept, as they are played again and again."""
+    loaded: float = 1.0
+    """Torque of gravity, in dry frictions, from which on a joint is loaded: friction holds against less, so that nothing moves in
+    its gear."""
+    poses_sampled: int = 50
+    """Poses of a log from which its load is read: it changes with the angle alone."""
     block: float = 0.4
     """Length of a stretch [s]."""
     uses: tuple[str, ...] = ("fit", "choose", "fit", "validate")
-    """What each of consecutive stretches is for: two are fitted, one decides, one validates."""
+    """Use of consecutive stretches: two are fitted, one decides, one validates."""
     part: float = 0.1
     """Length of a part [s]: on a fixed base, a joint forgets within one."""
     parts: int = 3
-    """On a fixed base, every so many parts of what does not validate, one decides: a joint may meet its stop but once."""
+    """On a fixed base, one in so many parts that do not validate decides: a joint may meet its stop only once."""
     deciding_part: int = 1
     """Which of these."""
     least_body_sigma: tuple[float, ...] = (1e-3, 1e-3, 0.01, 5e-4, 0.004, 0.004)
     """Of the body's channels [m, m, rad, m, rad, rad]: below this no contact model is believed."""
     late: float = 0.1
-    """By how much every model may shift an estimated start [s]: a robot whose servos got each other's speeds sets out so unlike
-    the nominal one that its start was estimated 62 ms early."""
+    """Shift of an estimated start that every model is allowed [s]: a robot whose servos received each other's speeds sets out so
+    unlike the nominal one that its start was estimated 62 ms early."""
     shifts: int = 4
     """Steps in which the start is shifted."""
     smoothing: float = 0.065
-    """Span of the running mean in which a gap is looked for [s]: noise averages out, what a model lacks does not."""
+    """Span of the running mean in which a gap is looked for [s]: noise averages out, model errors do not."""
     gap_ratio: float = 1.3
     """RMS over sigma from which on a channel has a gap. Quiet practice recordings stay below 1.15."""
     gap_ratio_smoothed: float = 2.0
@@ -67,11 +73,11 @@ class ProblemOptions:
     long: float = 60.0
     """Recording from which on a search looks at a part of it [s]."""
     looked_at: float = 40.0
-    """How much that is [s]: what an effect must bring is measured by recordings of this length, too."""
+    """Duration of the part that is searched [s]; required gains are scaled with recordings of this length."""
     piece: float = 12 * 0.4
-    """What that part grows by [s]: three times the stretches of all uses."""
+    """Increment of that part [s]: three times the stretches of the four uses."""
     starved: float = 0.1
-    """Share of what a channel lacks on a fixed base below which the frames that decide show too little of it."""
+    """If the selection frames contain less than this share of a channel's excess error on a fixed base, they are extended."""
     heavy: float = 0.15
     """Share of the robot's mass from which on a link's centre of mass is a candidate: of lighter ones it hardly shows."""
     most_stretches: int = 10_000
@@ -84,10 +90,10 @@ class ProblemOptions:
     """So much of each take is rolled out by both [s]: they part within the first steps or windows, or not at all. In fourteen
     diagnoses they differed by 8e-7 sigma at most."""
     engines_compared_whole: float = 20.0
-    """So much of one take is [s], of a walk where there is one, for what comes late, as a stop that is reached or a motor that
+    """Length of one take, of a walk if there is one [s], for effects that appear late, as a stop that is reached or a motor that
     fades."""
     heavy_trunk: float = 0.09
-    """The same of links that are no part of one leg: what they carry tips the robot, while their own joint hardly feels it."""
+    """The same for links that are not part of a leg: a load on them tips the robot, while their own joint hardly responds."""
 
 
 @dataclass(frozen=True)
@@ -95,13 +101,13 @@ class ReadOffOptions:
     """Estimators without a search: geometry, stops, mounts, frames, dropped commands."""
 
     register_exact: float = 0.005
-    """Standard deviation of what a servo's register sets, as a share: the servo itself calculates with that number."""
+    """Standard deviation of a value set by a servo's register, as a share: the servo itself calculates with that number."""
     least_along: float = 0.5
     """Cosine between a link's length and what of it two axes tell, at least."""
     length_error: float = 1e-4
-    """What a take's distance between axes is off by at the least [m]."""
+    """Least error of a take's distance between axes [m]."""
     direction_error: float = math.radians(0.25)
-    """The same of a direction, for what the model says of droop [rad]."""
+    """The same of a direction, for the model's droop [rad]."""
     geometry_sure: float = 5.0
     """Standard deviations from which on a link is not as drawn."""
     least_change: float = 5e-4
@@ -114,12 +120,13 @@ class ReadOffOptions:
     least_cut: float = math.radians(1.5)
     """A stop is a candidate where the model goes this much further than the recording ever does [rad]."""
     at_stop: float = math.radians(0.6)
-    """And where the recording stands this close to its end whenever the model is beyond it [rad]. What a take that is zeroed
-    alike passes by more is no stop: noise of five frames is a tenth of that, a stop of the second engine gave by 0.4 deg."""
+    """And where the recording is this close to its end whenever the model is beyond it [rad]. A limit that a take with the same
+    zero passes by more is no stop: noise of five frames is a tenth of that, a stop of the second engine gave by 0.4 deg."""
     rare: float = 0.02
     rocking_noise: float = 2.0
-    """Share of frames at either end that how far a link rocks is told without; and standard deviations of noise that are then
-    taken off: in seven sessions of the second engine that is its play, to 3 % and to 1.2 standard deviations of noise."""
+    """Share of frames at either end that are ignored when the rocking of a link is measured; and standard deviations of noise
+    that are then subtracted: in seven sessions of the second engine the result is its play, to 3 % and to 1.2 standard deviations
+    of noise."""
     least_asset_turn: float = math.radians(0.3)
     """A marker frame is a candidate that is turned by more than this at rest [rad]."""
     most_dropped: float = 0.6
@@ -143,9 +150,9 @@ class ReadOffOptions:
     before: float = 0.03
     """Time before a command that shows how the joint went until then [s]."""
     lag: float = 0.05
-    """Time by which what a command does shows later [s]."""
+    """Time by which the effect of a command appears later [s]."""
     pose_explains: float = 0.8
-    """Share of what a joint lacks until the next command that leaving out one pose must explain."""
+    """Share of a joint's excess error until the next command that leaving out one pose must explain."""
     most_dropped_in_motion: float = 0.5
     """Share of poses that may be dropped in motion: of more, something else is the matter."""
     turns: int = 12
@@ -157,7 +164,7 @@ class FitOptions:
     """Scaled parameters, responses, fits and their covariance."""
 
     least_move: float = 0.3
-    """What a finite difference is a share of at least, in typical sizes."""
+    """Least magnitude to which a finite difference is relative, in typical sizes."""
     vector_move: float = 0.5
     """The same of one of a vector's numbers, in its length."""
     most_doubled: float = 1000.0
@@ -179,9 +186,9 @@ class FitOptions:
     scanned_ground: tuple[float, ...] = (0.7, 2.0)
     """Sizes at which the floor's candidates are scanned on a walk."""
     scanned_around: float = 2.0
-    """Size of several numbers on a walk, beyond what it makes of anything small."""
+    """Size of several parameters on a walk, beyond its chaotic response to small changes."""
     shaped: tuple[float, ...] = (0.0, 2.0, -2.0)
-    """Doublings, on a fixed base, of a number that only shapes an effect: a fit from the wrong one ends beside the right one."""
+    """Doublings, on a fixed base, of a parameter that only shapes an effect: a fit from a wrong start ends in a local minimum."""
     stride_fixed: float = 0.15
     """Share of a number by which it is moved for a finite difference on a fixed base."""
     stride_free: float = 0.4
@@ -197,23 +204,23 @@ class FitOptions:
     refit_steps: int = 3
     """Steps of a fit of effects that fixed-base takes identified before."""
     against: float = 100.0
-    """Chi squared by which fixed-base takes must speak against what floating-base takes make of a number."""
+    """Chi squared by which fixed-base takes must contradict a value estimated from floating-base takes."""
     least_gain: float = 150.0
     """Of chi squared on the choosing stretches that each number of an effect must bring. Of a joint filmed for twenty seconds
     that is half its noise: engines, and a robot and its model, differ by as much."""
     finer: float = 0.5
-    """Time step, in search steps, for the last slopes of several numbers that floating-base takes identify: what a load's height
-    does is less than what a coarse step makes of it."""
+    """Time step, in search steps, for the last slopes of several parameters that floating-base takes identify: the response to
+    the height of a load is smaller than the error of a coarse step."""
     finer_steps: int = 3
     """Steps of that fit."""
     overdispersion_free: float = 60.0
-    """What differences of chi squared are divided by where floating-base takes identify: neighbouring frames err alike, engines
-    differ, and fits of the same effect that begin elsewhere end some hundreds apart there."""
+    """Divisor of differences of chi squared where floating-base takes identify an effect: errors of neighbouring frames are
+    correlated, simulators differ, and fits of the same effect from different starting points end some hundreds apart there."""
     contact_error: float = 0.06
     """Standard deviation, as a share of a number, that contact adds where a floating-base take identifies it: engines, and
     robots, differ by that."""
     slope_step: float = 1e-3
-    """Of a size, by which a slope of a known function is told."""
+    """Relative difference of a size, for the slope of a known function."""
     drift: float = 0.25
     """Share of a number by which it must change within a take to be a drift: two engines, or a robot and a model, differ by
     less."""
@@ -228,22 +235,23 @@ class ConclusionOptions:
     z90: float = 1.645
     """Half width of a 90 % interval, in standard deviations."""
     wider: float = 1.3
-    """Intervals are this much wider than the residuals' scatter alone says: neighbouring frames err alike, and the recording's
-    engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials held the truth, with 1.3 it is 91 %."""
+    """Factor on the intervals from the residuals' scatter: errors of neighbouring frames are correlated, and the recording's
+    engine, or the world, is not ours. With 1.1, 88 % of 193 intervals of three trials contained the truth, with 1.3 it is 91
+    %."""
     least_relative: float = 0.005
-    """Standard deviation that no number's interval goes below, in shares of what it differs from neutral by."""
+    """Least standard deviation of a parameter, as a share of its distance from neutral."""
     worth_an_experiment: float = 0.05
     """Probability from which on the likeliest rival of a finding is worth an experiment."""
     correlated: float = 0.3
-    """Correlation from which on a residual goes with a signal."""
+    """Correlation above which a residual is attributed to a signal."""
     same_elsewhere: float = 0.1
-    """Of a finding's probability, what the same effect elsewhere has to have for that place to be named with it."""
+    """Probability of the same effect elsewhere, relative to the finding's, above which that place is named with it."""
     likely: float = 0.5
     """Probability from which on a name counts as an explanation."""
     tied: float = 0.5
     """An alternative at least this share as likely as the effect ties with it: the finding is that one of the two is there."""
     surest: float = 0.98
-    """What no finding's probability exceeds: physics that the vocabulary lacks can look like any of it."""
+    """Largest probability of a finding: physics outside the vocabulary can look like any effect."""
     at_its_end: float = 0.99
     """Share of how far an effect's numbers may lie from neutral, from which on it wants to go further than is plausible."""
     aside: float = math.tan(math.radians(15.0))

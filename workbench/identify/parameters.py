@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from workbench.effects.base import Effect, Parameter
 from workbench.identify.options import FIT
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Key = tuple[str, tuple[str, ...]]
-"""What an effect is, and where."""
+"""Name and place of an effect."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Candidate:
 
     @property
     def read_off(self) -> bool:
-        """Whether its sizes were read off the recordings, 1 being what they say."""
+        """Whether its sizes were estimated directly, 1 being the estimate."""
         return not self.effect.from_neutral
 
     @property
@@ -93,15 +93,15 @@ class Candidate:
         return np.array([p.vector for p, fixed in zip(self.parameters, self.fixed) if not fixed], dtype=bool)
 
     def magnitudes(self, x: Array) -> Array:
-        """What each size is moved for a slope in shares of: a small number of a long vector, as how high a load sits, by as much
-        as the others, else what it does drowns in what contact makes of small moves."""
+        """Magnitudes to which the step of each slope is relative: a small component of a long vector, such as the height of a
+        load, is moved by as much as the others, or its response drowns in the contact noise of small changes."""
         out = np.maximum(np.abs(x), FIT.least_move)
         vector = self.of_vector
         out[vector] = np.maximum(out[vector], FIT.vector_move * np.linalg.norm(x[vector]))
         return np.asarray(out)
 
     def values(self, x: Sequence[float] | Array) -> list[float]:
-        """Numbers in the units of docs/formats.md, cut to what is possible; x: of those that are fitted."""
+        """Parameters in the units of docs/formats.md, limited to their bounds; x: of those that are fitted."""
         sizes = iter(np.asarray(x, dtype=float).tolist())
         out = []
         for p, n, t, fixed in zip(self.parameters, self.neutral, self.typical, self.fixed):
@@ -157,8 +157,8 @@ class Candidate:
         return [np.eye(self.size)[i] for i in shown] or [np.zeros(self.size)]
 
     def around(self) -> list[Array]:
-        """Probes both ways and, of the first two, together: what a push to the left shows depends on that to the front. The same
-        as probes where there is one."""
+        """Perturbations in both directions and, of the first two, together: the response to a sideways push depends on a forward
+        one. Only the perturbations themselves where there is one parameter."""
         probes = self.probes()
         return probes if len(probes) < 2 else both_ways(np.zeros(self.size), probes)
 

@@ -12,8 +12,7 @@ from workbench.effects.base import Effect
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate, both_ways
 from workbench.robot.kinematics import Kinematics
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def point_mass(payload: Effect, link: str, k: Kinematics, base_is_held: bool) -> Candidate:

@@ -1,4 +1,4 @@
-"""From recordings to evidence: takes beside the model's rollouts, registered, walks cut into windows."""
+"""From recordings to evidence: takes with the model's rollouts, registered, walks cut into windows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import ACROSS, BODY, channel_names, channels_of
 from workbench.compare.compare_session import Rollouts, roll_out, run_of
@@ -14,7 +13,7 @@ from workbench.compare.comparison import noise_of
 from workbench.compare.metrics import rms
 from workbench.compare.options import COMPARE
 from workbench.compare.session import Session
-from workbench.compare.session_takes import LeftOut, Progress, ReadTake, RegisteredTake, register_takes
+from workbench.compare.session_takes import LeftOut, ReadTake, RegisteredTake, register_takes
 from workbench.files import InputError
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, part_of, running_sum
@@ -22,14 +21,12 @@ from workbench.identify.shooting import base_states, unsettled
 from workbench.recording.take import Take
 from workbench.simulation import SimulationConfig
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask, Progress
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Takes beside a model's rollouts: evidence, by take the rollout of a robot left to itself, takes left out and why."""
+    """Takes with a model's rollouts: evidence, by take the rollout of an unconstrained robot, takes left out and why."""
 
     evidence: list[TakeEvidence]
     nominal: dict[str, Take]
@@ -37,8 +34,8 @@ class Prepared:
 
 
 def prepared(session: Session, takes: Sequence[ReadTake], config: SimulationConfig, n_jobs: int, progress: Progress) -> Prepared:
-    """Rolls the session's model out beside each take, registers the takes against these rollouts, and puts floating-base takes
-    back to the recorded base at the beginning of each window."""
+    """Rolls out the session's model for each take, registers the takes against these rollouts, and resets the simulated base of
+    floating-base takes to the recorded one at the beginning of each window."""
     def rolled(these: Sequence[ReadTake], steadied: Mapping[str, BaseStates | None], floors: bool = True) -> dict[str, Rollouts]:
         runs = [run_of(t, steadied.get(t.spec.name)) for t in these]
         return {r.name: of for r, of in zip(runs, roll_out(runs, config, progress=progress, n_jobs=n_jobs, floors=floors))}

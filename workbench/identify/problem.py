@@ -18,9 +18,7 @@ from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
@@ -77,8 +75,8 @@ class TakeEvidence:
         return np.asarray(self.since >= 0.0)
 
     def looked_at(self, until: float) -> TakeEvidence:
-        """The take of which models are asked until then [s after the first command], cropped to that, so that neither time nor
-        memory grows with what is not looked at; and to what a shifted start may need beyond."""
+        """The take cropped to the time until which models are simulated [s after the first command], with a margin for a shifted
+        start, so that neither time nor memory grows with unused data."""
         frames = int(np.searchsorted(self.since, until + max(PROBLEM.late, LOOP), side="right")) + 1
         early = self.since[:frames] <= until
         rough = self.rough[:frames] if isinstance(self.rough, np.ndarray) and self.rough.ndim == 2 else self.rough
@@ -91,7 +89,7 @@ class TakeEvidence:
         return float(self.take.measurement.rest_pose.get(joint, 0.0)) if self.take.recorded.zeroed else 0.0
 
     def columns(self, joint: str | None = None) -> NDArray[np.int_]:
-        """Of one joint's channels; of all."""
+        """Of one joint's channels; of every channel."""
         return np.array([i for i, c in enumerate(self.channels) if joint is None or joint_of(c) == joint], dtype=int)
 
     def simulated(self, rollout: Take, model: RobotModel) -> Array:
@@ -126,7 +124,7 @@ class TakeEvidence:
         return out
 
     def _shifted(self, simulated: Array) -> Array:
-        """Later by what the median joint asks for: a start that one bad joint cannot move."""
+        """Shifted later by the median over the joints: a start that one bad joint cannot move."""
         time, late, n = self.take.recorded.time, 0.0, len(self.joints)
         used = ~self.uses["validate"]
         shifted = simulated
@@ -166,7 +164,7 @@ def smoothed(residual: Array, frames: int) -> Array:
 
 def ratios(e: TakeEvidence, residual: Array, use: str | None = None, smooth: bool = False) -> dict[str, float]:
     """RMS of residual over sigma, by channel; on all frames after the first command, or those of one use. smooth: of running
-    means, which show what is no noise."""
+    means, in which noise averages out."""
     if smooth:
         residual = smoothed(residual, round(PROBLEM.smoothing / e.frame_time))
     rows = residual[e.moving] if use is None else residual[e.uses[use]]

@@ -9,6 +9,7 @@ from dataclasses import replace
 from workbench.effects.base import Effect
 from workbench.effects.registry import known_effects
 from workbench.effects.sdf import SdfRobot
+from workbench.identify.loads import unloaded_joints
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.point_mass import point_mass
@@ -21,7 +22,7 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
     seen = [j for j in model.joints if any(j in e.channels for e in evidence)]
     free = any(e.take.spec.base == "free" for e in evidence)
     start_known = not any(e.start_is_free for e in evidence)
-    sdf = SdfRobot(model.path)
+    sdf, unloaded = SdfRobot(model.path), unloaded_joints(model, evidence)
     out: list[Candidate] = []
     sent = [e.take.commands for e in evidence if e.take.commands is not None]
     for effect in known_effects().values():
@@ -31,7 +32,8 @@ def candidates(model: RobotModel, evidence: Sequence[TakeEvidence]) -> list[Cand
             continue
         neutral = effect.neutral(model)
         for where in _places(effect, model, seen):
-            if effect.like_a_late_start and not where and not start_known:
+            late = effect.like_a_late_start and not where and not start_known
+            if late or (effect.needs_steady_load and where and unloaded.issuperset(where)):
                 continue
             if effect.point_mass:
                 out.append(point_mass(effect, where[0], model.kinematics, base_is_held=not free))

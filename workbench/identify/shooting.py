@@ -1,21 +1,19 @@
-"""Walks in windows: every model walks on from where the recorded robot was, so that what it lacks shows before chaos does.
+"""Multiple shooting of walks: every model starts from the recorded robot's state at each window, so that its errors show before
+chaos does.
 
-At the beginning of each window the base is put back beside the recorded one; what shows until feet have found the floor again
-says nothing.
+At the beginning of each window the simulated base is reset to the recorded one; frames until the feet have found the floor again
+are excluded.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.identify.options import PROBLEM
 from workbench.recording.take import Take
 from workbench.simulation.steady import BaseStates
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
 
 
 def edges(since: Array) -> Array:
@@ -24,8 +22,8 @@ def edges(since: Array) -> Array:
 
 
 def base_states(recorded: Take) -> BaseStates | None:
-    """Where the base of a walk was at its windows' beginnings; None where it is fixed or was not tracked. A window
-    whose beginning no camera saw is left out: the one before goes on."""
+    """The base of a walk at the beginning of each window; None where it is fixed or was not tracked. A window whose beginning no
+    camera saw is left out, and the one before is extended."""
     if recorded.base != "free" or recorded.p_WB is None or recorded.quat_WB is None:
         return None
     seen: Mask = np.asarray(np.isfinite(np.hstack([recorded.p_WB, recorded.quat_WB])).all(axis=1))

@@ -6,13 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence, channel_gaps, part_of
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 def rebalanced(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
@@ -39,10 +36,10 @@ def _judged_fairly(e: TakeEvidence, residual: Array) -> TakeEvidence:
 
 
 def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[TakeEvidence]:
-    """Takes as a search looks at them: not those that only validate; of long sessions, each from its first command until what is
-    missing there was seen, or not at all, so that every channel's gap shows, in as many takes as it has.
+    """Takes as used by a search: without those that only validate; of long sessions, each from its first command until its
+    missing effects were seen, or not at all, so that every channel's gap is included, in as many takes as show it.
 
-    residuals (N, c): of the nominal robot, by take. Of what validates, nothing is used."""
+    residuals (N, c): of the nominal robot, by take. Validation frames are not used."""
     ends = [float(e.since[-1]) for e in evidence]
     fitted = [i for i, e in enumerate(evidence) if e.uses["fit"].any()]
     if sum(ends[i] for i in fitted) <= PROBLEM.long:
@@ -66,7 +63,7 @@ def data_subset(evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]
 
 
 def _power(e: TakeEvidence, residual: Array) -> Array:
-    """What is beyond noise (N, c), in frames that may be seen."""
+    """Excess beyond noise (N, c), in frames that may be used."""
     seen = e.uses["fit"] | e.uses["choose"]
     beyond = np.nan_to_num(np.square(residual) - 1.0) * seen[:, None] * e.weight
     # of a channel that is well, chance leaves nothing: little is enough to look at it somewhere
@@ -74,19 +71,19 @@ def _power(e: TakeEvidence, residual: Array) -> Array:
 
 
 def _by_name(values: Array, channels: Sequence[str], names: Sequence[str]) -> Array:
-    """Columns (N, c), one for each of `channels`, as those of all `names`."""
+    """Columns (N, c), one for each of `channels`, by their order in `names`."""
     out = np.zeros((len(values), len(names)))
     out[:, [names.index(c) for c in channels]] = values
     return out
 
 
 def _shown(e: TakeEvidence, shares: Array, until: float) -> float:
-    """What a take is worth if it is looked at until then: the root favours what was not seen yet."""
+    """Value of including a take until then: the root favours errors that were not seen yet."""
     return float(np.sum(np.sqrt(shares[e.since <= until].sum(axis=0))))
 
 
 def subset_used(evidence: Sequence[TakeEvidence]) -> dict[str, dict[str, float]]:
-    """What to say of a search that looked at a share of what it might: seconds by take that it looked at; else empty."""
+    """Report of a search that used a part of the data: seconds used, by take; else empty."""
     if all(np.isinf(e.until) for e in evidence if e.take.spec.use != "validate"):
         return {}
     return {"searched": {e.name: round(e.until, 1) for e in evidence if e.until > 0}}

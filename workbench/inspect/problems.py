@@ -1,10 +1,11 @@
-"""What is doubtful in the files that a run uses, against the robot they are of: said by `inspect` and by every verb alike."""
+"""Problems of the files that a run uses, checked against the robot; reported by `inspect` and by every other verb."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from workbench.compare.session_takes import capture_yaw, read_takes, readable
 from workbench.effects.apply import resolved
 from workbench.files import InputError
 from workbench.files.errors import MistypedError
+from workbench.files.problem import RoutineProblem
 from workbench.motion import Motion, load_motion
 from workbench.recording.formats.read import read_recording
 from workbench.recording.mocap.mending import mend
@@ -24,72 +26,89 @@ from workbench.recording.servo_log.plausibility import beyond_range
 from workbench.recording.take_from import named_by_model
 from workbench.robot import RobotModel
 
-_ROUTINE = " unseen in "
+
+class Part(NamedTuple):
+    """Part of a session that has problems. kind: "robot", one "take", all "takes", or one prediction ("predict"). name: of a take
+    or prediction."""
+
+    kind: Literal["robot", "take", "takes", "predict"]
+    name: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.kind} '{self.name}'" if self.name else self.kind
 
 
 @dataclass(frozen=True)
 class SessionCheck:
-    """problems: by what they are of ("take 'walk'"), a line each. longest: of its takes and predictions [s], and its name.
-    damaged: those that cannot be read or used, which the verbs leave out and name, or refuse, by themselves. refused: why no
-    verb can use the takes, or not together, with the file's name."""
+    """Problems of a session.
 
-    problems: Mapping[str, Sequence[str]]
+    problems: by part of the session, a line each. longest: duration of its longest take or prediction [s], and longest_name that
+    part's name. damaged: the parts that cannot be read or used; the verbs leave such takes out with a warning, and refuse such
+    predictions. refused: why no verb can use the takes, or use them together, with the file's name.
+    """
+
+    problems: Mapping[Part, Sequence[str]]
     longest: float
     longest_name: str
-    damaged: frozenset[str] = frozenset()
+    damaged: frozenset[Part] = frozenset()
     refused: str | None = None
 
     @property
+    def damaged_takes(self) -> frozenset[str]:
+        """Names of the takes that are left out."""
+        return frozenset(part.name for part in self.damaged if part.kind == "take")
+
+    @property
     def warnings(self) -> list[str]:
-        """A line for each file with problems that are not routine, as gaps of cameras are, damaged takes among them."""
+        """One line for each part with serious problems, damaged takes among them."""
         out = []
-        for of, lines in self.problems.items():
-            bad = [] if of == "takes" and self.refused else serious(lines)
-            if of in self.damaged:
-                out += [f"{of} left out: {bad[0]}"] if of.startswith("take ") else []
+        for part, lines in self.problems.items():
+            bad = [] if part.kind == "takes" and self.refused else serious(lines)
+            if part in self.damaged:
+                out += [f"{part} left out: {bad[0]}"] if part.kind == "take" else []
             elif bad:
-                out.append(f"{of}: {summed_up(bad)}")
+                out.append(f"{part}: {summed_up(bad)}")
         return out
 
 
 def session_problems(session: Session) -> list[str]:
-    """A line for each thing that is doubtful in a session."""
-    return [f"{of}: {text}" for of, lines in session_check(session).problems.items() for text in lines]
+    """All problems of a session, one line each."""
+    return [f"{part}: {text}" for part, lines in session_check(session).problems.items() for text in lines]
 
 
 def session_check(session: Session) -> SessionCheck:
-    """What is doubtful in a session: its robot, its servos, each of its takes and predictions, every file of them read and
-    checked against the robot. A damaged take, which the verbs leave out, is one of them."""
-    found: dict[str, list[str]] = {"robot": model_problems_of(session.model)}
-    seconds = {"": 0.0}
-    damaged, mistyped = set(), ""
-    for of, entries in (("take", session.takes), ("predict", session.predict)):
-        for entry in entries:
-            name = f"{of} '{entry.name}'"
-            try:
-                found[name], seconds[name] = (_take_problems(entry, session) if isinstance(entry, TakeSpec)
-                                              else _prediction_problems(entry, session))
-                if entry.servos:
-                    found[name] += sorted({text for servo in session.model_of(entry).servos.values() for text in servo.doubts})
-            except InputError as e:
-                found[name] = [str(e)]
-                damaged.add(name)
-                if isinstance(e, MistypedError):
-                    mistyped = mistyped or f"{session.path}: {name}: {e}"
-    usable = not mistyped and any(f"take '{t.name}'" not in damaged for t in session.takes)
+    """Checks a session: its robot, its servos, its takes and its predictions. Every file is read and checked against the robot;
+    a damaged one is a problem of its take."""
+    found: dict[Part, list[str]] = {Part("robot"): model_problems_of(session.model)}
+    seconds: dict[Part | None, float] = {None: 0.0}
+    damaged, mistyped = set[Part](), ""
+    entries: tuple[TakeSpec | PredictSpec, ...] = (*session.takes, *session.predict)
+    for entry in entries:
+        part = Part("take" if isinstance(entry, TakeSpec) else "predict", entry.name)
+        try:
+            found[part], seconds[part] = (_take_problems(entry, session) if isinstance(entry, TakeSpec)
+                                          else _prediction_problems(entry, session))
+            if entry.servos:
+                found[part] += sorted({text for servo in session.model_of(entry).servos.values() for text in servo.doubts})
+        except InputError as e:
+            found[part] = [str(e)]
+            damaged.add(part)
+            if isinstance(e, MistypedError):
+                mistyped = mistyped or f"{session.path}: {part}: {e}"
+    usable = not mistyped and any(Part("take", t.name) not in damaged for t in session.takes)
     refused = _no_yaw(session) if usable else None
     if refused:
-        found["takes"] = [refused]
+        found[Part("takes")] = [refused]
     if session.yaw is None and not session.takes and any(p.start is not None for p in session.predict):
-        found["predict"] = ["the yaw of the capture cannot be found from takes: it is estimated from where the bodies stand at "
-                            "the start, to some degrees; give the session's `yaw` [deg], or a captured take"]
-    longest = max(seconds, key=lambda name: seconds[name])
-    doubtful = {of: lines for of, lines in found.items() if lines}
-    return SessionCheck(doubtful, seconds[longest], longest, frozenset(damaged), mistyped or refused)
+        found[Part("predict")] = ["no take tells the yaw of the capture: it is estimated to a few degrees from the bodies' "
+                                  "positions at the start; give the session's `yaw` [deg], or a captured take"]
+    longest = max(seconds, key=lambda part: seconds[part])
+    doubtful = {part: lines for part, lines in found.items() if lines}
+    return SessionCheck(doubtful, seconds[longest], str(longest or ""), frozenset(damaged), mistyped or refused)
 
 
 def _no_yaw(session: Session) -> str | None:
-    """Why the takes that cameras saw do not tell where the robot headed; None where they do, or the session does."""
+    """Why the yaw of the capture cannot be found from the takes; None where it can, or where the session gives it."""
     try:
         capture_yaw(session, read_takes(session)[0])
     except InputError as e:
@@ -98,7 +117,7 @@ def _no_yaw(session: Session) -> str | None:
 
 
 def model_problems_of(model: RobotModel) -> list[str]:
-    """What is doubtful in a robot's description, its servos' constants and its effects, a line each."""
+    """Problems of a robot's description, its servos' constants and its effects, one line each."""
     out = list(model.held_problems if model.held else model.problems)
     doubts = {text: joint for joint, servo in model.servos.items() for text in servo.doubts}
     out += [f"servo of {joint}: {text}" for text, joint in doubts.items()]
@@ -106,20 +125,20 @@ def model_problems_of(model: RobotModel) -> list[str]:
     lacking = [j for j in model.joints if j not in given]
     if given and lacking:
         out.append(f"servos: none is given for {', '.join(lacking)}; taken as an AX-12A")
-    list(resolved(model))  # InputError where an effect is not what it says
+    list(resolved(model))  # InputError for an invalid effect
     return out
 
 
 def recording_problems(path: str | Path, recording: Recording, model: RobotModel | None = None) -> list[str]:
-    """What is doubtful in a recording, what is routine last; against a `model`'s joints, links and ranges where one is given.
-    InputError where it cannot be of the model."""
+    """Problems of a recording, routine ones last; checked against a `model`'s joints, links and ranges if one is given.
+    InputError where it cannot be a recording of that model."""
     out = list(recording.problems)
     if recording.sensing == "mocap":
         if not recording.rigid_bodies:
             found = f"only {len(recording.markers)} markers" if recording.markers else "nothing solved"
             out.append(f"no rigid bodies, {found}: no verb can use it; solve the robot's rigid bodies in the capture "
-                       "system (Motive: rigid bodies) and export again, or name three markers or more of each body alike, as "
-                       "leg_1")
+                       "system (Motive: rigid bodies) and export again, or give the three or more markers of each body a "
+                       "common name: leg_1, leg_2, leg_3")
         else:
             if model is not None:
                 check_assets(recording, model)
@@ -128,11 +147,11 @@ def recording_problems(path: str | Path, recording: Recording, model: RobotModel
         named = named_by_model(recording, model)
         frames = model.kinematics.frames
         out += beyond_range(named, {j: (frames[j].lower, frames[j].upper) for j in model.joints})
-    return sorted(dict.fromkeys(out), key=lambda text: _ROUTINE in text)
+    return sorted(dict.fromkeys(out), key=lambda text: isinstance(text, RoutineProblem))
 
 
 def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:
-    """What is doubtful in a motion that is played `cycles` times (None: as often as it says itself), a line each."""
+    """Problems of a motion that is played `cycles` times (None: as often as its file says), one line each."""
     jumps = motion.often(cycles) > 1 and not motion.closes
     out = ["the last row differs from the first: played in a loop, the motion jumps"] if jumps else []
     if (text := slow_poses(motion) or long_work(motion.seconds(1))) is not None:
@@ -151,24 +170,24 @@ def motion_problems(motion: Motion, cycles: int | None = 2) -> list[str]:
 
 
 def long_work(seconds: float) -> str | None:
-    """A line where so much is to be simulated that it was probably a slip."""
+    """A line where the requested duration is so long that it is probably a mistake."""
     if seconds <= FILES.longest:
         return None
     return f"lasts {seconds:.6g} s, {seconds / 60:.4g} minutes of the robot's time: check times, frames and cycles"
 
 
 def slow_poses(motion: Motion) -> str | None:
-    """A line where poses follow each other so slowly that their times are not in seconds."""
+    """A line where poses follow each other so slowly that their times are probably not in seconds."""
     apart = float(np.median(np.diff(motion.times)))
     if apart <= FILES.slowest_pose:
         return None
-    return (f"a pose every {apart:.4g} s, {motion.seconds(1):.6g} s in all: are the times in milliseconds, a slip? "
+    return (f"a pose every {apart:.4g} s, {motion.seconds(1):.6g} s in total: are the times in milliseconds? "
             "(a table has seconds)")
 
 
 def serious(problems: Sequence[str]) -> list[str]:
-    """Those that are not routine, as gaps of cameras are."""
-    return [text for text in problems if _ROUTINE not in text]
+    """Those that are not routine."""
+    return [text for text in problems if not isinstance(text, RoutineProblem)]
 
 
 def summed_up(problems: Sequence[str], most: int = 3) -> str:

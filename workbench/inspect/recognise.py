@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from workbench.files import InputError
+from workbench.files.errors import UnknownFolderError
 from workbench.files.reading import read_json, read_text, regular_file
 from workbench.files.tables import is_binary, plain_head
 from workbench.files.yaml_file import read_yaml
@@ -109,11 +110,9 @@ def _folder(path: Path) -> Inspection:
         return replace(inspect_file(path / results[0]), file=str(path))
     try:
         return _recording(path)
-    except InputError as e:
-        if "found a folder" not in e.problem:
-            raise
+    except UnknownFolderError:
         raise InputError(path, "expected a session (session.yaml), firmware tables (pos.txt), results of the workbench, or a "
-                               "recording that is a folder (state_motor.csv, meta/info.json); found none of them") from None
+                               "recording that is a folder (state_motor.csv, meta/info.json); found none of these") from None
 
 
 def _reader(path: Path, part: bool) -> Callable[[Path], Inspection] | None:

@@ -1,4 +1,4 @@
-"""Motions as tables of poses, and what they become on the bus."""
+"""Motions as tables of poses, and as commands on the bus."""
 
 from workbench.motion.commands import Commands
 from workbench.motion.files import load_motion, save_motion

@@ -1,4 +1,4 @@
-"""What goes out on the bus: goal positions and moving speeds at given times."""
+"""Commands on the bus: goal positions and moving speeds at given times."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.files import InputError
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -83,6 +82,8 @@ class Commands:
 
     def reordered(self, joints: tuple[str, ...]) -> Commands:
         """The same with columns in another order; joints without a command hold neutral, those left out are dropped."""
+        if joints == self.joints:
+            return self
         shape = (len(self.times), len(joints))
         goals, speeds, enabled = np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
         for i, j in enumerate(joints):

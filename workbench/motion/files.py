@@ -23,7 +23,7 @@ MOST_SECONDS, MOST_DEGREES = 3600.0, 3600.0
 """Beyond an hour, or ten turns, a table is in another unit."""
 
 SPEED = "speed."
-"""What a joint's name has before it in the column of its moving speeds."""
+"""Prefix of a joint's name in the column of its moving speeds."""
 SECTION, CYCLES = "section", "# cycles:"
 """The column that tells start, loop and stop, and the comment that says how often the loop runs."""
 
@@ -32,15 +32,16 @@ def load_motion(path: str | Path, model: RobotModel | None = None) -> Motion:
     """Reads a pose table (CSV, degrees), or a page of a ROBOTIS motion file as `FILE.mtn#page`.
 
     Columns are found by the header's names; without a header they are `time` and the model's joints in alphabetical
-    order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of all joints or of none, are moving speeds in place of
-    the travel over the dwell. A column `section` says `start`, `loop` or `stop`, in that order: start and stop are played once,
-    the loop is repeated; without it all is the loop. A comment line `# cycles: N` says how often, where nobody else does. What
-    the motion is rounded to when it is played are the counts of the model's servos (without a model, the AX-12A's). InputError
-    names line and column of what is wrong, or a joint `model` lacks.
+    order (without a model, the puppy's). Columns `speed.JOINT` [deg/s], of every joint or of none, are moving speeds that replace
+    the travel over the dwell. A column `section` contains `start`, `loop` or `stop`, in that order: start and stop are played
+    once, the loop is repeated; without it the whole table is the loop. A comment line `# cycles: N` gives the number of cycles,
+    unless the caller does. When it is played, the motion is rounded to the counts of the model's servos (without a model, the
+    AX-12A's). InputError names line and column of an error, or a joint that `model` lacks.
     """
     file, _, page = str(path).partition("#")
     if file.lower().endswith(".mtn"):
-        motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS)
+        motion = load_mtn(file).motion(page or None, bus_ids(model) if model else BUS_IDS,
+                                            model.mountings if model else None)
     else:
         motion = _parse(path, plain_text(path), model)
     return motion if model is None else replace(motion, units=units_of(model, motion.joints))
@@ -139,7 +140,7 @@ def _columns(path: str | Path, lines: list[Line], model: RobotModel | None) -> t
         if len(first) != len(joints) + 1:
             raise InputError(
                 path, f"line {n}: without a header, expected time and {len(joints)} joints, found {len(first)} cells "
-                      "(of a Motive export or a log without its header, export it anew with it)")
+                      "(export a Motive take or a log again with its header)")
         return ["time", *joints], lines
     if "time" not in first:
         raise InputError(path, f"line {n}: expected a header with a column 'time', found {', '.join(first[:4])}")

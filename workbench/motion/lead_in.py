@@ -1,4 +1,4 @@
-"""The way from neutral to a motion's first pose, and what a moving speed of 0 may stand for."""
+"""The approach from neutral to a motion's first pose, and the replacement of moving speed 0."""
 
 from __future__ import annotations
 
@@ -6,23 +6,21 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 SLOW = 0.6
-"""Speed of the fastest joint on a way that no table paces [rad/s]: a tenth of what an AX-12A can do."""
+"""Speed of the fastest joint where no table sets one [rad/s]: a tenth of the speed of an AX-12A."""
 
 
 def paced(commands: Commands, count: Array, speed_unit: Array, slow: float = SLOW) -> Commands:
-    """The same commands, from neutral, in which no joint that has to move is told to move at once (speed 0).
+    """The same commands, from neutral, in which no joint that has to move is sent speed 0 (at once).
 
     Such a joint gets the speed that brings it there within the dwell; a speed is rounded up to whole counts, speed_unit (n,)
-    [rad/s]. Where one would have to be faster than `slow` [rad/s] for the very first pose, a command is put in front that takes
-    all joints there first, the farthest at `slow`, and all else comes later by as much. A way of at most a count of position,
-    count (n,) [rad], is none. A joint whose torque is off, or comes on with the command, is left as it is.
+    [rad/s]. Where one would have to be faster than `slow` [rad/s] for the very first pose, a command is inserted before it that
+    takes every joint there first, the farthest at `slow`, and everything else is delayed by as much. A distance of at most a
+    count of position, count (n,) [rad], is ignored. A joint whose torque is off, or comes on with the command, is left as it is.
     """
     before = np.vstack([np.zeros(len(commands.joints)), commands.goals[:-1]])
     on = commands.enabled & np.vstack([commands.enabled[:1], commands.enabled[:-1]])

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.table import SECTIONS, PoseTable, Section
 from workbench.robot.servo_units import ServoUnits
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +83,7 @@ class Motion:
         return float(self.times[-1] - self.times[0]) + (self.often(cycles) - 1) * self.duration
 
     def often(self, cycles: int | None, default: int = 1) -> int:
-        """How many cycles are played: as many as asked for, else as the motion says itself, else the default."""
+        """Number of cycles: as requested, else as in the motion, else the default."""
         return cycles if cycles is not None else self.cycles if self.cycles is not None else default
 
     @property
@@ -112,11 +110,11 @@ class Motion:
                        speeds=None if self.speeds is None else self.speeds[rows])
 
     def as_table(self) -> PoseTable:
-        """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for what the registers cannot hold."""
+        """In the firmware's units (thesis, equations 3.1 to 3.4); InputError for values that the registers cannot hold."""
         return PoseTable.from_angles(
             self.joints, self.times, self.angles, self.source, self.speeds, self.units, self.start, self.stop)
 
     def commands(self, cycles: int | None = None) -> Commands:
-        """What the firmware sends for the start, so many cycles (default: the motion's own, else 1) and the stop, rounded to the
+        """The firmware's commands for the start, so many cycles (default: the motion's own, else 1) and the stop, rounded to the
         servo's counts and milliseconds."""
         return self.as_table().commands(self.often(cycles))

@@ -20,8 +20,8 @@ from workbench.files.numerals import number_of
 from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.motion.motion import Motion
 from workbench.robot import COUNT
-
-Array = NDArray[np.float64]
+from workbench.robot.mounting import Mounting
+from workbench.types import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +82,13 @@ class MtnFile:
                 self.source, f"expected {wanted}, found {len(found)} (name it: FILE.mtn#page); pages: {there}{more}")
         return found[0]
 
-    def motion(self, which: str | int | None, bus_ids: Mapping[str, int]) -> Motion:
+    def motion(self, which: str | int | None, bus_ids: Mapping[str, int],
+               mountings: Mapping[str, Mounting] | None = None) -> Motion:
         """One pass of a page as a motion of the joints that `bus_ids` names; a pause becomes a second row of its pose.
 
-        The first row is the page's last step where it repeats or follows itself, else the neutral pose. InputError if
-        the file moves an ID that no joint has: it was written for another robot.
+        mountings: of servos whose angle differs from their joint's. The first row is the page's last step where it repeats or
+        follows itself, else the neutral pose. InputError if the file moves an ID that no joint has: it was written for another
+        robot.
         """
         page = self.page(which)
         moved = [int(i) for i in np.flatnonzero(self.enable)]
@@ -98,7 +100,9 @@ class MtnFile:
                 motor = self.motor_type[i]
                 raise InputError(self.source, f"bus ID {i}: motor type {motor}; expected 0 (1024 counts, 300 deg)")
         joints = tuple(sorted(by_id[i] for i in moved))
-        steps = (page.positions[:, [bus_ids[j] for j in joints]] - 512) * COUNT
+        mounted = [(mountings or {}).get(j, Mounting()) for j in joints]
+        zeros = [m.zero if m.zero is not None else 512 + round(m.offset / COUNT) for m in mounted]
+        steps = (page.positions[:, [bus_ids[j] for j in joints]] - np.array(zeros)) * COUNT * [m.direction for m in mounted]
         loops = page.repeat > 1 or page.next == page.number
         times, rows = [0.0], [steps[-1] if loops else np.zeros(len(joints))]
         for step, time, pause in zip(steps, page.times / page.speed_rate, page.pauses / page.speed_rate):
@@ -117,7 +121,7 @@ _CODE_PAGES = ("utf-8-sig", "cp949", "cp1252", "latin-1")
 
 
 def load_mtn(path: str | Path) -> MtnFile:
-    """Reads a ROBOTIS motion file; InputError names the line and what was expected there."""
+    """Reads a ROBOTIS motion file; InputError names the line and the expected content."""
     lines = [(n, line.strip()) for n, line in enumerate(_text(path).splitlines(), start=1)]
     ends = [k for k, (_, line) in enumerate(lines) if line == "page_end"]
     starts = [k for k, (_, line) in enumerate(lines) if line == "page_begin"]

@@ -8,11 +8,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import NDArray
 
 from workbench.motion.motion import Motion
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Knots = Literal["smooth", "rest"]
 
 
@@ -78,9 +77,9 @@ def savitzky_golay(trajectory: Trajectory, window: int, order: int = 3) -> Traje
 
 
 def filter_derivatives(trajectory: Trajectory, window: int, order: int = 3) -> Trajectory:
-    """The thesis's own filter (6.7): velocity and acceleration each smoothed for themselves, angles left alone.
+    """The thesis's own filter (6.7): velocity and acceleration each smoothed separately, angles unchanged.
 
-    Nothing then makes v the derivative of q: the caller can measure by how much it is not (`inconsistency`).
+    Then v is not exactly the derivative of q: `inconsistency` measures the difference.
     """
     v, a = (_local_polynomial(y, window, order, 0, trajectory.step) for y in (trajectory.v, trajectory.a))
     return replace(trajectory, v=v, a=a)

@@ -13,8 +13,8 @@ from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.motion.lead_in import paced
 from workbench.robot.servo_units import AX12A, ServoUnits
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 Section = Literal["start", "loop", "stop"]
 SECTIONS: tuple[Section, ...] = ("start", "loop", "stop")
@@ -26,11 +26,11 @@ MOST_CYCLES = 10_000
 
 @dataclass(frozen=True, eq=False)
 class PoseTable:
-    """Poses as the firmware plays them: each is sent, then waited for.
+    """Poses as the firmware plays them: each is sent, then the dwell follows.
 
     joints: (n,) names. goals: (P, n) goal positions. speeds: (P, n) moving speeds, 0 = at once. dwells_ms: (P,) [ms], at least 1.
-    source: where they come from. units: (n,) what each joint's counts mean and where they end (default: the AX-12A's, 0 to 1023).
-    start, stop: how many of the first poses are played once before the loop, and how many of the last ones once after it; the
+    source: their origin. units: (n,) each joint's counts and their range (default: the AX-12A's, 0 to 1023).
+    start, stop: number of the first poses that are played once before the loop, and of the last ones played once after it; the
     poses between them are the loop, at least one. InputError names joint, pose and value out of range.
     """
 
@@ -149,8 +149,8 @@ class PoseTable:
         return np.asarray(self.speeds * self._of(lambda u: u.table_unit), dtype=float)
 
     def commands(self, cycles: int = 1) -> Commands:
-        """What the firmware sends: each pose when the dwells before it are over; the start, so many loops, the stop. No joint is
-        told to go at once (`paced`)."""
+        """The firmware's commands: each pose when the dwells before it are over; the start, so many loops, the stop. No joint is
+        sent speed 0 (`paced`)."""
         if not 1 <= cycles <= MOST_CYCLES:
             raise InputError(self.source, f"cycles: expected 1 to {MOST_CYCLES}, got {cycles}")
         played = self.order(cycles)

@@ -6,10 +6,9 @@ Rows of NaN are gaps and stay so, where scipy's Rotation refuses them; what has 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def multiply(a: Array, b: Array) -> Array:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.recording.body_track import BodyTrack
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Sensing = Literal["mocap", "encoders"]
 """What saw the robot: cameras its bodies, or its servos' own sensors their angles."""
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
 from workbench.recording.body_track import BodyTrack
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

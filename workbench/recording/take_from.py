@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.recording import quaternions as quat
@@ -18,8 +17,6 @@ from workbench.recording.mocap.tracks import Tracks, check_assets, tracks_of
 from workbench.recording.recording import Measurement, Recording
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
 
 
 def take_from_recording(recording: Recording, measurement: Measurement, model: RobotModel, name: str | None = None,

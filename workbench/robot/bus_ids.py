@@ -10,8 +10,8 @@ from workbench.robot.names import BUS_IDS
 
 
 def bus_ids(model: RobotModel) -> Mapping[str, int]:
-    """IDs by joint: the model's own, or, where it says none, those of the puppy's joints by name. InputError where a joint is
-    left without one: another robot's servo must not move in its place."""
+    """IDs by joint: the model's own or, where it has none, those of the puppy's joints by name. InputError for a joint without
+    one: another robot's servo must not move instead of it."""
     ids = dict(model.bus_ids or {j: i for j, i in BUS_IDS.items() if j in model.joints})
     missing = [joint for joint in model.joints if joint not in ids]
     if missing:

@@ -7,16 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import cached_by_content
 from workbench.robot.kinematics import Kinematics
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.robot.model import RobotModel
 
-Array = NDArray[np.float64]
 Points = tuple[Array, Array]
 """Points (M, 3) [m] in a link's frame and the radius (M,) [m] of the sphere about each; 0: a corner."""
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import cached_by_content
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class JointFrame:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of what follows.
+    """Links and revolute joints of a robot, in plain arrays. Weld joints are folded into X_PF of the joints after them.
 
     masses [kg] and centers of mass (3,) [m], in the link's frame, by link.
     """

@@ -17,6 +17,7 @@ from workbench.files.resources import resolve_model
 from workbench.robot.feet import feet_of
 from workbench.robot.kinematics import Kinematics
 from workbench.robot.model_source import ModelSource, model_problems, prepared
+from workbench.robot.mounting import Mounting
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import ServoConstants
 
@@ -25,11 +26,12 @@ GRAVITY = 9.81
 """Of free fall [m/s^2], as Drake's plants have it."""
 FAST_YAML = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 """Writes the same text either way."""
+_AX_12A = ServoConstants()
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The floor. friction: coefficient of foot on ground, static and dynamic alike; None: the SDF's own. stiffness [N/m] of a
+    """The floor. friction: coefficient of foot on ground, both static and dynamic; None: the SDF's own. stiffness [N/m] of a
     contact point; None or infinite: rigid. dissipation: Hunt and Crossley's [s/m]; None: 0. InputError for a negative number."""
 
     friction: float | None = None
@@ -59,10 +61,10 @@ class RobotModel:
 
     description: SDF or URDF path, or package:// URL. base: link that floats, the tree's root where it is left out. servos:
     constants by joint (AX-12A where none are given). ground: the floor. rigid_bodies: Motive asset -> link. bus_ids: Dynamixel ID
-    by joint. feet: links that stand on the ground; None: the last link with a collision shape on each branch (robot/feet.py).
-    packages: folder of each ROS package that the description's meshes name. held: its base was held in all its takes, and
-    is where a simulation is not told otherwise. InputError where the description is wanted for the base's default, and cannot be
-    read.
+    by joint. mountings: how servos sit on their joints, where the two angles differ. feet: links that stand on the ground; None:
+    the last link with a collision shape on each branch (robot/feet.py). packages: folder of each ROS package that the
+    description's meshes name. held: its base was held in all its takes, and is where a simulation is not told otherwise.
+    InputError where the description is wanted for the base's default, and cannot be read.
     """
 
     description: str
@@ -75,6 +77,7 @@ class RobotModel:
     feet: tuple[str, ...] | None = None
     packages: Mapping[str, str] = field(default_factory=dict)
     held: bool = False
+    mountings: Mapping[str, Mounting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.base:
@@ -92,12 +95,12 @@ class RobotModel:
 
     @cached_property
     def problems(self) -> tuple[str, ...]:
-        """What is doubtful in the description, a line each; InputError where Drake cannot build it."""
+        """Problems of the description, one line each; InputError where Drake cannot build it."""
         return (*self.source.problems, *model_problems(self.path, self.source.source))
 
     @cached_property
     def held_problems(self) -> tuple[str, ...]:
-        """As `problems`, of a robot whose base is always held: what the base weighs, and on what it stands, do not matter."""
+        """As `problems`, for a robot whose base is always held: the base's mass, and its feet, do not matter."""
         about = tuple(text for text in self.source.problems if not text.startswith(f"link '{self.base}' has no <inertial>"))
         return about + model_problems(self.path, self.source.source, self.base)
 
@@ -123,14 +126,14 @@ class RobotModel:
 
     def servo(self, joint: str) -> ServoConstants:
         """Constants of one joint's servo (default AX-12A where none are given)."""
-        return self.servos.get(joint, ServoConstants())
+        return self.servos.get(joint, _AX_12A)
 
     def with_effect(self, effect: EffectSpec) -> RobotModel:
         """The same robot with one effect more."""
         return self.with_effects((*self.effects, effect))
 
     def with_effects(self, effects: Sequence[EffectSpec]) -> RobotModel:
-        """The same robot with these effects in place of its own; what is known of its description is not read again."""
+        """The same robot with these effects instead of its own; its description is not read again."""
         return self.with_physics(self.servos, effects)
 
     def with_physics(self, servos: Mapping[str, ServoConstants], effects: Sequence[EffectSpec]) -> RobotModel:
@@ -176,6 +179,7 @@ class RobotModel:
             "ground": asdict(self.ground),
             "rigid_bodies": dict(self.rigid_bodies),
             "bus_ids": dict(self.bus_ids),
+            **({"mountings": {j: asdict(m) for j, m in self.mountings.items()}} if self.mountings else {}),
             "feet": None if self.feet is None else list(self.feet),
             "effects": [
                 {"effect": e.effect, "where": list(e.where),

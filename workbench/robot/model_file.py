@@ -12,23 +12,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.files.yaml_file import Fields, top_of, yaml_text
 from workbench.robot.model import EffectSpec, RobotModel
+from workbench.robot.mounting import written_mountings
 from workbench.robot.robot_section import read_model, read_servos
-
-Array = NDArray[np.float64]
+from workbench.robot.servo_profile_file import servo_profile
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """What is known of the effects' parameters, in the units of docs/formats.md, section 7.
+    """Posterior of the effects' parameters, in the units of docs/formats.md, section 7.
 
     names: (n) such as "backlash(flm).gap", "payload(body_link).position.x". mean: (n,). covariance: (n, n), infinite where
-    the data say nothing.
+    the data do not constrain them.
     """
 
     names: tuple[str, ...] = ()
@@ -84,13 +84,14 @@ def model_text(model: RobotModel, folder: Path, posterior: Posterior | None = No
 
 
 def robot_content(model: RobotModel, folder: Path) -> dict[str, Any]:
-    """The keys `robot` and `ground` of a file that is to lie in `folder`, its effects left out. Servos that are alike stand there
-    once; paths outside the folder are absolute."""
+    """The keys `robot` and `ground` of a file in `folder`, without effects. Identical servos are written once; paths outside the
+    folder are absolute."""
     servos = {j: model.servo(j).written() for j in model.joints}
     robot: dict[str, Any] = {
         "model": _description(model, folder.resolve()), "base": model.base,
         "servos": next(iter(servos.values())) if len({repr(s) for s in servos.values()}) == 1 else servos,
         "rigid_bodies": dict(model.rigid_bodies), "bus_ids": dict(model.bus_ids)}
+    robot |= written_mountings(model.mountings, {j: servo_profile(model.servo(j).model) for j in model.mountings})
     if model.packages:
         robot["packages"] = {name: str(Path(place).resolve()) for name, place in model.packages.items()}
     if model.feet is not None:
@@ -120,8 +121,8 @@ def load_model(path: str | Path) -> RobotModel:
 def load_model_file(path: str | Path) -> ModelFile:
     """Reads a model.yaml.
 
-    InputError names the file, the key and what was expected: an unknown key, a missing SDF, an effect at a place that the robot
-    lacks. Whether an effect of that name is installed, and what its parameters are, is for the effects package to say.
+    InputError names the file, the key and the expected value: an unknown key, a missing SDF, an effect at a place that the robot
+    lacks. The effects package checks whether an effect of that name is installed, and its parameters.
     """
     path = Path(path)
     top = top_of(path, "robot", "ground", "servos", "effects", "posterior", "provenance")

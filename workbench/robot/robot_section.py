@@ -9,18 +9,20 @@ from typing import Any
 from workbench.files import InputError
 from workbench.files.yaml_file import Fields, read_yaml
 from workbench.robot.model import PUPPY, Ground, RobotModel, puppy_model
+from workbench.robot.mounting import Mounting, read_lerobot, read_mountings
 from workbench.robot.names import BUS_IDS, RIGID_BODIES
 from workbench.robot.servo_constants import KEYS, ServoConstants, servo_constants
-from workbench.robot.servo_profile_file import with_family_law
+from workbench.robot.servo_profile_file import servo_profile, with_family_law
 
 _CONSTANTS = set(KEYS)
 
 
 def read_model(top: Fields) -> RobotModel:
-    """The robot of a file's `robot` and `ground`. InputError names the file, the key and what was expected."""
+    """The robot of a file's `robot` and `ground`. InputError names the file, the key and the expected value."""
     ground = _ground(top.mapping("ground"))
     f = top.mapping("robot") or Fields(top.path, {}, "robot")
-    f.only("model", "base", "servos", "rigid_bodies", "bus_ids", "feet", "held", "packages")
+    f.only("model", "base", "servos", "rigid_bodies", "bus_ids", "calibration", "direction", "offset", "homing", "feet", "held",
+           "packages")
     packages = _packages(f)
     description = f.text("model", PUPPY) or PUPPY
     if not description.startswith("package://"):
@@ -35,12 +37,12 @@ def read_model(top: Fields) -> RobotModel:
     if base not in links:
         raise f.error("base", f"the model has no link '{base}'; expected one of {', '.join(links)}")
     bodies = _rigid_bodies(f, links)
-    ids = _bus_ids(f, joints)
+    ids, mountings = _bus(f, joints)
     feet = _feet(f, links)
     servos = read_servos(f, joints, by_family=True)
     held = f.flag("held")
     f.done()
-    return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, servos=servos or model.servos,
+    return replace(model, base=base, rigid_bodies=bodies, bus_ids=ids, mountings=mountings, servos=servos or model.servos,
                    ground=ground or model.ground, feet=feet, held=held)
 
 
@@ -87,6 +89,17 @@ def _feet(f: Fields, links: tuple[str, ...]) -> tuple[str, ...] | None:
     return tuple(_name(f, "feet", link, "link", links) for link in given)
 
 
+def _bus(f: Fields, joints: tuple[str, ...]) -> tuple[dict[str, int], dict[str, Mounting]]:
+    """IDs and mountings, either written out or from LeRobot's calibration file."""
+    calibration = f.file("calibration")
+    if calibration is None:
+        return _bus_ids(f, joints), read_mountings(f, joints)
+    for key in ("bus_ids", "direction", "offset", "homing"):
+        if f.raw(key) is not None:
+            raise f.error(key, "is in the file that `calibration` names; expected one of the two")
+    return read_lerobot(calibration, joints)
+
+
 def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
     given = f.mapping("bus_ids")
     if given is None:
@@ -102,10 +115,10 @@ def _bus_ids(f: Fields, joints: tuple[str, ...]) -> dict[str, int]:
 
 
 def read_servos(f: Fields, joints: tuple[str, ...], by_family: bool = False) -> dict[str, ServoConstants]:
-    """Constants by joint, of the key `servos`: one for all or one for each, as files or as they are; empty where it is absent.
+    """Constants by joint, of the key `servos`: one for all or one for each, as files or inline; empty where it is absent.
 
-    by_family: whether what the file leaves out of the servo's law (delay, goal ramp, minimum duty, dead zone, load friction, …)
-    comes from its family's profile, with its uncertainty; else it is absent.
+    by_family: whether parts of the servo's law that the file omits (delay, goal ramp, minimum duty, dead zone, load friction, …)
+    come from its family's profile, with its uncertainty; else they are absent.
     """
     given = f.raw("servos")
     if given is None:
@@ -120,8 +133,18 @@ def read_servos(f: Fields, joints: tuple[str, ...], by_family: bool = False) -> 
 def _constants(f: Fields, key: str, value: Any, by_family: bool) -> ServoConstants:
     path, place = (f.path, f.at(key)) if isinstance(value, Mapping) else (f.existing(key, value), "")
     content = value if isinstance(value, Mapping) else read_yaml(path)
+    if isinstance(content, Mapping) and set(content) == {"model"}:
+        return _nominal(f, key, content["model"])
     servo = servo_constants(content, path, place)
     return with_family_law(servo, content) if by_family else servo
+
+
+def _nominal(f: Fields, key: str, name: Any) -> ServoConstants:
+    """Of a servo of which only the name is known."""
+    try:
+        return replace(servo_profile(str(name)).constants(), model=str(name))
+    except InputError as e:
+        raise f.error(key, f"model: {e.problem}") from None
 
 
 def _name(f: Fields, key: str, value: Any, kind: str, known: tuple[str, ...]) -> str:

@@ -10,6 +10,9 @@ from typing import Any
 
 from workbench.files import InputError
 from workbench.files.yaml_file import read_yaml
+from workbench.robot.law_covariance import LawCovariance, law_covariance
+from workbench.robot.torque_speed import TorqueSpeedLine
+from workbench.robot.torque_table import TorqueTable, torque_tables
 
 COUNT = math.radians(300 / 1023)
 """One count of goal position [rad] (AX-12A manual, 0 to 1023 over 300 degrees)."""
@@ -26,12 +29,13 @@ class ServoConstants:
     compliance_margin (counts of 300/1023 deg) and punch (of 1023), or proportional_gain (duty per radian), with minimum_duty at
     the edge of the dead_zone [deg each side of the goal].
 
-    What more real servos do, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which the
-    servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
-    rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tolerance,
-    back_emf_tolerance: standard deviation of the natural logarithm of torque at full duty and of back-EMF; None: what stall
-    torque, supply and no-load speed say. sd: standard deviation of a constant, by key, in its unit; of others the share in
-    SHARES_KNOWN. InputError names the key and what was expected.
+    Further behaviour of real servos, each zero unless given: goal_delay [s] after which a goal acts, goal_ramp [deg/s] at which
+    the servo's own goal moves at most, command_filter [s] as the time constant of its first-order lag, derivative_gain [duty per
+    rad/s] against the joint's speed, load_friction as a share of the torque that the gear transmits. torque_tables: repeatable
+    torques without a name, added to all these. torque_tolerance, back_emf_tolerance: standard deviation of the natural logarithm
+    of torque at full duty and of back-EMF; None: as follows from stall torque, supply and no-load speed. covariance: joint
+    uncertainty of the law's constants from an earlier diagnosis. sd: standard deviation of a constant, by key, in its unit; of
+    others the share in SHARES_KNOWN. InputError names the key and the expected value.
     """
 
     model: str = "AX-12A"
@@ -53,8 +57,10 @@ class ServoConstants:
     command_filter: float = 0.0
     derivative_gain: float = 0.0
     load_friction: float = 0.0
+    torque_tables: tuple[TorqueTable, ...] = ()
     torque_tolerance: float | None = None
     back_emf_tolerance: float | None = None
+    covariance: LawCovariance | None = None
     sd: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
@@ -64,12 +70,13 @@ class ServoConstants:
                 raise InputError(None, "expected compliance_slope, compliance_margin and punch, or proportional_gain")
             for name, instead in (("minimum_duty", "punch"), ("dead_zone", "compliance_margin")):
                 if getattr(self, name):
-                    raise InputError(None, f"{name} goes with proportional_gain; beside compliance_slope expected {instead}")
+                    raise InputError(None, f"{name} belongs to proportional_gain; with compliance_slope expected {instead}")
         elif any(v is not None for v in compliance):
             raise InputError(None, "proportional_gain excludes compliance_slope, compliance_margin and punch")
+        object.__setattr__(self, "torque_tables", torque_tables(self.torque_tables))
         for f in fields(self):
             v = getattr(self, f.name)
-            if f.name == "sd":
+            if f.name in ("sd", "covariance", "torque_tables"):
                 continue
             if f.name == "model":
                 if not isinstance(v, str):
@@ -119,6 +126,11 @@ class ServoConstants:
         """Torque lost per joint speed by the motor's back-EMF [N m s/rad]."""
         return self.stall_torque / self.no_load_speed
 
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """The torque-speed line at full duty and the supply voltage."""
+        return TorqueSpeedLine(self.torque_at_full_duty, self.back_emf, self.viscous_friction, self.coulomb_friction)
+
     def share_known(self, key: str) -> float:
         """Standard deviation of a number, as a share of its value; 0 where it is taken to be exact, or is 0. Besides the keys
         "torque_at_full_duty" and "back_emf", of which a tolerance is the standard deviation of the natural logarithm."""
@@ -135,12 +147,16 @@ class ServoConstants:
 
     def constants(self) -> dict[str, Any]:
         """By key, None where the other position law's; what only some servos do is left out where this one does not."""
-        return {key: getattr(self, key) for key in KEYS if key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key]}
+        out = {key: getattr(self, key) for key in KEYS
+               if key != "covariance" and (key not in _OPTIONAL or getattr(self, key) != _OPTIONAL[key])}
+        return out | ({"torque_tables": [t.written() for t in self.torque_tables]} if self.torque_tables else {})
 
     def written(self) -> dict[str, Any]:
         """As servo.yaml has it."""
         known = dict(self.sd)
-        return {k: {"value": v, "sd": known[k]} if k in known else v for k, v in self.constants().items() if v is not None}
+        together = {} if self.covariance is None else {"covariance": self.covariance.written()}
+        return {k: {"value": v, "sd": known[k]} if k in known else v
+                for k, v in self.constants().items() if v is not None} | together
 
     def updated(self, changes: dict[str, Any]) -> ServoConstants:
         """With some keys replaced; a switch between the two position laws drops the other's keys."""
@@ -159,7 +175,7 @@ class ServoConstants:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """What no hobby servo has, though nothing forbids it: mostly a unit that is not the key's."""
+        """Values that no hobby servo has, though they are not impossible: mostly in a wrong unit."""
         out = []
         for name, (likely, unit, other) in _LIKELY.items():
             v = getattr(self, name)
@@ -183,7 +199,8 @@ KEYS = tuple(f.name for f in fields(ServoConstants) if f.name != "sd")
 TOLERANCES = ("torque_tolerance", "back_emf_tolerance")
 _TOLERANCE_OF = {"torque_at_full_duty": "torque_tolerance", "back_emf": "back_emf_tolerance"}
 _OPTIONAL = {f.name: f.default for f in fields(ServoConstants) if f.name in (
-    "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", *TOLERANCES)}
+    "minimum_duty", "dead_zone", "goal_delay", "goal_ramp", "command_filter", "derivative_gain", "load_friction", "covariance",
+    "torque_tables", *TOLERANCES)}
 _LAW = ("compliance_slope", "compliance_margin", "punch", "proportional_gain")
 _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "rated_voltage": (100.0, "V"),
            "supply_voltage": (100.0, "V"), "coulomb_friction": (100.0, "N m"), "viscous_friction": (100.0, "N m s/rad"),
@@ -193,7 +210,7 @@ _BOUNDS = {"stall_torque": (200.0, "N m"), "no_load_speed": (200.0, "rad/s"), "r
            "goal_delay": (1.0, "s"), "goal_ramp": (1e5, "deg/s"), "command_filter": (1.0, "s"),
            "derivative_gain": (100.0, "duty per rad/s"), "load_friction": (2.0, "of the load"),
            "torque_tolerance": (3.0, "(of the logarithm)"), "back_emf_tolerance": (3.0, "(of the logarithm)")}
-"""Ten times beyond what any servo of a small robot has; what is larger is another unit or a slip."""
+"""Ten times beyond any servo of a small robot; a larger value is in another unit or a mistake."""
 _LIKELY = {"stall_torque": (12.0, "N m", "kg cm"), "no_load_speed": (25.0, "rad/s", "rpm or deg/s"),
            "rated_voltage": (30.0, "V", "mV"), "supply_voltage": (30.0, "V", "mV"),
            "coulomb_friction": (2.0, "N m", "kg cm"), "viscous_friction": (1.0, "N m s/rad", "another unit"),
@@ -213,7 +230,7 @@ def load_servo_constants(path: str | Path) -> ServoConstants:
 
 
 def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants:
-    """Constants out of keys and values that stand at `place` in the file `path`; InputError names file, place and key."""
+    """Constants from keys and values at `place` in the file `path`; InputError names file, place and key."""
     at = f"{place}: " if place else ""
     if not isinstance(content, Mapping):
         raise InputError(path, f"{at}expected a mapping of servo constants")
@@ -228,7 +245,9 @@ def servo_constants(content: Any, path: Path, place: str = "") -> ServoConstants
         raise InputError(path, f"{at}{empty[0]}: is empty; expected a value, or no such key")
     values, sd = dict(content), []
     for key, value in content.items():
-        if isinstance(value, Mapping):
+        if key == "covariance":
+            values[key] = law_covariance(value, path, f"{at}{key}: ", (*KEYS, *_TOLERANCE_OF, "zero"))
+        elif isinstance(value, Mapping):
             values[key], known = _value_and_sd(value, path, f"{at}{key}: ")
             sd.append((key, known))
     try:

@@ -85,18 +85,17 @@ class ServoProfile:
     """One family of bus servos. SI and radians.
 
     models: name by model number. protocol: of the bus. counts over span [rad]: of positions, `centre` the count of angle zero.
-    speed_unit [rad/s], largest_speed: of the register moving_speed, where 0 is as fast as it can; table_unit [rad/s]: what the
-    conversion of a motion table takes that unit for, where it is another. load_unit: share of full
-    output a count. supply: voltages [V] at which it works. full_torque: count of max_torque and torque_limit that limits
-    nothing. bit_rates: bit/s by value of baud_rate. return_delay_unit [s]. eeprom_below: address where RAM begins. law:
-    registers behind the keys of the nominal law. nominal: those keys, and how well they are known of a servo nobody measured.
-    tolerances: of torque and back-EMF, as in servo.yaml.
-    alarms, refusals: what the bits of an answer's error byte mean, of the servo's state and of the instruction; with protocol
-    2 alarms are bits of the register hardware_error and refusals numbers. position_mode: what registers hold in plain position
-    control. unlock: what lets the EEPROM be written. watchdog: register and its unit [s] with which a servo stops by itself
-    when the bus falls silent. maker: who builds it, for the rules that it gives. group_read: how many are asked at
-    once: Sync Read of protocol 2, Feetech's, or "" for one after the other. marker: a register that does nothing to the
-    joint and is forgotten when the servo restarts.
+    speed_unit [rad/s], largest_speed: of the register moving_speed, where 0 is as fast as possible; table_unit [rad/s]: unit that
+    the conversion of a motion table assumes, where it is another. load_unit: share of full output a count. supply: voltages [V]
+    at which it works. full_torque: count of max_torque and torque_limit that sets no limit. bit_rates: bit/s by value of
+    baud_rate. return_delay_unit [s]. eeprom_below: address where RAM begins. law: registers behind the keys of the nominal law.
+    nominal: those keys, and how well they are known for an unmeasured servo. tolerances: of torque and back-EMF, as in
+    servo.yaml. alarms, refusals: meanings of the bits of an answer's error byte, of the servo's state and of the instruction;
+    with protocol 2 alarms are bits of the register hardware_error and refusals numbers. position_mode: register values of plain
+    position control. unlock: register that allows the EEPROM to be written. watchdog: register and its unit [s] with which a
+    servo stops automatically when the bus falls silent. maker: manufacturer, for its recommendations. group_read: how many are
+    asked at once: Sync Read of protocol 2, Feetech's, or "" for one after the other. marker: a register without effect on the
+    joint that is reset when the servo restarts.
     """
 
     name: str

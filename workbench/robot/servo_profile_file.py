@@ -21,14 +21,14 @@ ENTRY_POINT_GROUP = "workbench.servos"
 _NOMINAL_KEYS = ("stall_torque", "no_load_speed", "rated_voltage", "supply_voltage", "coulomb_friction", "viscous_friction",
                  "reflected_inertia", *LAW_KEYS, *MORE_KEYS)
 BY_GAIN = ("minimum_duty", "dead_zone", "derivative_gain")
-"""Of the law by proportional gain; that by compliance has punch and margin in their place."""
+"""Keys of the law by proportional gain; the law by compliance has punch and margin instead."""
 _NEEDED = ("model_number", "id", "baud_rate", "return_delay_time", "cw_angle_limit", "ccw_angle_limit", "temperature_limit",
            "min_voltage_limit", "torque_enable", "goal_position", "moving_speed", "torque_limit", "max_torque",
            "present_position", "present_speed", "present_load", "present_voltage", "present_temperature")
 
 
 def load_profile(path: str | PurePath) -> ServoProfile:
-    """Reads a profile; InputError names the file, the key and what was expected."""
+    """Reads a profile; InputError names the file, the key and the expected value."""
     path = Path(path)
     top = top_of(path, "position", "speed", "load", "registers", "name", "models", "protocol", "supply", "position_mode",
                  "full_torque", "bit_rates", "return_delay_unit", "eeprom_below", "law", "nominal", "alarms", "refusals",
@@ -86,9 +86,9 @@ def servo_profile(model: str) -> ServoProfile:
 
 
 def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConstants:
-    """The constants, with what their file leaves out of the servo's law taken from its family's profile, with its uncertainty.
+    """The constants, with parts of the servo's law that their file omits taken from its family's profile, with its uncertainty.
 
-    given: keys of the file; what it gives stays, 0 too. Servos of an unknown family stay as they are. What belongs to the law by
+    given: keys of the file; their values are kept, including 0. Servos of an unknown family stay as they are. Keys of the law by
     proportional gain is not added to a servo with the law by compliance.
     """
     family = _family_of(servo.model)
@@ -104,7 +104,7 @@ def with_family_law(servo: ServoConstants, given: Collection[str]) -> ServoConst
 
 
 def model_name(number: int, protocol: int) -> str:
-    """What a model number stands for."""
+    """Name of the servo with a model number."""
     for profile in servo_profiles().values():
         if profile.protocol == protocol and number in profile.models:
             return profile.models[number]

@@ -1,4 +1,4 @@
-"""What the servos' own registers say, read over the bus: evidence of a session that needs no recording."""
+"""The servos' own registers, read over the bus: evidence of a session that needs no recording."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def save_registers(registers: ServoRegisters, path: str | Path) -> Path:
 
 
 def load_registers(path: str | Path, model: RobotModel | None = None) -> ServoRegisters:
-    """Reads registers.yaml; InputError names the file, the key and what was expected, or a joint that `model` lacks."""
+    """Reads registers.yaml; InputError names the file, the key and the expected value, or a joint that `model` lacks."""
     path = Path(path)
     top = Fields(path, read_yaml(path))
     if top.raw("format") != FORMAT:

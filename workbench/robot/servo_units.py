@@ -1,4 +1,4 @@
-"""Goal position and moving speed in a servo family's own counts: what a motion table is written in."""
+"""Goal position and moving speed in a servo family's own counts: the units of a motion table."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from workbench.robot.servo_profile_file import servo_profile
 
 @dataclass(frozen=True)
 class ServoUnits:
-    """The counts of one family; as it stands here, the AX-12A's (data/servos/ax12a.yaml says the same).
+    """The counts of one family; the defaults are the AX-12A's (the same as in data/servos/ax12a.yaml).
 
     family: its name. count: one count of position [rad]; centre: the position of angle zero; highest: the largest goal of a joint
-    that turns less than once. speed_unit: one count of moving speed [rad/s]; fastest: the largest count of it; table_unit: what a
-    motion table's conversion takes a count of moving speed for [rad/s] (the thesis: 114/1023 rpm, where the servo has 0.111).
+    that turns less than once. speed_unit: one count of moving speed [rad/s]; fastest: the largest count of it; table_unit: value
+    that a motion table's conversion assumes for a count of moving speed [rad/s] (the thesis: 114/1023 rpm, where the servo has
+    0.111).
     """
 
     family: str = "AX-12A"

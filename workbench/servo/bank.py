@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointActuator, PdControllerGains, RevoluteJoint
 from pydrake.systems.framework import DiagramBuilder
@@ -15,12 +14,11 @@ from pydrake.systems.primitives import ConstantVectorSource
 from workbench.files import InputError
 from workbench.robot import RobotModel
 from workbench.servo.law import ServoLaw
-from workbench.servo.rubbing import nominal_terms
+from workbench.servo.nominal import nominal_terms
 from workbench.servo.system import ServoBank
 from workbench.servo.term_bank import TermBank
 from workbench.servo.terms import ServoTerm, most_friction
 
-Array = NDArray[np.float64]
 Friction = Literal["implicit", "bristle"]
 
 HOLDING_DAMPING = 1e3
@@ -52,9 +50,9 @@ def servo_joints(plant: MultibodyPlant, model: RobotModel) -> list[RevoluteJoint
 
 def SetServoPhysics(plant: MultibodyPlant, model: RobotModel, friction: Friction, law: ServoLaw | None = None,
                     terms: Sequence[ServoTerm] = ()) -> ServoLaw:
-    """Sets on the plant's joints what the servos add to them, in place of what the SDF gave: damping, reflected inertia and,
-    where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque, or with the most that `terms` may
-    ask for).
+    """Sets on the plant's joints the properties that the servos add to them, replacing those of the SDF: damping, reflected
+    inertia and, where it is "implicit", Coulomb friction (an actuator that brakes with at most that torque, or with the largest
+    that `terms` may require).
 
     A joint's only actuator is used, because CENIC clamps the sum of several once, and because a joint's
     reflected inertia is that of its last actuator.
@@ -85,12 +83,12 @@ def AddServos(builder: DiagramBuilder, plant: MultibodyPlant, model: RobotModel,
     the goal ramp: the plant's step, or 1 ms in a continuous one. Takes the plant's applied_generalized_force input and, for
     implicit friction, desired_state of the instances that hold the joints. `friction`: "implicit" (discrete plants, the
     default there, and CENIC) or "bristle" (continuous plants under an integrator whose error control sees the bristles;
-    CENIC's does not: it steps over them and slides on without friction). `law`: in place of the model's nominal constants.
-    `terms`: what servos do beyond the law. A goal_delay of the model is in the commands of `simulate`, not in the bank: who sends
-    goals himself sends them that much later. In a discrete plant they take `period` to be its step, and make its output ports
-    unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that varies
-    needs bristles or a discrete plant. InputError for a plant that is finalized, lacks a joint, or does not go with `friction`,
-    and for a model with effects, which MakeStation takes.
+    CENIC's does not: it steps over them and slides without friction). `law`: replaces the model's nominal constants.
+    `terms`: behaviour of servos beyond the law. A goal_delay of the model is in the commands of `simulate`, not in the bank: who
+    sends goals himself sends them that much later. In a discrete plant they take `period` to be its step, and make its output
+    ports unsampled: a plant that samples them updates before the bank does, whose events then see the step's end. Friction that
+    varies needs bristles or a discrete plant. InputError for a plant that is finalized, lacks a joint, or does not support
+    `friction`, and for a model with effects, which MakeStation takes.
     """
     if model.effects and law is None:
         names = ", ".join(dict.fromkeys(e.effect for e in model.effects))

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.robot import ServoConstants
-
-Array = NDArray[np.float64]
+from workbench.robot.torque_speed import TorqueSpeedLine
+from workbench.robot.torque_table import TorqueTable
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,8 @@ class ServoLaw:
     """Constants of n servos as arrays (n,): gain [duty/rad], margin [rad], punch [duty], torque at full duty [N m] and that per
     volt of supply, back-EMF and viscous damping [N m s/rad], Coulomb friction [N m], reflected inertia [kg m^2]; derivative gain
     [duty per rad/s], speed of the goal's ramp [rad/s] (infinite: none), time constant of the goal's lag [s], and friction as a
-    share of the load. A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
+    share of the load; tables: torques beyond all that, each with the number of its servo.
+    A goal's delay is not here: it is in when commands come (`workbench.effects.apply.played`)."""
 
     gain: Array
     margin: Array
@@ -33,6 +35,7 @@ class ServoLaw:
     ramp: Array
     lag: Array
     load_friction: Array
+    tables: tuple[tuple[int, TorqueTable], ...] = ()
 
     @staticmethod
     def of(servos: Sequence[ServoConstants]) -> ServoLaw:
@@ -44,7 +47,13 @@ class ServoLaw:
         return ServoLaw(column("gain"), column("margin"), column("punch_duty"), column("torque_at_full_duty"),
                         column("back_emf"), column("viscous_friction"), column("coulomb_friction"), column("reflected_inertia"),
                         column("stall_torque") / column("rated_voltage"), column("derivative_gain"), column("ramp"),
-                        column("command_filter"), column("load_friction"))
+                        column("command_filter"), column("load_friction"),
+                        tuple((i, table) for i, s in enumerate(servos) for table in s.torque_tables))
+
+    @property
+    def line(self) -> TorqueSpeedLine:
+        """The torque-speed lines at full duty and the supply voltage."""
+        return TorqueSpeedLine(self.full_torque, self.back_emf, self.viscous, self.coulomb)
 
     @property
     def damping(self) -> Array:

@@ -20,8 +20,7 @@ from pydrake.systems.framework import (
 )
 
 from workbench.servo.law import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 BRISTLE_SLIP = 5e-4
 """Deflection [rad] at which a bristle of a continuous plant yields; a tenth of a count, so that no sensor sees it."""
@@ -41,7 +40,7 @@ class ServoBank(LeafSystem):
     (discrete state, n) towards the goal, or, where the law has a lag, towards the goal behind a first-order filter (discrete
     state, n), by no more than the law's own ramp. Back-EMF and viscous friction act as joint damping of the plant, Coulomb
     friction as its joints' actuators (implicit) or as bristles of this system (continuous state, n; after Dahl 1968), which both
-    hold at rest, so that generalized_force holds what remains.
+    hold at rest; generalized_force holds the rest.
     Build it with AddServos, which sets all that on the plant.
     """
 

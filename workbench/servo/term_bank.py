@@ -15,8 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, DependencyTicket, Di
 from workbench.servo.law import ServoLaw
 from workbench.servo.system import BRISTLE_SHARPNESS, BRISTLE_SLIP, ServoBank
 from workbench.servo.terms import Instant, ServoTerm, most_friction, wanted_friction
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 LOAD_SMOOTHING = 2e-3
 """Time constant [s] of the load that friction sees: following at once, friction and load would feed on each other from step to
@@ -27,8 +26,8 @@ MOVING = 5e-3
 
 @dataclass(frozen=True)
 class _Parts:
-    """(n,) [N m]. push: duty torque as the plant takes it, which takes back-EMF off itself; motor: duty torque less back-EMF;
-    friction: the dry friction wanted; relief: what the bank takes off the plant's, along the motion."""
+    """(n,) [N m]. push: duty torque as the plant takes it, which subtracts back-EMF itself; motor: duty torque less back-EMF;
+    friction: the dry friction wanted; relief: the reduction of the plant's friction by the bank, along the motion."""
 
     push: Array
     motor: Array
@@ -46,16 +45,18 @@ class TermBank(ServoBank):
     Back-EMF is damping of the plant, implicit in a discrete one, so that a motor torque that is saturated, cut, or off gets it
     back, at the velocity to expect at the end of the step.
 
+    Torques of tables are added to the motor's torque, whether torque is enabled or not.
+
     Friction that varies, discrete plants: the plant's actuator brakes with at most the most friction there can be; the bank
     pushes along the motion, at rest along the motion that friction prevents, with that less the friction wanted. A held joint
-    stays exactly held, as the actuator takes up what the bank pushes. Direction and load are those of the last step; a joint
+    stays exactly held, as the actuator absorbs the torque of the bank. Direction and load are those of the last step; a joint
     that turns back rests for one step. Bristles yield at the friction wanted.
 
-    The load is what the servo hands to its link: motor torque less viscous and dry friction less what the reflected inertia
-    takes. It is exact in discrete plants, for the step before the last; in continuous ones it comes from differences over a
-    period. Friction sees it through a first-order lag of LOAD_SMOOTHING.
+    The load is the torque that the servo transmits to its link: motor torque less viscous and dry friction and less the torque of
+    the reflected inertia. It is exact in discrete plants, for the step before the last; in continuous ones it comes from
+    differences over a period. Friction sees it through a first-order lag of LOAD_SMOOTHING.
 
-    Discrete state besides the reference: velocity (n), what is known of the load (n), load (n), friction of the last step (n),
+    Discrete state besides the reference: velocity (n), the knowledge of the load (n), load (n), friction of the last step (n),
     and whether there was a last step (1).
     """
 
@@ -72,6 +73,7 @@ class TermBank(ServoBank):
             self._ceiling = np.minimum(self._ceiling, term.ceiling())
             self._bend = self._bend + 1.0 / np.asarray(term.saturation())
         self._cuts = bool(np.isfinite(self._ceiling).any() or self._bend.any())
+        self._tabled = tuple(t for t in terms if type(t).more_torque is not ServoTerm.more_torque)
         self._discrete = plant.time_step() > 0
         self._smoothing = period / (period + LOAD_SMOOTHING)
         self._inertia_rate = law.inertia / period
@@ -97,7 +99,7 @@ class TermBank(ServoBank):
         context.get_mutable_numeric_parameter(self._first_command).SetFromVector([time])
 
     def SetReference(self, context: Context, reference: Array) -> None:
-        """As in ServoBank; joints may have been moved, so that the last step says nothing about the next."""
+        """As in ServoBank; joints may have been moved, so that the last step cannot predict the next."""
         super().SetReference(context, reference)
         context.SetDiscreteState(self._memory, np.zeros(4 * len(self.joints) + 1))
 
@@ -113,7 +115,7 @@ class TermBank(ServoBank):
         duty = duty if on is None else duty * on
         (last_v, _, load, held), stepped = self._remembered(context)
         begin = context.get_numeric_parameter(self._first_command).value()[0]
-        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none)
+        now = Instant(max(context.get_time() - begin, 0.0), v, duty, load, self._none, self._none, x[self._q])
         torque = duty * law.full_torque
         for term in self.terms:
             torque = torque * term.strength(law, now)
@@ -124,6 +126,8 @@ class TermBank(ServoBank):
             motor = motor - self._lost(motor)
         if on is not None:  # no back-EMF either: undo the joint's share of damping
             push, motor = np.where(on, push, law.back_emf * ahead), np.where(on, motor, 0.0)
+        for term in self._tabled:
+            push = push + term.more_torque(now)
         if not self._varies:
             return _Parts(push, motor, law.coulomb, self._none)
         now = replace(now, motor=motor, direction=_limited(v / MOVING))

@@ -1,4 +1,4 @@
-"""What a servo may do beyond the nominal law, at each instant: terms of a TermBank."""
+"""Behaviour of a servo beyond the nominal law, at each instant: terms of a TermBank."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from workbench.robot.torque_table import TorqueTable
 from workbench.servo.law import ServoLaw
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) of the joints [rad/s]; duty (n,), 0 with
-    torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it. Known where friction is
-    asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or would but for friction."""
+    """Of n servos now. elapsed: since the first command, 0 before it [s]; velocity (n,) and angle (n,) of the joints [rad/s,
+    rad]; duty (n,), 0 with torque disabled; load (n,): torque that each servo hands to its link [N m], as TermBank finds it.
+    Known where friction is asked: motor (n,): torque of the motor [N m]; direction (n,), -1 to 1: in which the joint turns, or
+    would but for friction."""
 
     elapsed: float
     velocity: Array
@@ -25,6 +25,7 @@ class Instant:
     load: Array
     motor: Array
     direction: Array
+    angle: Array
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class TermNumbers:
     full duty; fade [1/s]; sticking (n,) [N m] more friction at rest, fading as exp(-(w / speed)^2), speed [rad/s]; rubbing
     (n,): friction by load, rubbing_still (n,) more at rest, fading likewise by rubbing_speed [rad/s], rubbing_backwards (n,)
     more where the load drives the motor; bend (n,) [1/(N m)]: one over the torque at which the motor saturates; lopsided (n,):
-    share by which friction is more forwards and less backwards."""
+    share by which friction is more forwards and less backwards; tables: torques, each with the number of its servo."""
 
     ceiling: Array | None = None
     sag: float = 0.0
@@ -46,17 +47,18 @@ class TermNumbers:
     rubbing_backwards: Array | None = None
     bend: Array | None = None
     lopsided: Array | None = None
+    tables: tuple[tuple[int, TorqueTable], ...] = ()
 
 
 class ServoTerm:
-    """Does nothing unless overridden. What it returns is for all servos (n,), or one number for all."""
+    """Does nothing unless overridden. Its results are for every servo (n,), or one number for all."""
 
     def numbers(self) -> TermNumbers | None:
         """All that the term does, in numbers; None where they do not say it."""
         return None
 
     def strength(self, law: ServoLaw, now: Instant) -> Array | float:
-        """What is left of the duty torque, 0 to 1."""
+        """Factor on the duty torque, 0 to 1."""
         return 1.0
 
     def ceiling(self) -> Array | float:
@@ -66,6 +68,10 @@ class ServoTerm:
     def saturation(self) -> Array | float:
         """Torque s [N m] by which the motor's, x, acts as x / (1 + |x|/s)."""
         return np.inf
+
+    def more_torque(self, now: Instant) -> Array | float:
+        """Torque on the joint beyond the motor's and friction [N m]."""
+        return 0.0
 
     def friction(self, now: Instant) -> Array | float:
         """Dry friction beyond the law's Coulomb friction [N m], not negative."""

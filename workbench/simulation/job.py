@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Start
 from workbench.simulation.steady import BaseStates, JointStates
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

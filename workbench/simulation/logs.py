@@ -13,8 +13,8 @@ from workbench.servo import ServoLaw
 from workbench.servo.bank import servo_joints
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.gantry import AXES, base_poses
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LOGS = ("state_log", "net_actuation_log", "reference_log", "generalized_force_log", "motor_torque_log", "friction_relief_log")
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from workbench.motion import Motion, interpolate_motion
@@ -14,8 +13,8 @@ from workbench.robot import RobotModel
 from workbench.simulation.batch import Job
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import Simulation
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LEAD = 0.3
 """Rest before the first command [s]."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 from pydrake.planning import RobotDiagram
@@ -12,8 +11,7 @@ from pydrake.systems.framework import Context
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.servo.bank import servo_joints
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def play_back(diagram: RobotDiagram, context: Context, model: RobotModel, base: str, take: Take) -> Take:

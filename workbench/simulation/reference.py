@@ -14,8 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 
 from workbench.files import InputError
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def ConnectReference(

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -31,11 +30,10 @@ from workbench.simulation.playback import bridged_base, play_back
 from workbench.simulation.reference import linear_trajectory, reference_columns
 from workbench.simulation.steady import BaseSetter, BaseStates
 from workbench.simulation.structure import Structure
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.simulation.stepped import SteppedRun
-
-Array = NDArray[np.float64]
 
 
 class BaseState(NamedTuple):

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import GeometryId, SceneGraph, SceneGraphInspector, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialVelocity
@@ -19,7 +18,8 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from workbench.types import Array
+
 BESIDE = np.deg2rad(0.5)
 """Between simulated and recorded tilt of the base [rad], where half of it is taken away: noise of cameras leaves nearly all of
 it, and a walk that goes another way nearly none."""

@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.apply import played
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.take import Take
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.simulation.rollout import BaseState, Simulation, Start
-
-Array = NDArray[np.float64]
 
 
 class SteppedRun:

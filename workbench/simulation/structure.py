@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.apply import Physics
 from workbench.recording import quaternions as quat
 from workbench.recording.body_track import BodyTrack
 from workbench.robot import Kinematics, RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

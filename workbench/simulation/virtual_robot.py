@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.device.bus.survey import family_of
 from workbench.device.capture.virtual_motive import Pose, Scene
@@ -29,11 +28,12 @@ from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording import Measurement, Take, observe
 from workbench.robot import RobotModel, bus_ids
+from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
 from workbench.simulation.config import SimulationConfig
 from workbench.simulation.rollout import BaseState, Simulation
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FAMILIES = {"AX-12A": AX12A, "XL-330": XL330, "XL-430": XL430, "STS3215": STS3215}
 """Families of which there is a virtual servo, by the name of their profile."""
 PIVOT = 0.012
@@ -52,6 +52,8 @@ class StationBody:
         n = len(model.joints)
         self._goal, self._speed, self._on = np.zeros(n), np.zeros(n), np.zeros(n, dtype=bool)
         self._column = {i: model.joints.index(joint) for joint, i in bus_ids(model).items()}
+        self._servo = {i: JointServo(family_of(model), model.mountings.get(joint, Mounting()))
+                       for joint, i in bus_ids(model).items()}
         self._changed = False
         self._here: tuple[Array, Array, Array] | None = None
         self.let_go: int | None = None
@@ -61,7 +63,8 @@ class StationBody:
         """From now on the servo does this."""
         self._advance(now)
         k = self._column[joint]
-        self._goal[k], self._speed[k], self._on[k] = drive.goal, drive.speed, drive.enabled and drive.torque_limit > 0
+        goal = self._servo[joint].from_servo(drive.goal)
+        self._goal[k], self._speed[k], self._on[k] = goal, drive.speed, drive.enabled and drive.torque_limit > 0
         self._changed = True
         if self.let_go is None and self._on.all():
             self.let_go = now
@@ -76,7 +79,9 @@ class StationBody:
         q, v, duty = self._here
         k = self._column[joint]
         since = self.time(now) - self._run.time
-        return Sense(float(q[k] + since * v[k]), float(v[k]), float(duty[k] * self._on[k]))
+        servo = self._servo[joint]
+        sign = servo.mounting.direction
+        return Sense(servo.to_servo(float(q[k] + since * v[k])), sign * float(v[k]), sign * float(duty[k] * self._on[k]))
 
     def time(self, now: int) -> float:
         """The station's clock [s] at a time of the bus's [ticks]: it starts when the hand lets go."""

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.recording.take import Take
 from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 STAND_CLEARANCE = 0.05
 """Height of the lowest point above the floor at which a robot on a stand is shown [m]; how high it hung says nothing."""

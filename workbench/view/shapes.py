@@ -18,8 +18,7 @@ from workbench.files.resources import ConfigureParser
 from workbench.robot.feet import foot_points
 from workbench.robot.model import RobotModel
 from workbench.robot.model_source.checks import quiet_drake
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 GREY = Rgba(0.8, 0.8, 0.8, 1.0)
 

@@ -17,7 +17,7 @@ TICK = 2 * math.pi / 4096
 
 
 def matches(head: bytes) -> bool:
-    """Told by its first line."""
+    """Recognised by its first line."""
     return head.startswith(FIRST)
 
 

@@ -1,7 +1,8 @@
-"""Physics put into the robot: this engine's own making of all effects of docs/formats.md, section 7, and of some beyond it.
+"""Physics hidden in the robot: this engine's own implementation of the effects of docs/formats.md, section 7, and of some beyond
+it.
 
 Written from the contract's words alone; no code of the workbench's effects, station or servo law is used, only `EffectSpec`, so
-that a diagnosis which finds what is hidden here has not found its own formulas. What the words leave open is decided in the
+that a diagnosis which finds these effects has not found its own formulas. Details that the words leave open are decided in the
 functions' docstrings.
 """
 

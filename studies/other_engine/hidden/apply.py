@@ -1,4 +1,4 @@
-"""The effects of a model, worked into what the engine plays and films."""
+"""Applies the effects of a model to the commands, the robot and the camera of this engine."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from studies.other_engine.hidden.values import vector
 from studies.other_engine.servo import ServoBank
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 MEASURED = ("marker_frame",)
 VOCABULARY = (*COMMANDS, *ROBOT, *AROUND, *CONSTANTS, *STEP, *MEASURED)
 """The contract's effects."""
@@ -38,7 +38,7 @@ class Hidden:
     rng: np.random.Generator
 
     def heard(self, sent: Commands) -> Commands:
-        """What reaches the servos of what was sent."""
+        """The commands that reach the servos."""
         for spec in self.model.effects:
             if spec.effect in COMMANDS:
                 sent = COMMANDS[spec.effect](sent, spec, self.model, self.rng)
@@ -46,7 +46,7 @@ class Hidden:
 
 
 def hide(robot: Description, model: RobotModel, rng: np.random.Generator) -> Hidden:
-    """The robot with the model's effects; `rng` decides what is up to chance (missed poses, dips of power).
+    """The robot with the model's effects; `rng` drives random effects (missed poses, dips of power).
 
     ValueError for an effect that is not in KNOWN, and for parameters that it cannot use.
     """

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studies.other_engine.description import Description, LinkPart, SeriesJoint, Surroundings
 from studies.other_engine.hidden.values import angle, number, vector
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LOSS = 1e-3
 """Damping of a compliant gear over its stiffness [s]: a twentieth of critical at 100 rad/s. The contract leaves it open."""
 RATTLE = 1e-4
@@ -43,7 +42,7 @@ def loose_mount(robot: Description, spec: EffectSpec) -> Description:
 
 
 def joint_stop(robot: Description, spec: EffectSpec) -> Description:
-    """The servo's shaft ends there, or before, where the description says so."""
+    """The servo's shaft ends there, or earlier if the description sets a limit."""
     lower, upper = angle(spec, "lower"), angle(spec, "upper")
     return _joints(robot, spec, lambda l: replace(l, lower=max(l.lower, lower), upper=min(l.upper, upper)))
 
@@ -108,7 +107,7 @@ def soft_ground(robot: Description, spec: EffectSpec) -> Description:
 
 
 def ground_friction(around: Surroundings, spec: EffectSpec) -> Surroundings:
-    """Of all feet that have none of their own."""
+    """Applies to every foot without a value of its own."""
     return replace(around, friction=number(spec, "friction"))
 
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from studies.other_engine.hidden.values import angle, number, optional
 from studies.other_engine.servo import ServoBank
 from workbench.robot import EffectSpec
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Instant:
 
 
 class StepEffect:
-    """Nothing unless overridden. What it returns is for all servos (n,), or one number for all."""
+    """Does nothing unless overridden. Results are for every servo (n,), or one number for all."""
 
     needs_load = False
 
@@ -49,11 +48,11 @@ class StepEffect:
         self.here[columns] = 1.0
 
     def sensor_error(self, q: Array) -> Array | float:
-        """What the sensor says beyond the angle q [rad]."""
+        """Error of the sensor, added to the angle q [rad]."""
         return 0.0
 
     def strength(self, now: Instant, supply: Array) -> Array | float:
-        """What is left of the duty's torque, 0 to 1, of servos at `supply` (n,) [V]."""
+        """Factor on the duty's torque, 0 to 1, of servos at `supply` (n,) [V]."""
         return 1.0
 
     def ceiling(self) -> Array | float:
@@ -61,7 +60,7 @@ class StepEffect:
         return np.inf
 
     def saturated(self, torque: Array) -> Array:
-        """What acts of the motor's torque (n,) [N m]."""
+        """The part of the motor's torque that acts (n,) [N m]."""
         return torque
 
     def friction(self, now: Instant) -> Array | float:
@@ -133,7 +132,7 @@ class StribeckFriction(StepEffect):
 
 
 class LoadFriction(StepEffect):
-    """Coulomb friction grows by `coefficient` times what the joint hands to its link (not what the motor gives), by `static`
+    """Coulomb friction grows by `coefficient` times the torque of the joint on its link (not the motor's torque), by `static`
     times that more at rest, fading as exp(-(v / speed)²), by `backdrive` times more where the motor pulls against the motion."""
 
     needs_load = True
@@ -154,7 +153,7 @@ class LoadFriction(StepEffect):
 
 
 class FrictionAsymmetry(StepEffect):
-    """All Coulomb friction is `ratio` times as much forwards as backwards, and in the mean what it was."""
+    """All Coulomb friction is `ratio` times as much forwards as backwards, with the mean unchanged."""
 
     needs_load = True
 
@@ -224,7 +223,7 @@ CONSTANTS: dict[str, Callable[[ServoBank, NDArray[np.int_], EffectSpec], None]] 
 
 
 class Drive:
-    """A bank of servos with what is hidden in it."""
+    """A bank of servos with hidden effects."""
 
     def __init__(self, servos: ServoBank, effects: Sequence[StepEffect] = ()) -> None:
         self.servos, self.effects = servos, tuple(effects)
@@ -233,7 +232,7 @@ class Drive:
             self.most = np.minimum(self.most, e.ceiling())
 
     def acting(self, torque: Array) -> Array:
-        """What acts of the motors' torque (n,) [N m]."""
+        """The part of the motors' torque that acts (n,) [N m]."""
         for e in self.effects:
             torque = e.saturated(torque)
         return np.clip(torque, -self.most, self.most)
@@ -250,7 +249,7 @@ class Drive:
         return q
 
     def strength(self, now: Instant) -> Array | float:
-        """What is left of the duty's torque."""
+        """Factor on the duty's torque."""
         left: Array | float = 1.0
         for e in self.effects:
             left = left * e.strength(now, self.servos.supply)

@@ -1,4 +1,4 @@
-"""Physics that the contract has no name for. An honest diagnosis says that something is left, and what it depends on.
+"""Physics outside the vocabulary. An honest diagnosis reports an unexplained residual, and the signal it depends on.
 
 | effect | where | parameters |
 |---|---|---|
@@ -26,8 +26,8 @@ from studies.other_engine.hidden.body import Around, Build
 from studies.other_engine.hidden.drive import Instant, StepEffect
 from studies.other_engine.hidden.values import angle, number, vector
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Columns = NDArray[np.int_]
 
 

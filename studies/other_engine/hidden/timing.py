@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studies.other_engine.hidden.values import number
 from workbench.motion.commands import Commands
 from workbench.robot import EffectSpec, RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Change = Callable[[Commands, EffectSpec, RobotModel, np.random.Generator], Commands]
 
 
@@ -35,7 +34,7 @@ def clock_rate(sent: Commands, spec: EffectSpec, model: RobotModel, rng: np.rand
 
 
 def dropped_command(sent: Commands, spec: EffectSpec, model: RobotModel, rng: np.random.Generator) -> Commands:
-    """A servo that misses a pose goes on to its last goal at its last speed; before its first it stays in neutral."""
+    """A servo that misses a pose continues to its last goal at its last speed; before its first it stays in neutral."""
     goals, speeds = sent.goals.copy(), sent.speeds.copy()
     for joint in spec.where:
         c = sent.column(joint)

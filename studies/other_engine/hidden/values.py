@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.robot import EffectSpec
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def number(spec: EffectSpec, name: str) -> float:

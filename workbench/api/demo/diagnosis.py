@@ -33,8 +33,8 @@ class Found:
 
 
 def diagnosis_section(folder: Path, progress: Callable[[str, float | None], None], n_jobs: int = 2) -> Found:
-    """Diagnoses the bundled logs of an arm and writes the whole diagnosis into `folder`. progress: called with what is being
-    done and the share done."""
+    """Diagnoses the bundled logs of an arm and writes the diagnosis into `folder`. progress: called with the current stage and
+    the share done."""
 
     def stage(what: str, done: float | None) -> None:
         progress(f"a diagnosis: {what}", done)

@@ -19,7 +19,7 @@ from workbench.view.report.gait import write_gait_page
 from workbench.view.report.page import Part, Section, Text
 
 SPEED = 0.10
-"""What the demo asks for [m/s]: four times what the ROBOTIS walk does on this model."""
+"""Speed that the demo requests [m/s]: four times that of the ROBOTIS walk on this model."""
 
 
 def demo_options() -> OptimizeOptions:
@@ -44,8 +44,8 @@ def gait_section(folder: Path, model: RobotModel, progress: Callable[[str, float
         write_gait_page(folder, model, result)
         if result.met:
             export(load_motion(folder / "gait.csv", model), model, folder / "firmware", result.certified.take)
-            parts.append(Text("`gait/report.html` shows it in 3D, with every limit; `gait/firmware/` is what the robot plays. "
-                              "`workbench optimize --help` lists what else can be requested."))
+            parts.append(Text("`gait/report.html` shows it in 3D, with every limit; `gait/firmware/` holds the tables for the "
+                              "robot. `workbench optimize --help` lists the other requests."))
     return Section("A new gait", parts)
 
 

@@ -54,8 +54,8 @@ _SYNTHETIC = (
 
 @dataclass(frozen=True)
 class Demo:
-    """What the demo found and wrote. table: the thesis's with our rows under it, as text. finding: of the comparison.
-    diagnosed: of the diagnosis. page: the report."""
+    """Results of the demo. table: the thesis's with our rows under it, as text. finding: of the comparison. diagnosed: of the
+    diagnosis. page: the report."""
 
     table: str
     finding: str
@@ -65,7 +65,7 @@ class Demo:
 
 
 def run_demo(folder: Path, progress: Callable[[str, float | None], None]) -> Demo:
-    """Simulates, compares, exports and writes it all into `folder`; progress: called with what it is at and the share done."""
+    """Simulates, compares, exports and writes everything into `folder`; progress: called with the stage and the share done."""
     began = time.monotonic()
     model = puppy_model()
     motion = load_motion(data_file("robotis_walk.csv"), model)
@@ -146,7 +146,7 @@ def _firmware_section(motion: Motion, folder: Path, violations: tuple[Violation,
     return Section("Onto the robot", [
         Text(f"{names} in `firmware/`, checked against each servo's range, speed and, as it ran in simulation, torque."),
         Table(["pose", "dwell [ms]", *table.joints], rows, "; ".join(map(str, table.families)) + "."),
-        Details("What the check says", [Text(said)])])
+        Details("Result of the check", [Text(said)])])
 
 
 def _as_text(rows: list[Row]) -> str:

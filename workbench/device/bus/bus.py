@@ -16,7 +16,6 @@ from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.ports import GONE, StripEcho, gone
 from workbench.device.bus.wire import clean, echo_error, hear, hears_itself, ping
 from workbench.robot.servo_profile import Register, ServoProfile
-from workbench.robot.servo_profile_file import model_name
 
 T = TypeVar("T")
 LONGEST = 200
@@ -93,20 +92,27 @@ class Bus:
         return {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
 
     def write(self, servo: int, values: Mapping[str, int], check: bool = True) -> None:
-        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written.
+        """Writes registers one by one and, with `check`, reads each back. BusError names the one that is not as written. A servo
+        that answers reads only (status_return_level 1) is believed by what it reads.
 
         EEPROM of a family that locks it is unlocked before and locked after."""
         eeprom = any(self._register(name).address < self.profile.eeprom_below for name in values)
         switch = self.profile.unlock if eeprom else None
         if switch is not None:
-            self._write(servo, switch.register, switch.open)
+            self._switch(servo, switch.register, switch.open)
         for name, value in values.items():
-            self._write(servo, name, value)
+            with suppress(*([NoAnswerError] if check else [])):
+                self._write(servo, name, value)
             if check and self.read(servo, name)[name] != value:
                 found = self.read(servo, name)[name]
                 raise BusError(f"reads {found} after {value} was written", servo, self.joints.get(servo), name)
         if switch is not None and "id" not in values:
-            self._write(servo, switch.register, switch.closed)
+            self._switch(servo, switch.register, switch.closed)
+
+    def _switch(self, servo: int, name: str, value: int) -> None:
+        """Writes a register of which only the effect on others counts; whether it answered does not matter."""
+        with suppress(NoAnswerError):
+            self._write(servo, name, value)
 
     def exists(self, servo: int, tries: int | None = None) -> int | None:
         """Model number of a servo, None where none answers to so many questions (default: the options')."""
@@ -139,10 +145,9 @@ class Bus:
         self.asked = self.now() + len(packet) * self.port.tx_time_per_byte / 1000
         heard = self._guarded(lambda: self._collect(packet, len(servos) * group.answer_length(kind, count)))
         out = {}
-        for servo, (error, data) in group.answers(kind, heard, count).items():
-            if servo in servos:
-                self._look(servo, error)
-                out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
+        for servo, (error, data) in group.answers(kind, heard, count, servos).items():
+            self._look(servo, error)
+            out[servo] = {r.name: r.decode(data[r.address - first:r.address - first + r.size]) for r in wanted}
         return out
 
     def _collect(self, packet: bytes, most: int) -> bytes:
@@ -282,12 +287,6 @@ class Bus:
         if self.profile.protocol == 1:
             return bytes(answer[5:answer[3] + 3])
         return bytes(answer[9:(answer[5] | answer[6] << 8) + 5])
-
-    def wrong_model(self, servo: int, number: int) -> BusError:
-        """The error of a servo that is of another kind than the profile's."""
-        found = model_name(number, self.profile.protocol)
-        expected = " or ".join(sorted(self.profile.models.values()))
-        return BusError(f"is {found} ({number}); expected {expected}", servo, self.joints.get(servo))
 
 
 def _batched(items: list[bytes], size: int) -> Iterable[list[bytes]]:

@@ -26,10 +26,12 @@ def answer_length(kind: Kind, count: int) -> int:
     return count + (6 if kind == "feetech" else 11)
 
 
-def answers(kind: Kind, heard: bytes, count: int) -> dict[int, tuple[int, bytes]]:
-    """Error byte and data by ID, of every whole answer with `count` bytes of data in what was heard; the rest is skipped."""
+def answers(kind: Kind, heard: bytes, count: int, servos: Sequence[int]) -> dict[int, tuple[int, bytes]]:
+    """Error byte and data by ID, of every whole answer with `count` bytes of data; other bytes are skipped. Empty where an answer
+    comes twice, out of turn, or from a servo that was not asked: then another program talks on the bus, and any of the answers
+    may be to its questions."""
     out: dict[int, tuple[int, bytes]] = {}
-    at = 0
+    at, turn = 0, -1
     header = HEADER1 if kind == "feetech" else HEADER2
     while (at := heard.find(header, at)) >= 0:
         found = _protocol1(heard, at, count) if kind == "feetech" else _protocol2(heard, at, count)
@@ -37,6 +39,9 @@ def answers(kind: Kind, heard: bytes, count: int) -> dict[int, tuple[int, bytes]
             at += 1
             continue
         servo, error, data, at = found
+        if servo not in servos or servos.index(servo) <= turn:
+            return {}
+        turn = servos.index(servo)
         out[servo] = error, data
     return out
 

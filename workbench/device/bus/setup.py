@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 from workbench.device.bus.bus import Bus
@@ -10,6 +9,7 @@ from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import Survey
 from workbench.files import InputError
 from workbench.robot import RobotModel, bus_ids
+from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_profile import ServoProfile
 
@@ -18,11 +18,12 @@ ROUNDING = 2
 
 
 def wanted_registers(model: RobotModel, joint: str, profile: ServoProfile) -> dict[str, int]:
-    """What `set_up` writes into a joint's servo: no return delay, and the joint's range, by the model
+    """What `set_up` writes into a joint's servo: answers to all instructions without delay, and the joint's range, by the model
     and the table of ranges that the firmware's tables keep to."""
     own = joint_ranges(model)[joint]
-    lowest, highest = _limit(own.lower, profile), _limit(own.upper, profile)
-    return {"return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
+    lowest, highest = JointServo(profile, model.mountings.get(joint, Mounting())).limits(own.lower, own.upper)
+    level = {"status_return_level": 2} if "status_return_level" in profile.registers else {}
+    return {**level, "return_delay_time": 0, "cw_angle_limit": lowest, "ccw_angle_limit": highest}
 
 
 def wider_limits(model: RobotModel, found: Survey) -> tuple[str, ...]:
@@ -75,10 +76,3 @@ def set_id(bus: Bus, model: RobotModel, found: Survey, joint: str) -> str:
     if lock is not None:
         bus.write(new, {lock.register: lock.closed})
     return f"servo {old} is now {new} ({joint})"
-
-
-def _limit(angle: float, profile: ServoProfile) -> int:
-    """Nearest count of a joint's limit that the register holds."""
-    if math.isinf(angle):
-        return 0 if angle < 0 else profile.largest_position
-    return min(max(profile.centre + round(angle / profile.count), 0), profile.largest_position)

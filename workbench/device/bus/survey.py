@@ -5,13 +5,14 @@ from __future__ import annotations
 import datetime
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError, NoAnswerError
 from workbench.device.bus.wire import measure_latency
 from workbench.files import InputError
 from workbench.robot import RobotModel, bus_ids
+from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
 from workbench.robot.servo_profile_file import model_name, servo_profile
 from workbench.robot.servo_registers import ServoReading, ServoRegisters
@@ -24,7 +25,8 @@ FIRST = 25.0
 
 @dataclass(frozen=True)
 class FoundServo:
-    """One servo. joint: the model's, None for a stranger. registers: in counts; angle [rad], voltage [V], temperature [deg C]."""
+    """One servo. joint: the model's, None for a servo that is not in the model. registers: in counts. angle: the joint's, without
+    a joint the servo's own [rad]. voltage [V], temperature [deg C]. mounting: how the servo sits on its joint."""
 
     id: int
     joint: str | None
@@ -35,6 +37,7 @@ class FoundServo:
     voltage: float
     temperature: int
     alarms: tuple[str, ...]
+    mounting: Mounting = field(default_factory=Mounting)
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class Survey:
             limit = servo.registers.get("temperature_limit", 70)
             if servo.temperature > limit - COOLER:
                 out.append(f"{name}: {servo.temperature} deg C; expected at least {COOLER} below its limit of {limit}")
-            out += [f"{name}: {problem}" for problem in _mode(servo, self.profile)]
+            out += [f"{name}: {problem}" for problem in (*_mode(servo, self.profile), *_homing(servo))]
         return tuple(out)
 
     def _supply(self) -> list[str]:
@@ -97,11 +100,12 @@ def family_of(model: RobotModel) -> ServoProfile:
     return servo_profile(families.pop())
 
 
-def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
+def survey(bus: Bus, model: RobotModel | None, ids: Iterable[int] = ALL_IDS,
            progress: Callable[[str, float], None] | None = None) -> Survey:
-    """Asks every ID, then every servo for all its registers. BusError in one line where nobody answers, with who does at which
-    other bit rate."""
-    joints = {i: joint for joint, i in bus_ids(model).items()}
+    """Asks every ID, then reads all registers of each servo that answered. Without a model no servo has a joint. BusError where
+    none answers; it says at which other bit rate servos do."""
+    joints = {} if model is None else {i: joint for joint, i in bus_ids(model).items()}
+    mountings = {} if model is None else model.mountings
     bus.joints.update(joints)
     wanted = sorted({*ids, *joints})
     _measure(bus, [*joints, *(i for i in wanted if i not in joints)])
@@ -118,7 +122,8 @@ def survey(bus: Bus, model: RobotModel, ids: Iterable[int] = ALL_IDS,
         if progress is not None:
             progress("reading registers", k / len(numbers))
         if servo not in doubled:
-            found[servo] = _found(bus, servo, number, joints.get(servo))
+            joint = joints.get(servo)
+            found[servo] = _found(bus, servo, number, joint, mountings.get(joint or "", Mounting()))
     missing = tuple(joint for i, joint in joints.items() if i not in numbers and i not in doubled)
     return Survey(bus.profile, int(bus.port.getBaudRate()), found, missing, doubled, bus.latency)
 
@@ -149,7 +154,7 @@ def read_registers(bus: Bus, servo: int) -> dict[str, int]:
     return out | bus.read(servo, *group)
 
 
-def _found(bus: Bus, servo: int, number: int, joint: str | None) -> FoundServo:
+def _found(bus: Bus, servo: int, number: int, joint: str | None, mounting: Mounting) -> FoundServo:
     name = model_name(number, bus.profile.protocol)
     if number not in bus.profile.models:  # its table is another one
         return FoundServo(servo, joint, number, name, {}, math.nan, math.nan, 0, ())
@@ -157,8 +162,9 @@ def _found(bus: Bus, servo: int, number: int, joint: str | None) -> FoundServo:
         registers = read_registers(bus, servo)
     except NoAnswerError as e:
         raise BusError(f"answered once, then not any more: {e.said}", servo, joint) from None
-    return FoundServo(servo, joint, number, name, registers, bus.profile.angle(registers["present_position"]),
-                      registers["present_voltage"] / 10, registers["present_temperature"], bus.alarms.get(servo, ()))
+    angle = JointServo(bus.profile, mounting).angle(registers["present_position"])
+    return FoundServo(servo, joint, number, name, registers, angle, registers["present_voltage"] / 10,
+                      registers["present_temperature"], bus.alarms.get(servo, ()), mounting)
 
 
 def _mode(servo: FoundServo, profile: ServoProfile) -> Iterable[str]:
@@ -171,6 +177,13 @@ def _mode(servo: FoundServo, profile: ServoProfile) -> Iterable[str]:
     for name, expected in profile.position_mode.items():
         if r[name] != expected:
             yield f"{name} is {r[name]}; expected {expected}, for plain position control"
+
+
+def _homing(servo: FoundServo) -> Iterable[str]:
+    """A servo whose zero was moved since the robot was calibrated."""
+    expected, found = servo.mounting.homing, servo.registers.get("homing_offset")
+    if expected is not None and found != expected:
+        yield f"homing_offset is {found}, the calibration says {expected}; its angles are not those of the calibration"
 
 
 def _nobody(bus: Bus, wanted: list[int]) -> BusError:

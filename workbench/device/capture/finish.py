@@ -29,8 +29,8 @@ from workbench.files import InputError
 from workbench.files.reading import write_whole
 from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.motive_write import write_motive
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 KEPT = 20
 """Broken packets whose bytes are kept, for whoever wants to know why."""
 DRIFT_AFTER = 10.0
@@ -194,7 +194,7 @@ def _problems(counts: Counts, gaps: Mapping[str, float], worst: float, clock: Se
     if worst > 1e-3:
         out.append(f"the frames are not evenly spaced: up to {1000 * worst:.1f} ms off their rate")
     if not math.isfinite(clock.offset):
-        out.append("the server answers no echo (NatNet before 3.0): its clock is set by the soonest arrival of a frame")
+        out.append("the server answered no echo request: its clock is estimated from the earliest arrival of a frame")
     unseen = [name for name, share in gaps.items() if share == 1]
     if unseen:
         out.append(f"never seen: {', '.join(unseen)}")

@@ -60,6 +60,10 @@ class UdpLink:
             raise InputError(None, f"interface '{self.interface}': not an address of this machine; expected one of "
                                    f"{', '.join(addresses())}") from None
         self._data: socket.socket | None = None
+        self._sender = ""
+        self.others: set[str] = set()
+        """Addresses of other servers on the same multicast group, whose packets are dropped. The server that was asked may send
+        from another of its addresses: then the first sender is taken for it."""
 
     @property
     def description(self) -> str:
@@ -97,9 +101,16 @@ class UdpLink:
         ready, _, _ = select.select(sockets, [], [], timeout)
         for s in ready:
             try:
-                return time.monotonic(), s.recv(65536)
+                data, (sender, _) = s.recvfrom(65536)
             except OSError:  # an ICMP answer to an earlier command: nobody listens there
                 continue
+            if s is self._data:
+                if not self._sender or sender == self._server[0]:
+                    self._sender = sender
+                if sender != self._sender:
+                    self.others.add(sender)
+                    continue
+            return time.monotonic(), data
         return None
 
     def close(self) -> None:

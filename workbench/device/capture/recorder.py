@@ -42,6 +42,8 @@ class RecordOptions:
     """Until a stream that stopped ends the recording."""
     echo_every: float = 0.5
     """Between measurements of the server's clock; the best of a few is kept."""
+    trailing: float = 0.25
+    """Silence at the end of a recording that is reported: seven frames at 30 Hz, the slowest rate."""
     keep_alive_every: float = 1.0
     """Between signs of life, without which a server that sends to each client alone stops after some seconds."""
 
@@ -121,6 +123,9 @@ class Recorder:
             self._check_silence(now - began, now - self._last_frame)
             if progress is not None:
                 progress(self._said(), None if seconds is None or math.isinf(first) else (now - first) / seconds)
+        quiet = self.link.now() - self._last_frame
+        if self.counts_received and not self.problem and quiet > self.options.trailing:
+            self.problem = f"no frame came in the last {quiet:.1f} s of the recording"
         return self.counts
 
     @property

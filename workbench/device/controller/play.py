@@ -24,6 +24,7 @@ from workbench.device.link import (
     upload_frames,
 )
 from workbench.device.tables.table_file import TableFile, encode_table
+from workbench.robot.mounting import JointServo, Mounting
 from workbench.robot.servo_profile import ServoProfile
 
 ANSWER = 1.5
@@ -240,7 +241,8 @@ def play_by_controller(port: Any, table: TableFile, seconds: float, log: Path, p
         raise NothingPlayedError(stopped)
     first = began + FIRST_POSE + (8 + 5 * len(table.table.joints)) * BUS_BYTE
     rounds = [m for _, m in controller.heard if isinstance(m, LogMessage) and first - KEPT <= m.time <= first + seconds]
-    write_telemetry(log, rounds, table.table.joints, profile)
+    servos = [JointServo(profile, Mounting(joint.direction, zero=joint.neutral)) for joint in table.joints]
+    write_telemetry(log, rounds, table.table.joints, servos)
     started = first + controller.clock_offset()
     zero = rounds[0].time + rounds[0].duration / 2
     return ControllerRun(started, started + seconds, first - zero, len(rounds), stopped)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from workbench.device.play.journal import read_play_journal
 from workbench.files import InputError
 from workbench.recording.formats.joint_log import write_joint_log
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NEAR = 0.002
 """A row holds what was read within so long of it [s], moved to the row's time along the line between two readings: at 200 deg/s
 and a corner in between that is wrong by 0.4 deg at worst."""
@@ -26,6 +26,11 @@ STILL = math.radians(0.5)
 LATE = 2.0
 """An answer that took so many times as long as usual, and DELAY longer, has an unknown time, as the computer stood still."""
 DELAY = 0.002
+
+FASTEST = 20.0
+"""No hobby servo turns faster [rad/s]; the fastest with a profile reaches 11 without a load."""
+JUMP = math.radians(2)
+"""Smaller steps are never thought to be impossible [rad]: a count of noise in a very short time."""
 
 
 class NothingPlayedError(InputError):
@@ -100,7 +105,18 @@ def _trusted(readings: Mapping[str, Array]) -> dict[str, Array]:
     for joint, rows in readings.items():
         late = rows[:, 4] > max(LATE * usual, usual + DELAY)
         late[[0, -1]] = False
-        out[joint] = rows[~late]
+        timely = rows[~late]
+        out[joint] = timely[_possible(timely)]
+    return out
+
+
+def _possible(rows: Array) -> NDArray[np.bool_]:
+    """Without single readings to and from which the joint would have had to turn faster than any servo: answers to another
+    program's question, or bytes whose errors the checksum missed."""
+    step, took = np.diff(rows[:, 1]), np.maximum(np.diff(rows[:, 0]), 1e-4)
+    fast = (np.abs(step) > FASTEST * took) & (np.abs(step) > JUMP)
+    out = np.ones(len(rows), dtype=bool)
+    out[1:-1] = ~(fast[:-1] & fast[1:] & (step[:-1] * step[1:] < 0))
     return out
 
 

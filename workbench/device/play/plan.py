@@ -16,7 +16,7 @@ from workbench.motion.commands import Commands
 
 STEP = 0.02
 """Readings of a joint farther apart than this leave out what a walk does [s]: a quarter of the shortest pose there is."""
-STATE_BYTES = 11
+STATE_BYTES = 9
 """Of registers in one reading, on average over those with and without load, voltage and heat."""
 ENOUGH = 500
 """Poses of a motion that are looked at."""

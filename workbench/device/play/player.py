@@ -16,8 +16,9 @@ from workbench.device.play.rig import Rig
 from workbench.device.play.watch import Reaction, StopError, Watch, WatchOptions
 from workbench.files import InputError
 from workbench.motion.commands import Commands
+from workbench.robot.mounting import JointServo
+from workbench.types import Progress
 
-Progress = Callable[[str, float | None], None]
 HOLDING = "the servos could not be told to let go and may hold their last goal: switch the robot's power off"
 
 
@@ -35,7 +36,8 @@ def play(bus: Bus, found: Survey, commands: Commands, journal: PlayJournal, stop
     limits = {servo.id: servo.registers.get("temperature_limit", 70) for servo in found.found.values()}
     watch = Watch(bus.profile, {i: j for j, i in ids.items()}, limits, watching)
     torque_limits = {s.joint: s.registers["torque_limit"] for s in found.found.values() if s.joint is not None}
-    rig = Rig(bus, ids, watch, journal, torque_limits)
+    servos = {s.joint: JointServo(bus.profile, s.mounting) for s in found.found.values() if s.joint is not None}
+    rig = Rig(bus, ids, watch, journal, torque_limits, servos)
     return _Performance(rig, stop, options or PlayOptions(), progress or (lambda what, done: None)).run(commands)
 
 
@@ -118,9 +120,8 @@ class _Performance:
         self._seat(neutral)
 
     def _keep_in_range(self) -> None:
-        profile = self.rig.bus.profile
-        low, high = profile.angle(0), profile.angle(profile.largest_position)
         for joint, angle in self.goals.items():
+            low, high = self.rig.servos[joint].range
             if not low <= angle <= high:
                 raise BusError(f"stands at {math.degrees(angle):.0f} deg, beyond the range of its goals; turn it back by hand",
                                self.rig.ids[joint], joint)

@@ -13,11 +13,12 @@ from workbench.device.bus.group import answer_length
 from workbench.device.play.journal import PlayJournal
 from workbench.device.play.watch import Watch
 from workbench.motion.lead_in import SLOW
+from workbench.robot.mounting import JointServo
 
 STATE = ("present_position", "present_load", "present_voltage", "present_temperature")
 POSITION = ("present_position",)
 GOAL = "goal_position"
-"""Read back with every second reading of a servo: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
+"""Read back in turn with load, voltage and heat: nobody answers a Sync Write, so that a lost pose would go unnoticed."""
 ROUND, ROUND_AT_ONCE = 0.018, 0.003
 """Shortest time in which all servos are read once [s], one after the other, and by one question: more would show nothing new of a
 joint that swings a few times a second."""
@@ -40,15 +41,15 @@ LIMP_EVERY = 5
 @dataclass
 class Rig:
     """ids: by joint. Reads in turn whenever there is time, and writes down everything. torque_limits: of each joint's servo, in
-    counts, as it was found. readings: of each joint's position, so far. repaired: goals that
-    had to be sent again. missed: goals
-    that had not arrived when the next one was sent."""
+    counts, as it was found. servos: what turns each joint's angles into counts. readings: of each joint's position, so far.
+    repaired: goals that had to be sent again. missed: goals that had not arrived when the next one was sent."""
 
     bus: Bus
     ids: Mapping[str, int]
     watch: Watch
     journal: PlayJournal
     torque_limits: Mapping[str, int]
+    servos: Mapping[str, JointServo]
 
     def __post_init__(self) -> None:
         self._joints = list(self.ids)
@@ -83,7 +84,7 @@ class Rig:
             if not agreed:
                 raise BusError("two readings in a row never agree; does it move, or is its sensor bad?", servo, joint,
                                "present_position")
-            out[joint] = self.angles[joint] = profile.angle(last)
+            out[joint] = self.angles[joint] = self.servos[joint].angle(last)
         return out
 
     def send(self, goals: Mapping[str, float], speeds: Mapping[str, float]) -> float:
@@ -100,7 +101,7 @@ class Rig:
         time = "goal_time" in profile.registers
         packet = {}
         for joint, goal in goals.items():
-            count, kept = profile.position(goal), self._told.get(joint, (-1, 0))
+            count, kept = self.servos[joint].position(goal), self._told.get(joint, (-1, 0))
             speed = profile.speed(speeds[joint]) if speeds[joint] else kept[1] if kept[0] == count else profile.speed(SLOW)
             self._told[joint], self._goals[joint] = (count, speed), goal
             packet[self.ids[joint]] = {"goal_position": count, "moving_speed": speed, **({"goal_time": 0} if time else {})}
@@ -192,8 +193,10 @@ class Rig:
         if at_once:
             turn = self._turn % (4 * STATE_EVERY)
             return self._limp if turn == 1 else (GOAL, *STATE) if turn % STATE_EVERY == 0 else POSITION
-        turn = self._turn // turns
-        return (*STATE, *self._limp) if turn % LIMP_EVERY == 0 else (GOAL, *STATE) if turn % 2 else STATE
+        turn = self._turn // turns % LIMP_EVERY
+        if turn == 0:
+            return (*self._limp, GOAL, *POSITION) if self._together else (*STATE, *self._limp)
+        return STATE if turn % 2 else (GOAL, *POSITION)
 
     def _read_all(self, names: tuple[str, ...]) -> None:
         """One question to all; whoever did not answer is asked alone first next time: it may keep others silent."""
@@ -240,7 +243,7 @@ class Rig:
         self.watch.answered(servo, bus.now(), values, bus.alarms.get(servo, ()))
         if "present_position" not in values:
             return
-        angle = bus.profile.angle(values["present_position"])
+        angle = self.servos[joint].angle(values["present_position"])
         self.angles[joint] = angle
         if GOAL in values and joint in self._told:
             if values[GOAL] == self._told[joint][0]:

@@ -10,6 +10,7 @@ from workbench.device.bus.bus import Bus
 from workbench.device.bus.errors import BusError
 from workbench.device.bus.survey import FoundServo
 from workbench.files import InputError
+from workbench.robot.mounting import Mounting
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,8 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
     here = bus.read(servo.id, "present_position")["present_position"]
     if abs(bus.read(servo.id, "present_position")["present_position"] - here) * profile.count > math.radians(2):
         raise BusError("it moves; hold the robot still", servo.id, servo.joint)
-    there = min(here + round(o.by / profile.count), profile.largest_position)
+    step = servo.mounting.direction * round(o.by / profile.count)
+    there = min(max(here + step, 0), profile.largest_position)
     time = {"goal_time": 0} if "goal_time" in profile.registers else {}
 
     def go(count: int) -> None:
@@ -58,7 +60,8 @@ def wiggle(bus: Bus, servo: FoundServo, options: WiggleOptions | None = None) ->
         bus.write(servo.id, {"torque_enable": 1})
         go(there)
         bus.pause(o.by / o.speed + o.rest)
-        went = (bus.read(servo.id, "present_position")["present_position"] - here) * profile.count
+        moved = bus.read(servo.id, "present_position")["present_position"] - here
+        went = servo.mounting.direction * moved * profile.count
         go(here)
         bus.pause(o.by / o.speed + o.rest)
     finally:
@@ -90,11 +93,28 @@ class Answers:
             self.reversed.append(other)
 
     def findings(self, ids: Mapping[str, int]) -> list[str]:
-        """What is wrong with bus_ids and directions, a line each."""
+        """What is wrong with bus IDs and directions, a line each."""
         out = [f"servo {ids[told]} is {seen}, not {told}: bus_ids should say {seen}: {ids[told]}"
                for told, seen in self.moved.items() if told != seen]
         seen = list(self.moved.values())
         out += [f"joint {joint} moved for several servos: look again" for joint in sorted({j for j in seen if seen.count(j) > 1})]
-        out += [f"joint {joint} turns the other way than the model: its axis in the model has the wrong sign, or its servo is "
-                "mounted the other way round" for joint in self.reversed]
+        out += [f"joint {joint} turns the other way than in the model" for joint in self.reversed]
         return out
+
+    def corrected(self, ids: Mapping[str, int], mountings: Mapping[str, Mounting]) -> dict[str, dict[str, int]]:
+        """The keys `bus_ids` and `direction` of a `robot` section that agree with what was seen; a key that is right already is
+        left out. InputError where two servos were seen to move one joint."""
+        seen = list(self.moved.values())
+        if len(set(seen)) < len(seen):
+            raise InputError(None, "one joint moved for several servos; wiggle them again")
+        new = {joint: ids[told] for told, joint in self.moved.items()}
+        unseen = {joint: i for joint, i in ids.items() if joint not in new and i not in new.values()}
+        signs = {}
+        for joint in ids:
+            told = next((t for t, s in self.moved.items() if s == joint), joint)
+            sign = mountings.get(told, Mounting()).direction * (-1 if joint in self.reversed else 1)
+            if sign != 1:
+                signs[joint] = sign
+        old = {joint: m.direction for joint, m in mountings.items() if m.direction != 1}
+        out = {} if all(ids[joint] == i for joint, i in new.items()) else {"bus_ids": new | unseen}
+        return out if signs == old else out | {"direction": signs}

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.device.tables.limits import Violation, refuse_broken_limits
+from workbench.device.tables.mounted import in_joint_counts, in_servo_counts, zeros
 from workbench.device.tables.table_file import TableFile, encode_table, table_file, unplayable
 from workbench.files import InputError
 from workbench.files.numerals import whole_of
@@ -19,13 +20,14 @@ from workbench.files.reading import read_text, write_together
 from workbench.motion import Motion, PoseTable
 from workbench.recording.take import Take
 from workbench.robot import BUS_IDS, RobotModel, bus_ids
+from workbench.robot.mounting import Mounting
 from workbench.robot.servo_profile_file import servo_profile
 from workbench.robot.servo_units import AX12A, ServoUnits, known_units
 
 Counts = NDArray[np.int64]
 
 GOALS, SPEEDS, DWELLS, HEADER, BINARY = "pos.txt", "speed.txt", "timeDiff.txt", "motion.h", "motion.table"
-ORDER, FAMILIES, SECTIONS = "# joints:", "# servos:", "# sections:"
+ORDER, FAMILIES, SECTIONS, MOUNTED = "# joints:", "# servos:", "# sections:", "# mounted:"
 _MOST = 2**31 - 1  # of a dwell [ms]; the other registers are checked by the table
 
 
@@ -54,7 +56,8 @@ def export(
     if not other:
         file = table_file(table, model)
         other = unplayable(file.table)
-    return Export(tuple(write_tables(table, out_dir, bus_ids(model), None if other else file)), tuple(violations), other)
+    files = write_tables(table, out_dir, bus_ids(model), None if other else file, model.mountings)
+    return Export(tuple(files), tuple(violations), other)
 
 
 def check_servos(motion: Motion, model: RobotModel) -> None:
@@ -75,21 +78,27 @@ def _check_ids(joints: Sequence[str], ids: Mapping[str, int], source: str) -> No
 
 def write_tables(
     table: PoseTable, folder: str | Path, ids: Mapping[str, int] = BUS_IDS,
-    file: TableFile | None = None,
+    file: TableFile | None = None, mountings: Mapping[str, Mounting] | None = None,
 ) -> list[Path]:
     """Writes pos.txt, speed.txt, timeDiff.txt, motion.h and, where `file` holds it with its bounds, motion.table; all or none.
 
     The text files keep the thesis's layout (figure 3.4: first the number of poses, then a row for each) under a first
     line that says the order of joints, the same in all files; where servos are none of the AX-12A's family, a second line says
-    which they are, as counts are theirs; where there are poses of a start or a stop, a line says how many (SECTIONS). InputError
+    which they are, as counts are theirs; where there are poses of a start or a stop, a line says how many (SECTIONS), and where
+    a servo turns against its joint or has its zero elsewhere, a line says so (MOUNTED). Goals are those of the servos. InputError
     for a joint without a bus ID.
     """
     _check_ids(table.joints, ids, table.source)
+    mounted = [(j, m.direction, zero) for j, u, zero in zip(table.joints, table.units, zeros(table, mountings or {}))
+               if (m := (mountings or {}).get(j, Mounting())).direction != 1 or zero != u.centre]
+    table = in_servo_counts(table, mountings or {})
     order = f"{ORDER} {' '.join(table.joints)}"
     if any(u != AX12A for u in table.units):
         order += f"\n{FAMILIES} {', '.join(u.family for u in table.units)}"
     if table.start or table.stop:
         order += f"\n{SECTIONS} start {table.start} loop {table.loop} stop {table.stop}"
+    if mounted:
+        order += f"\n{MOUNTED} {', '.join(f'{joint} {sign:+d} {zero}' for joint, sign, zero in mounted)}"
 
     def text(rows: Counts) -> str:
         return "\n".join([order, f"{len(rows)},", *(f"{_listed(row)}," for row in rows)]) + "\n"
@@ -105,13 +114,14 @@ def write_tables(
 
 
 def read_tables(folder: str | Path) -> PoseTable:
-    """Reads the three text files back; InputError where they disagree, or lack the line that says the order of joints."""
+    """Reads the three text files back, goals as counts of the joints; InputError where they disagree, or lack the line that says
+    the order of joints."""
     folder = Path(folder)
-    (joints, units, sections), goals = _read(folder / GOALS)
+    (joints, units, sections, mountings), goals = _read(folder / GOALS)
     columns = {SPEEDS: len(joints), DWELLS: 1}
     counts = {}
     for name, width in columns.items():
-        (order, families, again), counts[name] = _read(folder / name, width)
+        (order, families, again, _), counts[name] = _read(folder / name, width)
         if order != joints:
             raise InputError(folder / name, f"line 1: joints are not in the order of {GOALS}")
         if families != units:
@@ -120,11 +130,12 @@ def read_tables(folder: str | Path) -> PoseTable:
             raise InputError(folder / name, f"line '{SECTIONS} …': not that of {GOALS}")
         if len(counts[name]) != len(goals):
             raise InputError(folder / name, f"{len(counts[name])} poses, but {len(goals)} in {GOALS}")
-    return PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder), units, *sections)
+    table = PoseTable(joints, goals, counts[SPEEDS], counts[DWELLS][:, 0], str(folder), units, *sections)
+    return in_joint_counts(table, mountings)
 
 
-Order = tuple[tuple[str, ...], tuple[ServoUnits, ...], tuple[int, int]]
-"""The joints, the units of their servos, and how many poses are of the start and of the stop."""
+Order = tuple[tuple[str, ...], tuple[ServoUnits, ...], tuple[int, int], Mapping[str, Mounting]]
+"""The joints, the units of their servos, how many poses are of the start and of the stop, and how servos are mounted."""
 
 
 def _read(path: Path, width: int | None = None) -> tuple[Order, Counts]:
@@ -139,6 +150,9 @@ def _read(path: Path, width: int | None = None) -> tuple[Order, Counts]:
     sections = (0, 0, 0)
     if lines[first:] and lines[first].startswith(SECTIONS):
         sections, first = _sections(path, lines[first], first + 1), first + 1
+    mountings: dict[str, Mounting] = {}
+    if lines[first:] and lines[first].startswith(MOUNTED):
+        mountings, first = _mountings(path, lines[first], first + 1, joints), first + 1
     rows: list[list[int]] = []
     for n, line in enumerate(lines[first:], start=first + 1):
         rows.append([])
@@ -154,7 +168,17 @@ def _read(path: Path, width: int | None = None) -> tuple[Order, Counts]:
             raise InputError(path, f"pose {k}: expected {width or len(joints)} numbers, found {len(row)}")
     if any(sections) and sum(sections) != len(rows) - 1:
         raise InputError(path, f"line '{SECTIONS} …': says {sum(sections)} poses, and {len(rows) - 1} follow")
-    return (joints, units, (sections[0], sections[2])), np.array(rows[1:], dtype=np.int64)
+    return (joints, units, (sections[0], sections[2]), mountings), np.array(rows[1:], dtype=np.int64)
+
+
+def _mountings(path: Path, line: str, n: int, joints: Sequence[str]) -> dict[str, Mounting]:
+    out = {}
+    for entry in line.removeprefix(MOUNTED).strip().split(","):
+        found = re.fullmatch(r"(\S+) ([+-]1) (\d{1,9})", entry.strip())
+        if found is None or found[1] not in joints:
+            raise InputError(path, f"line {n}: expected '{MOUNTED} JOINT +1 or -1 COUNT, …', found '{entry.strip()[:60]}'")
+        out[found[1]] = Mounting(int(found[2]), zero=int(found[3]))
+    return out
 
 
 def _sections(path: Path, line: str, n: int) -> tuple[int, int, int]:

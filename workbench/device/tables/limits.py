@@ -8,17 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 
 from workbench.files import InputError
 from workbench.motion import PoseTable
 from workbench.recording.take import Take
-from workbench.robot import RobotModel, ServoConstants
+from workbench.robot import RobotModel
 from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_units import maker_of
-
-Array = NDArray[np.float64]
 
 RPM = 2 * math.pi / 60
 HOLD = 0.01
@@ -98,9 +95,7 @@ def _speeds(table: PoseTable, model: RobotModel) -> Iterator[Violation]:
     asked = np.where(table.speeds > 0, table.rates(), travel) / RPM
     for i, joint in enumerate(table.joints):
         servo = model.servo(joint)
-        no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage / RPM
-        surplus = max(servo.torque_at_full_duty - servo.coulomb_friction, 0.0)
-        reached = surplus / (servo.back_emf + servo.viscous_friction) / RPM
+        no_load, reached = float(servo.line.no_load_speed) / RPM, float(servo.line.reachable_speed) / RPM
         for k in np.flatnonzero(asked[:, i] > reached):
             broken = bool(asked[k, i] > no_load)
             limit = no_load if broken else reached
@@ -127,7 +122,7 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
             raise InputError(take.name, f"the simulated take lacks joint '{joint}'")
         servo, i = model.servo(joint), take.column(joint)
         torque = take.torque[moving, i]
-        allowed = _available(servo, torque, np.zeros_like(torque) if take.v is None else take.v[moving, i])
+        allowed = servo.line.available(torque, np.zeros_like(torque) if take.v is None else take.v[moving, i])
         lasting = minimum_filter1d(np.nan_to_num(np.abs(torque) - allowed, nan=-np.inf), window)
         k = int(np.argmax(lasting))
         if lasting[k] > 0.01 * servo.torque_at_full_duty:
@@ -145,14 +140,3 @@ def _torques(table: PoseTable, model: RobotModel, take: Take) -> Iterator[Violat
 def _rule(model: str) -> str:
     """Whose advice the share of the stall torque is: ROBOTIS gives it for its own servos."""
     return "ROBOTIS's rule" if maker_of(model) == "ROBOTIS" else "ROBOTIS's rule for its own servos; ask the maker of this one"
-
-
-def _available(servo: ServoConstants, torque: Array, speed: Array) -> Array:
-    """Largest torque (N,) [N m] in the direction of `torque` at a joint speed [rad/s] (docs/formats.md, section 4).
-
-    Full duty less back-EMF; where the load drives the joint backwards, the gearbox's friction helps to hold it.
-    """
-    along = speed * np.sign(torque)
-    line = servo.torque_at_full_duty - servo.back_emf * along
-    friction = np.where(along < 0, servo.coulomb_friction - servo.viscous_friction * along, 0)
-    return np.asarray(np.maximum(line + friction, 0), dtype=float)

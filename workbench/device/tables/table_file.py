@@ -11,9 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from workbench.device.tables.mounted import in_servo_counts, zeros
 from workbench.files import InputError
 from workbench.motion import PoseTable
 from workbench.robot import BUS_IDS, RobotModel, bus_ids
+from workbench.robot.mounting import Mounting
 from workbench.robot.ranges import joint_ranges
 from workbench.robot.servo_units import AX12A
 
@@ -38,7 +40,8 @@ _JOINT = struct.Struct("<BBHHHHH")
 @dataclass(frozen=True)
 class JointBounds:
     """What the controller holds a joint to: bus ID, model number of its servo, goals from `low` to `high`, moving speed up to
-    `fastest`, and where neutral is [all in the servo's own counts]."""
+    `fastest`, and where neutral is [all in the servo's own counts]. direction: -1 where the servo turns against its joint; the
+    controller has no use for it, and a binary table does not hold it."""
 
     bus_id: int
     model_number: int = AX12A_NUMBER
@@ -46,12 +49,13 @@ class JointBounds:
     high: int = LARGEST
     fastest: int = LARGEST
     neutral: int = CENTRE
+    direction: int = 1
 
 
 @dataclass(frozen=True)
 class TableFile:
-    """A pose table with what makes it safe to play. joints: as many as the table's columns. cycles: how many, where `stops`;
-    else the table goes on until it is stopped or another comes."""
+    """A pose table, in the servos' own counts, with what makes it safe to play. joints: as many as the table's columns. cycles:
+    how many, where `stops`; else the table goes on until it is stopped or another comes."""
 
     table: PoseTable
     joints: tuple[JointBounds, ...]
@@ -69,16 +73,20 @@ def bounds_of(table: PoseTable, model: RobotModel, numbers: Mapping[str, int] | 
     if other:
         raise InputError(table.source, other)
     ids, ranges = bus_ids(model), joint_ranges(model)
-    bounds = []
+    bounds, neutral = [], zeros(table, model.mountings)
     for i, joint in enumerate(table.joints):
         servo, limits = model.servo(joint), (ranges[joint].lower, ranges[joint].upper)
         low, high = (min(max(round(CENTRE + limit / AX12A.count), 0), LARGEST) if math.isfinite(limit) else edge
                      for limit, edge in zip(limits, (0, LARGEST)))
-        no_load = servo.no_load_speed * servo.supply_voltage / servo.rated_voltage
+        low, high = min(low, CENTRE, int(table.goals[:, i].min())), max(high, CENTRE, int(table.goals[:, i].max()))
+        sign, zero = model.mountings.get(joint, Mounting()).direction, neutral[i]
+        ends = sorted(min(max(zero + sign * (end - CENTRE), 0), LARGEST) for end in (low, high))
+        no_load = float(servo.line.no_load_speed)
         bounds.append(JointBounds(
             ids[joint], (numbers or {}).get(joint, AX12A_NUMBER),
-            low=min(low, CENTRE, int(table.goals[:, i].min())), high=max(high, CENTRE, int(table.goals[:, i].max())),
-            fastest=max(1, min(LARGEST, round(no_load / AX12A.speed_unit)), int(table.speeds[:, i].max()))))
+            low=ends[0], high=ends[1],
+            fastest=max(1, min(LARGEST, round(no_load / AX12A.speed_unit)), int(table.speeds[:, i].max())),
+            neutral=zero, direction=sign))
     return tuple(bounds)
 
 
@@ -94,7 +102,7 @@ def table_file(table: PoseTable, model: RobotModel, cycles: int = 0, stops: bool
     order = np.argsort(joints)
     whole = replace(table, joints=tuple(joints[k] for k in order), goals=goals[:, order], speeds=speeds[:, order],
                     units=(AX12A,) * len(joints) if absent else table.units)
-    return TableFile(whole, bounds_of(whole, model), cycles, stops)
+    return TableFile(in_servo_counts(whole, model.mountings), bounds_of(whole, model), cycles, stops)
 
 
 def unplayable(table: PoseTable) -> str:

@@ -174,12 +174,11 @@ class ServoBus:
         """Sync Read: each answers when the one before it has; one that does not silences all after it."""
         if not ids:
             return
-        for servo in self.servos:
-            if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key:
-                end = servo.answer_in_turn(what, time)
-                if end is not None:
-                    self.clock.at(end, partial(self._asked_in_turn, what, ids[1:], key, end))
-                    return
+        ends = [servo.answer_in_turn(what, time) for servo in self.servos
+                if servo.ident == ids[0] and (servo.rate, id(servo.profile.protocol)) == key]
+        answered = [end for end in ends if end is not None]
+        if answered:
+            self.clock.at(max(answered), partial(self._asked_in_turn, what, ids[1:], key, max(answered)))
 
     def _collide(self, one: Burst, two: Burst) -> None:
         """Where bytes of two talkers overlap, both come out as what neither said, with a broken stop bit."""

@@ -101,6 +101,6 @@ _STS3215 = {
     "present_current": Kept(),
 }
 
-XL330 = emulated("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False)
-XL430 = emulated("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False)
+XL330 = emulated("xl330", "XL330-M288-T", 148, _XL330, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
+XL430 = emulated("xl430", "XL430-W250-T", 148, _XL430, protocol=Protocol2(), refresh=0.0, goal_enables=False, boot=0.4)
 STS3215 = emulated("sts3215", "STS3215", 71, _STS3215, refresh=0.0, eeprom_lock=1)

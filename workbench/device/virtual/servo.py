@@ -32,7 +32,8 @@ class VirtualServo:
     """One servo on a bus, by default an AX-12A as it leaves the factory, but for its ID.
 
     joint: the body's name for what it moves (default: the ID it starts with). seed: phase of its motor interrupt and jitter.
-    Faults a test may set: mute (hears, never answers), temperature [deg C], overload (as if stalled for long), settings.
+    Faults a test may set: mute (hears, never answers), temperature [deg C], overload (as if stalled for long), settings. It is
+    made as one that has started; after its power was off it hears nothing for the family's `boot`, unless not `starts_slowly`.
     """
 
     def __init__(self, bus: ServoBus, profile: VirtualProfile, ident: int, body: Body, joint: int | None = None,
@@ -41,6 +42,7 @@ class VirtualServo:
         self.joint = ident if joint is None else joint
         self.mute = False
         self.powered = True
+        self.starts_slowly = False
         self.temperature = 30.0
         self.overload = False
         self.written: list[tuple[int, int, int]] = []
@@ -60,6 +62,7 @@ class VirtualServo:
         self["id"] = ident
         bus.add(self)
         self._power_on()
+        self.starts_slowly = True
 
     # Registers
 
@@ -105,6 +108,8 @@ class VirtualServo:
             self._put(self.profile.by_name["torque_limit"], self["max_torque"])
         self._registered = None
         now = self.bus.clock.now
+        if self.starts_slowly:
+            self._deaf_until = now + round(self.profile.boot * SECOND)
         angle = self.body.sense(self.joint, now).angle
         self._put(self.profile.by_name["goal_position"], self._count(angle))
         self._steer(now)

@@ -18,6 +18,7 @@ class Backlash(Effect):
     layer = "structure"
     places = ("joint",)
     under_load = True
+    needs_steady_load = True
     free_play = "gap"
     # measured on hobby servos: 0.6 to 1.3 deg; worn ones are said to have "at least 2"
     parameters = (Parameter("gap", "deg", 0.0, 30.0, 1.0, si=DEGREE, seldom_beyond=4.0),)

@@ -11,8 +11,8 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class DampingGain(ServoConstant):
-    """A servo's duty is less by `gain` times the speed of its joint, beyond nominal: viscous friction by the motor, which ends
-    where duty is full and goes with torque off."""
+    """A servo's duty is reduced by `gain` times the speed of its joint, beyond nominal: viscous friction made by the motor, which
+    is lost where duty saturates and while torque is off."""
 
     name = "damping_gain"
     field = "derivative"

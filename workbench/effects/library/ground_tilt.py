@@ -7,8 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from workbench.effects.base import DEGREE, Array, Effect, Parameter, si_values
+from workbench.effects.base import DEGREE, Effect, Parameter, si_values
 from workbench.robot import GRAVITY, EffectSpec, RobotModel
+from workbench.types import Array
 
 
 class GroundTilt(Effect):

@@ -20,6 +20,7 @@ class JointCompliance(Effect):
     layer = "structure"
     places = ("joint",)
     under_load = True
+    needs_steady_load = True
     parameters = (Parameter("stiffness", "N m/rad", 0.2, 1e4, 10.0),)
 
     def sentence(self, spec: EffectSpec) -> str:

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
-from workbench.servo import Rubbing, ServoTerm
-
-Array = NDArray[np.float64]
+from workbench.servo import LoadFrictionTerm, ServoTerm
 
 
 class LoadFriction(Effect):
@@ -28,6 +26,7 @@ class LoadFriction(Effect):
     places = ("joint",)
     family = "friction"
     under_load = True
+    needs_steady_load = True
     # 0.17 and 0.3 by fits to an XL-330 and an STS3215; from about half on a gear holds by itself what hangs on it
     parameters = (
         Parameter("coefficient", "", 0.0, 1.0, 0.15, seldom_beyond=0.6),
@@ -47,7 +46,7 @@ class LoadFriction(Effect):
 
     def servo_term(self, here: NDArray[np.bool_], values: Mapping[str, float]) -> ServoTerm:
         at = here.astype(float)
-        return Rubbing(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
+        return LoadFrictionTerm(at * values["coefficient"], at * values["static"], values["speed"], at * values["backdrive"])
 
 
 EFFECT = LoadFriction()

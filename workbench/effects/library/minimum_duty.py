@@ -11,8 +11,8 @@ from workbench.robot import EffectSpec, RobotModel
 
 
 class MinimumDuty(ServoConstant):
-    """The duty at the edge of a servo's dead zone is more than nominal by `duty`, and so is all duty beyond it: what a register
-    of start-up force or punch does."""
+    """The duty at the edge of a servo's dead zone is larger than nominal by `duty`, and so is all duty beyond it: the effect of a
+    register of start-up force or punch."""
 
     name = "minimum_duty"
     field = "punch"

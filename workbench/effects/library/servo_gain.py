@@ -33,7 +33,7 @@ class ServoGain(ServoConstant):
         return (1.0,)
 
     def in_registers(self, logs: Sequence[Registers], where: tuple[str, ...]) -> tuple[float, float] | None:
-        """The register of duty over what the nominal law does at the logged error."""
+        """Ratio of the duty register to the duty of the nominal law at the logged error."""
         ratios = []
         for log in logs:
             for joint in where:

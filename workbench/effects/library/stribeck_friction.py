@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from workbench.effects.base import DEGREE, Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from workbench.effects.base import Effect, Parameter, Registers, mean_of_logs, scalar
 from workbench.robot import EffectSpec
 from workbench.servo import Instant, ServoLaw, ServoTerm, TermNumbers
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LEAST_DRAWN = 0.3
 """By which the sum of duties has to change for a log's voltage to tell a sag."""
 COUNT = 0.05
@@ -34,7 +34,7 @@ class _Sagging(ServoTerm):
 
 
 class SupplySag(Effect):
-    """The supply's voltage drops in proportion to the sum of all servos' duties, for all servos alike."""
+    """The supply's voltage drops in proportion to the summed duties of the servos, by the same amount for every servo."""
 
     name = "supply_sag"
     layer = "actuator"

@@ -14,7 +14,7 @@ from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoLaw
 
 STANDS = 1.5
-"""Most voltage that a servo is run at, over what it is rated at or said to get: a full pack of two cells on
+"""Largest supply voltage, over the voltage at which a servo is rated or said to run: a full pack of two cells on
 a servo rated at 6 V is 1.4; more burns it."""
 REGISTER = 0.1
 """A step of the voltage that servos measure [V]."""

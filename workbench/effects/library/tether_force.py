@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from workbench.effects.base import Array, Effect, Parameter, si_values, vector
+from workbench.effects.base import Effect, Parameter, si_values, vector
 from workbench.robot import GRAVITY, EffectSpec, RobotModel
+from workbench.types import Array
 
 
 class TetherForce(Effect):

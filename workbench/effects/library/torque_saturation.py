@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from workbench.effects.base import Effect, Parameter, scalar
 from workbench.robot import EffectSpec, RobotModel
 from workbench.servo import ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

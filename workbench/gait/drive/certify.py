@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.option_checks import check_positive, check_whole
@@ -25,10 +23,9 @@ from workbench.gait.drive.step_map import MapOptions, StepMap, fell, fit_step_ma
 from workbench.gait.ensemble import Ensemble
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
+from workbench.types import Array, Progress
 
 FILE = "family.json"
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)

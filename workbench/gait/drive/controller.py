@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from workbench.gait.drive import observer as at
@@ -18,8 +17,7 @@ from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.plan import Disc, Planned, corridor, plan, with_stride
 from workbench.gait.drive.step_map import StepMap
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 class CycleController(LeafSystem):
@@ -84,7 +82,7 @@ class CycleController(LeafSystem):
         return x[at.ALONG] + m.ahead, left, x[at.HEADING] + m.turned(x[at.NEXT], x[at.PLAYED]) + x[at.BIAS]
 
     def _planned(self, along: float, left: float, heading: float, x: Array, m: StepMap) -> Planned:
-        ahead = along + m.ahead * np.arange(self.options.horizon + 1)
+        ahead = np.asarray(along + m.ahead * np.arange(self.options.horizon + 1), float)
         targets = np.array([self.path.heading(s) for s in ahead])
         bounds = corridor(self.path, ahead, left, self.discs, self.options.clearance) if self.discs else None
         return plan(left, heading, x[at.NEXT], x[at.BIAS], targets, m, self.options, bounds)

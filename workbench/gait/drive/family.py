@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -101,8 +101,8 @@ def load_family(motion: str | Path, model: RobotModel) -> GaitFamily:
     certificate = read_certificate(at)
     if certificate.model_sha256 != model.sha256:
         raise InputError(at, f"it was made for another robot ({certificate.model_sha256[:12]}) than this ({model.sha256[:12]})")
-    known = {f.name for f in fields(GaitShape)}
-    if not set(certificate.shape) <= known or "family" not in certificate.shape:
-        raise InputError(at, "shape: expected the shape of a gait that was searched for; this one cannot be steered")
-    shape = dict(certificate.shape)
-    return GaitFamily(GaitMachine(model), GaitShape(**{**shape, "knees": tuple(shape["knees"])}))
+    try:
+        shape = GaitShape.from_plain(certificate.shape)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(at, "shape: expected the shape of a gait that was searched for; this one cannot be steered") from None
+    return GaitFamily(GaitMachine(model), shape)

@@ -15,9 +15,8 @@ from workbench.gait.drive.controller import CycleController
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.walk import Seen, StoppedError, Walk
 from workbench.recording.take import Take
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
-Progress = Callable[[str, float | None], None]
 Watch = Callable[[Seen, Array], None]
 """Called at the end of each cycle with the robot's pose and the planned positions (N, 2) [m]."""
 FELL, END = "fell", "end of the path"

@@ -6,12 +6,10 @@ The state of the controller is a vector; the names of its entries are here.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.step_map import StepMap
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 X, Y, HEADING, BIAS, P00, P01, P11, PLAYED, NEXT, AFTER, ALONG, LOST, STARTED, AHEAD, ASIDE = range(15)
 """Position [m]; heading [rad]; turning bias beyond the map's [rad per cycle]; covariance of the last two; turns of the cycle that

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from workbench.gait.drive.options import DriveOptions
 from workbench.gait.drive.path import WayPath
 from workbench.gait.drive.step_map import StepMap
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

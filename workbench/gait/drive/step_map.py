@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import heading
 from workbench.files import InputError
@@ -20,8 +19,7 @@ from workbench.gait.drive.family import GaitFamily
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import Job, SimulationConfig, simulate_batch
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import heading
 from workbench.gait.drive.family import GaitFamily
@@ -18,8 +17,8 @@ from workbench.simulation import Simulation, SimulationConfig
 from workbench.simulation.compiled import CompiledSteppedRun, NotCoveredError
 from workbench.simulation.rollout import BaseState
 from workbench.simulation.stepped import SteppedRun
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FALLEN = math.cos(math.radians(45))
 """Upward component of the base's z axis below which the robot lies."""
 

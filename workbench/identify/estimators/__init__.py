@@ -1,1 +1,1 @@
-"""What is read off the recordings without a search: lengths, zeros, stops, loose mounts, dropped commands."""
+"""Direct estimates from the recordings, without a search: lengths, zeros, stops, loose mounts, dropped commands."""

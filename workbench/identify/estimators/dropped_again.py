@@ -1,5 +1,5 @@
-"""Dropped commands, estimated again once the fixed-base takes have identified the servos: beside the nominal robot, what went
-differently for other reasons may look like a command that never arrived."""
+"""Dropped commands, estimated again once the fixed-base takes have identified the servos: compared with the nominal robot, a
+motion that differs for other reasons may look like a command that never arrived."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from workbench.robot import RobotModel
 
 @dataclass(frozen=True)
 class TakesAsPlayed:
-    """sent: takes with all poses that went out; missed: what was taken for missed, and left out of what is played; without:
-    effects that are not looked for."""
+    """sent: takes with all poses that were sent; missed: poses first taken for missed, which are not played; without: effects
+    that are not searched for."""
 
     sent: RolloutEvaluator
     missed: tuple[DroppedCommands, ...] = ()
@@ -30,7 +30,7 @@ class TakesAsPlayed:
 
     def without_missed(self, model: RobotModel, residuals: Mapping[int, NDArray[np.float64]]
                        ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
-        """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: the model's."""
+        """An evaluator whose takes are played without the missed poses, and these poses. residuals: the model's."""
         if self.without.intersection(e.name for e in estimated_by("missed poses")):
             return self.sent, ()
         return with_dropped_commands(self.sent, model, residuals)

@@ -16,9 +16,7 @@ from workbench.identify.problem import TakeEvidence, joint_error
 from workbench.identify.results.findings import Change, Estimate, Finding
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import EffectSpec, RobotModel
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -79,8 +77,7 @@ class DroppedCommands:
 def with_dropped_commands(
     evaluator: RolloutEvaluator, nominal: RobotModel, residuals: Mapping[int, Array]
 ) -> tuple[RolloutEvaluator, tuple[DroppedCommands, ...]]:
-    """An evaluator whose takes are played without the poses that were missed, and what was missed. residuals: of
-    the nominal robot."""
+    """An evaluator whose takes are played without the missed poses, and these poses. residuals: of the nominal robot."""
     effect, *_ = (*estimated_by("missed poses"), None)
     if effect is None:
         return evaluator, ()
@@ -114,8 +111,8 @@ def poses_lost(
     known: Mapping[int, tuple[int, ...]],
     residuals: Mapping[int, Array],
 ) -> tuple[dict[int, tuple[int, ...]], dict[int, Array]]:
-    """Poses that a joint missed, by take, and what is left of all takes played without them. known: those missed in motion. What
-    comes after a missed pose is read anew, beside a robot that did not get it either."""
+    """Poses that a joint missed, by take, and the residuals of the takes played without them. known: those missed in motion.
+    Poses after a missed one are examined again, compared with a robot that did not receive it either."""
     lost, now = dict(known), dict(residuals)
     new = {i: k for i, k in lost.items() if k}
     for _ in range(READ_OFF.turns):
@@ -163,8 +160,8 @@ def _at_the_end_of(e: TakeEvidence, k: int) -> NDArray[np.bool_]:
 
 
 def _read(e: TakeEvidence, joint: str, residual: Array, gone: Sequence[int]) -> tuple[int, ...]:
-    """Commands that a joint missed beside those that are known (gone), by what it did until the next came. After one, none until
-    it stands where it was told to: the model got what it did not."""
+    """Commands that a joint missed in addition to the known ones (gone), judged by its motion until the next command. After one,
+    none until the joint reaches a goal again: the model received a command that the joint did not."""
     commands = e.take.commands
     assert commands is not None
     column, i = commands.column(joint), e.channels.index(joint)

@@ -1,7 +1,7 @@
-"""Poses that a servo never got while it was on its way: a fast gait leaves no rest by which to tell, but simulation does.
+"""Poses that a servo never received while it was moving: a fast gait has no rests that would show it, but simulation does.
 
-Where a joint that went as the model has it begins to stay behind with a pose, that pose is left out of what is played, and is
-taken for missed if the joint then goes as recorded, until it stays behind again.
+Where a joint that followed the model begins to lag with a pose, that pose is removed from the played commands, and is taken for
+missed if the joint then moves as recorded, until it lags again.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.schedules import without_poses
 from workbench.identify.options import READ_OFF
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 DroppedPoses = dict[tuple[int, str], tuple[int, ...]]
 """Poses by take and joint."""
 
@@ -65,7 +64,7 @@ def dropped_in_motion(evaluator: RolloutEvaluator, nominal: RobotModel, residual
 def _played(
     evaluator: RolloutEvaluator, nominal: RobotModel, lost: DroppedPoses, residuals: Mapping[int, Array]
 ) -> dict[int, Array]:
-    """What is left without these poses."""
+    """Residuals without these poses."""
     takes = tuple(sorted({i for i, _ in lost}))
     return dict(residuals) | played_without(evaluator, lost).residuals([RolloutRequest(nominal, takes)])[0]
 
@@ -73,8 +72,8 @@ def _played(
 def suspects(
     evaluator: RolloutEvaluator, now: Mapping[int, Array], lost: DroppedPoses, cleared: set[tuple[int, str, int]]
 ) -> DroppedPoses:
-    """Poses with which joints that were well begin to stay behind; of several in a row the first, as what one does shows with the
-    next, and left out together neither would be believed."""
+    """Poses with which joints that followed the model begin to lag; of several in a row the first, since the effect of one shows
+    with the next, and with both removed neither would be accepted."""
     out: DroppedPoses = {}
     for i, e in enumerate(evaluator.evidence):
         for joint in e.joints if e.take.commands is not None else ():
@@ -87,7 +86,7 @@ def suspects(
 
 
 def steps(e: TakeEvidence, joint: str, gone: Sequence[int]) -> dict[int, float]:
-    """Poses that move a joint and that it got, and by how much [rad]."""
+    """Poses that move a joint and that it received, and the change of its goal [rad]."""
     commands = e.take.commands
     assert commands is not None
     column = commands.column(joint)
@@ -115,7 +114,7 @@ def _explained(e: TakeEvidence, joint: str, k: int, before: Array, after: Array)
 
 
 def _between(e: TakeEvidence, k: int) -> tuple[float, float]:
-    """When a command came [s], and until when what it did shows alone."""
+    """When a command arrived [s], and until when its effect can be seen alone."""
     commands = e.take.commands
     assert commands is not None
     return float(commands.times[k]), end_of(e, k) + READ_OFF.lag

@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.effects.registry import effect_named, estimated_by
@@ -26,9 +25,9 @@ from workbench.recording.mocap.mending import mend
 from workbench.recording.mocap.tracks import seen_joints, tracks_of, turned
 from workbench.robot import EffectSpec, RobotModel
 from workbench.robot.kinematics import Kinematics
+from workbench.types import Array
 
-Array = NDArray[np.float64]
-SEEN = " The axes of the joints at both its ends, as cameras saw them, say so without any simulation."
+SEEN = " Measured from the axes of the joints at both its ends, as seen by the cameras, without any simulation."
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class UncertainValue:
 
 @dataclass(frozen=True)
 class Measured:
-    """A link that is not as long as drawn, a horn that sits turned, or what a servo's register says: value and standard deviation
+    """A direct estimate: a link that is not as long as drawn, a rotated horn, or a servo's register; value and standard deviation
     in the unit of docs/formats.md. seen: how that is known, for a person."""
 
     effect: str
@@ -69,7 +68,7 @@ class Measured:
         return EffectSpec(self.effect, (self.where,), {effect_named(self.effect).parameters[0].name: self.mean})
 
     def finding(self, fit: Change, validation: Change) -> Finding:
-        """With the 90 % interval of what was measured."""
+        """With the 90 % interval of the measurement."""
         p = effect_named(self.effect).parameters[0]
         half = CONCLUSIONS.z90 * self.sigma
         number = Estimate(self.mean, self.mean - half, self.mean + half, p.unit)
@@ -79,25 +78,25 @@ class Measured:
 
 @dataclass(frozen=True)
 class Geometry:
-    """What the bodies show. measured: what is not as drawn; near: a number from which to begin, by effect and place, where droop
-    may not be what the model says; as_drawn: what need not be asked about."""
+    """Geometry estimated from the bodies. measured: deviations from the drawing; near: initial value by effect and place, where
+    droop may differ from the model's; as_drawn: candidates that need not be tried."""
 
     measured: tuple[Measured, ...] = ()
     near: Mapping[Key, float] = field(default_factory=dict)
     as_drawn: frozenset[Key] = frozenset()
 
     def added_to(self, model: RobotModel) -> RobotModel:
-        """The model with what was measured."""
+        """The model with the measured deviations."""
         return model.with_effects((*model.effects, *(m.spec for m in self.measured)))
 
     def asked(self, pool: Sequence[Candidate]) -> list[Candidate]:
-        """Of a pool, what is still to be asked about."""
+        """The candidates of a pool that must still be tried."""
         known = self.as_drawn | {(m.effect, (m.where,)) for m in self.measured}
         return [replace(c, typical=(self.near[c.key],)) if c.key in self.near else c for c in pool if c.key not in known]
 
 
 def geometry_of(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> Geometry:
-    """What the bodies show of a robot whose model has no lengths or zeros of its own. residuals: of the model, by take."""
+    """Estimates the geometry of a robot whose model has no lengths or zeros of its own. residuals: of the model, by take."""
     lengths, turns = estimated_by("length between axes"), estimated_by("turn about an axis")
     if not lengths or not turns or {e.effect for e in model.effects} & {e.name for e in (*lengths, *turns)}:
         return Geometry()
@@ -129,7 +128,7 @@ def _spans(e: TakeEvidence, model: RobotModel) -> list[Span]:
 
 
 def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainValue]:
-    """By how much links are longer than drawn, by link."""
+    """Amount by which links are longer than drawn, by link."""
     k, sdf = model.kinematics, SdfRobot(model.path)
     estimates: dict[str, list[UncertainValue]] = {}
     for s in between:
@@ -143,7 +142,7 @@ def _changes(model: RobotModel, between: Sequence[Span]) -> dict[str, UncertainV
 
 
 def _turns(model: RobotModel, fixed: Sequence[tuple[TakeEvidence, Sequence[Span]]]) -> dict[str, UncertainValue]:
-    """By how much links stand turned about the axes that carry them beyond what droop turns them, by joint."""
+    """Rotation of links about the axes that carry them, beyond droop, by joint."""
     k = model.kinematics
     estimates: dict[str, list[UncertainValue]] = {}
     for e, between in fixed:

@@ -1,4 +1,4 @@
-"""What the servos' own registers say (`registers` of a session): physics that is known before the first step."""
+"""Physics known from the servos' own registers (`registers` of a session) before the first step."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def read_off_registers(session: Session) -> tuple[Measured, ...]:
         if departure.effect is not None:
             ((_, value),) = departure.effect.parameters.items()
             assert isinstance(value, float)
-            seen = (f" The servo's own register says so, without any recording: {departure.key} is {departure.found:g}, the "
+            seen = (f" Read from the servo's own register, without any recording: {departure.key} is {departure.found:g}, the "
                     f"model has {departure.nominal:g}.")
             out.append(Measured(departure.effect.effect, departure.joint, value, READ_OFF.register_exact * abs(value), seen))
     return tuple(out)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.channels import ACROSS
@@ -16,8 +15,7 @@ from workbench.identify.options import READ_OFF
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence, channel_gaps, smoothed
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
@@ -35,7 +33,7 @@ def read_off_candidates(model: RobotModel, evidence: Sequence[TakeEvidence], res
 @dataclass(frozen=True)
 class _Travel:
     """Where a take's joint ended on one side, counted as positive from its servo's centre [rad]. base: of the take; reach: how
-    far the model went while the joint stood there; None: it did not stand at an end."""
+    far the model moved while the joint was at rest there; None: it did not rest at an end."""
 
     base: str
     end: float
@@ -53,7 +51,7 @@ class _Stop:
 
 
 def stops(stop: Effect, joint: str, evidence: Sequence[TakeEvidence], residuals: Mapping[int, Array]) -> list[Candidate]:
-    """A stop at either side where the recording stands at its end while the model goes on, and that no take passed."""
+    """A stop on either side, where the recording rests at its end while the model moves further, and that no take passed."""
     travels = {side: [t for i, e in enumerate(evidence) if joint in e.joints
                       for t in _travel(e, e.joints.index(joint), residuals[i], side)] for side in (1, -1)}
     met = {side: _stop_met(of) for side, of in travels.items()}
@@ -88,8 +86,8 @@ def _travel(e: TakeEvidence, column: int, residual: Array, side: int) -> list[_T
 
 
 def _stop_met(travels: Sequence[_Travel]) -> _Stop | None:
-    """Where some takes stood at an end that all others keep to. Takes of one base are zeroed alike, so that they differ by noise
-    and by how hard the stop was met; between bases the model's droop may be wrong, too."""
+    """Where some takes rest at an end that no other take passes. Takes of one base are zeroed in the same way, so that they
+    differ by noise and by how hard the stop was hit; between bases the model's droop may be wrong, too."""
     met = [t for t in travels if t.reach is not None]
     if not met:
         return None

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.compare.session_takes import Progress
 from workbench.identify.evidence.fit import Fitted
 from workbench.identify.evidence.holdout import folds_of, vetoed
 from workbench.identify.evidence.nested import told_from_nothing
@@ -20,6 +19,7 @@ from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.reasons import Reason, SpokenAgainst
+from workbench.types import Progress
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts

@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from workbench.compare.session_takes import Progress
 from workbench.identify.evidence.checks import checks, drifts, refuted
 from workbench.identify.evidence.explanation import Explanation
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, regressed
@@ -23,11 +22,15 @@ from workbench.identify.evidence.robot_search import RobotFound, search_robot
 from workbench.identify.evidence.robot_wide import Whole
 from workbench.identify.evidence.rollouts import Rollouts, step_errors
 from workbench.identify.evidence.search import Found, gone_on, lockstep, standing, without_names
-from workbench.identify.explained import Problem
+from workbench.identify.evidence.tied_names import names_of_tie
+from workbench.identify.evidence.torque_law import torque_law
+from workbench.identify.evidence.unknown_law import slopes_by_law, with_unknown_law
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Rejected
+from workbench.identify.search_result import Problem
 from workbench.robot import RobotModel
+from workbench.types import Progress
 
 
 def is_by_logs(evidence: Sequence[TakeEvidence]) -> bool:
@@ -59,6 +62,10 @@ def explained_by_evidence(problem: Problem) -> Explanation:
         found = tuple(left.get(k, f) for k, f in enumerate(found))
         rollouts, found = gone_on(rollouts, found, options, progress)
     stopped = rollouts.exhausted and any(f.goes_on(options) for f in found)
+    progress("names that are tied", None)
+    names = lockstep(standing(rollouts, found), {k: names_of_tie(f.region, options, f.best) for k, f in enumerate(found)})
+    progress("an unnamed torque", None)
+    rollouts, found = _beside_unnamed(rollouts, found, options)
     progress("numbers at a finer step", None)
     entire = tuple(replace(_region(j, whole.evidence, nominal, (), options), candidates=f.region.candidates)
                    for j, f in zip(joints, found))
@@ -73,7 +80,8 @@ def explained_by_evidence(problem: Problem) -> Explanation:
     believed = tuple(posterior_of(list(f.fits.values()), options) for f in found)
     drifting = tuple(d for f in found for d in drifts(f.region, f.best, whole.evidence))
     return Explanation(nominal, replace(standing(rollouts, found), shared=together.shared), found, believed, robot,
-                       tuple(rejected), options, problem.played.missed, drifting, stopped)
+                       tuple(rejected), options, problem.played.missed, drifting, stopped,
+                       tuple(names[k] for k in range(len(found))))
 
 
 def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Candidate], options: EvidenceOptions,
@@ -88,6 +96,20 @@ def _searched(rollouts: Rollouts, names: Sequence[Candidate], felt: Sequence[Can
         rejected += [Rejected(c.name, c.where, why) for c, why in gone.items()]
         names = [c for c in names if c.key not in {g.key for g in gone}]
     return robot, rejected
+
+
+def _beside_unnamed(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions) -> tuple[Rollouts, tuple[Found, ...]]:
+    """What was found in each joint, with models that have an unnamed torque there."""
+    parts = {}
+    for k, f in enumerate(found):
+        (joint,) = f.region.joints
+        law = torque_law(joint, rollouts.evaluator.evidence, rollouts.nominal, options.law)
+        if law is not None:
+            full = rollouts.nominal.servo(joint).torque_at_full_duty
+            parts[k] = with_unknown_law(f, options, law, full)
+    done = lockstep(rollouts, parts)
+    found = tuple(done.get(k, f) for k, f in enumerate(found))
+    return standing(rollouts, found), found
 
 
 def _begun(evidence: Sequence[TakeEvidence], seconds: float) -> list[TakeEvidence]:
@@ -122,7 +144,7 @@ def _finished(found: Found, entire: Region, options: EvidenceOptions) -> Asks[Fo
     s = region.likelihood.discrepancy(r)
     fit: Fitted = yield from fitting(region, options, best.hypothesis, s, options.iterations, r)
     fit = yield from regressed(region, options, fit)
-    fit = replace(fit, log_evidence=best.log_evidence, log_prior=best.log_prior)
+    fit = replace(fit, beside=(yield from slopes_by_law(fit)), log_evidence=best.log_evidence, log_prior=best.log_prior)
     return replace(found, region=region, fits={**found.fits, best.hypothesis.key: fit})
 
 

@@ -8,44 +8,49 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, change, estimates, value_slopes, with_read_off
+from workbench.identify.evidence.fit import weights_covariance
 from workbench.identify.evidence.leftover import left_over
-from workbench.identify.evidence.nuisance import Uncertain, as_mapping, turned_horn, with_known
+from workbench.identify.evidence.nuisance import ZERO, as_mapping, mixing, turned_horn, widened, with_known
 from workbench.identify.evidence.recalibration import what_changed
 from workbench.identify.evidence.step_errors import extrapolated
 from workbench.identify.evidence.tied import as_torque
+from workbench.identify.evidence.tied_names import gravity_over_torque
 from workbench.identify.options import CONCLUSIONS, PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Alternative, FamilyBelief, Finding, Recalibrated, Rejected, Unexplained
 from workbench.identify.results.reasons import LessLikely
 from workbench.identify.results.ties import Tie
+from workbench.identify.results.unknown_torque import UnknownTorque, said
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import parameter_names
+from workbench.types import Array, Progress
 
 if TYPE_CHECKING:
     from workbench.identify.estimators.dropped_commands import DroppedCommands
+    from workbench.identify.evidence.fit import Fitted
     from workbench.identify.evidence.options import EvidenceOptions
     from workbench.identify.evidence.posterior import RegionPosterior
     from workbench.identify.evidence.robot_search import RobotFound
     from workbench.identify.evidence.rollouts import Rollouts
     from workbench.identify.evidence.search import Found
     from workbench.identify.fitting.constancy import Drift
+    from workbench.identify.parameters import Candidate
+    from workbench.identify.results.tied_names import GravityOverTorque
 
-Array = NDArray[np.float64]
 WORTH_SAYING = 0.01
 """Least probability of an alternative that is named."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """The likeliest model, and all that was believed beside it (`workbench.identify.explained.Explained`). found, posteriors: one
-    a region; robot: what acts in all of them; refuted: by registers or by takes kept back; missed: commands that never arrived;
-    drifts: parameters that drift within a take; stopped: by the limit of work."""
+    """The most probable model, with all alternatives (a `workbench.identify.search_result.SearchResult`). found, posteriors: one
+    for each region; robot: effects that act on all joints; refuted: effects rejected by registers or by held-out takes; missed:
+    commands that never arrived; drifts: parameters that drift within a take; stopped: whether the limit of work was reached;
+    tied_names: by region, each effect fitted that could be the whole change of gravity over torque."""
 
     nominal: RobotModel
     rollouts: Rollouts
@@ -57,6 +62,14 @@ class Explanation:
     missed: tuple[DroppedCommands, ...] = ()
     drifts: tuple[Drift, ...] = ()
     stopped: bool = False
+    tied_names: tuple[list[Fitted], ...] = ()
+
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """Gravity over torque where it is not as told, with the effects that could be it."""
+        said = (gravity_over_torque(region, self.options, p, fits)
+                for region, p, fits in zip(self.rollouts.regions, self.posteriors, self.tied_names))
+        return tuple(s for s in said if s is not None)
 
     @property
     def model(self) -> RobotModel:
@@ -66,11 +79,12 @@ class Explanation:
     @property
     def calibrated(self) -> RobotModel:
         """The same, with how well its servos' numbers are known now."""
-        sds: dict[Uncertain, float] = {}
+        model = self.model
         for region, p in zip(self.rollouts.regions, self.posteriors):
-            variances = np.diag(p.best.covariance(region, self.options))
-            sds |= {n: n.sd * math.sqrt(v) for n, v in zip(p.best.hypothesis.numbers, variances)}
-        return with_known(self.model, sds)
+            numbers = p.best.hypothesis.numbers
+            n, covariance = len(numbers), p.best.covariance(region, self.options)
+            model = with_known(model, numbers, widened(covariance[:n, :n], self.options.formal))
+        return model
 
     @property
     def recalibrated(self) -> tuple[Recalibrated, ...]:
@@ -98,10 +112,31 @@ class Explanation:
                 fit, validation = (change(evidence, where, before, after, use) for use in ("fit", "validate"))
                 out.append(Finding(
                     c.name, where, share * (p.named[c.name, c.where] + sum(elsewhere.values())),
-                    estimates(c, x, covariance[s, s]), fit, validation, tuple(others[:1]),
-                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence),
+                    estimates(c, x, covariance[s, s] if tie is None else tie.covariance(covariance[s, s], x)), fit, validation,
+                    tuple(others[:1]),
+                    c.effect.sentence(c.spec(x)) + ("" if tie is None else tie.sentence) + self._or_unnamed(p, c),
                     family=None if family is None else FamilyBelief(family, share * p.families[family])))
         return tuple(sorted(out, key=lambda f: -f.confidence))
+
+    def _or_unnamed(self, p: RegionPosterior, c: Candidate) -> str:
+        """What a finding's sentence says of an unnamed torque in its place."""
+        depends_on, probability = p.unnamed_instead((c.name, c.where))
+        if probability < CONCLUSIONS.worth_an_experiment:
+            return ""
+        return f" Or ({probability:.2f}) a torque that depends on {said(depends_on)}, which no known effect describes."
+
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """Torques of the likeliest model that no effect describes, by joint."""
+        out = []
+        for region, p in zip(self.rollouts.regions, self.posteriors):
+            law = p.best.hypothesis.law
+            if law is None or p.best.beside is None:
+                continue
+            spread = law.spread(CONCLUSIONS.wider**2 * weights_covariance(p.best, region, self.options))
+            fit, validation = (change(evidence, (law.joint,), before, after, use) for use in ("fit", "validate"))
+            out.append(UnknownTorque(law.joint, CONCLUSIONS.surest * p.unnamed, law.rms(evidence, self.nominal), law.tables(),
+                                     spread, fit, validation))
+        return tuple(sorted(out, key=lambda u: -u.confidence))
 
     def _of_robot(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> list[Finding]:
         """What acts in all joints at once."""
@@ -125,10 +160,11 @@ class Explanation:
         blocks: dict[tuple[str, tuple[str, ...]], Array] = {}
         for region, p in zip(self.rollouts.regions, self.posteriors):
             h, covariance = p.best.hypothesis, p.best.covariance(region, self.options)
+            moved = mixing(h.numbers)
             for k, number in enumerate(h.numbers):
-                degrees = np.degrees(number.sd)
-                zero = turned_horn(number.joint, number.sd)
-                blocks.setdefault((zero.effect, zero.where), np.array([[degrees**2 * covariance[k, k]]]))
+                if number.name == ZERO:
+                    zero, row = turned_horn(number.joint, number.sd), np.degrees(moved[k])
+                    blocks[zero.effect, zero.where] = np.array([[row @ covariance[:len(row), :len(row)] @ row]])
             for (c, x), s in zip(h.sizes(), h.slices()):
                 slopes = value_slopes(c, x)
                 blocks[c.name, c.where] = slopes @ covariance[s, s] @ slopes.T

@@ -7,17 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import hadamard
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.fitting.levenberg_marquardt import Solved, fit_blocks
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.region import Region
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Asks = Generator[list[Hypothesis], list[Array], T]
 """Yields hypotheses to be rolled out, is sent the residuals (n,) [rad] that each leaves."""
@@ -35,6 +34,7 @@ class Fitted:
     log_evidence: float
     log_prior: float
     too_much: Array | None = field(default=None, repr=False)
+    beside: Array | None = field(default=None, repr=False)
 
     @property
     def log_posterior(self) -> float:
@@ -48,15 +48,41 @@ class Fitted:
         if self.too_much is not None:
             told, axes = np.linalg.eigh(H - self.too_much)
             H = (axes * np.maximum(told, 0.0)) @ axes.T
-        return np.asarray(np.linalg.inv(H + np.diag(Prior.of(h, options).precision(h.theta))))
+        H = H + np.diag(Prior.of(h, options).precision(h.theta))
+        if self.beside is not None and h.law is not None:  # what the weights could take over is not known
+            W = likelihood.precision(self.r, self.discrepancy)[:, None] * self.beside
+            taken = np.linalg.solve(self.beside.T @ W + np.diag(h.law.precision), W.T @ self.J)
+            H = _at_least(H - (self.J.T @ W) @ taken, Prior.of(h, options).precision(h.theta))
+        return np.asarray(np.linalg.inv(H))
 
 
-def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array) -> Fitted:
-    """A hypothesis with its evidence, where it stands."""
+def weights_covariance(f: Fitted, region: Region, options: EvidenceOptions) -> Array:
+    """Of the weights of a fit's unnamed torque (m, m) [(N m)^2]."""
+    assert f.hypothesis.law is not None
+    assert f.beside is not None
+    A = np.hstack([f.J, f.beside])
+    P = np.concatenate([Prior.of(f.hypothesis, options).precision(f.hypothesis.theta), f.hypothesis.law.precision])
+    H = (A.T * region.likelihood.precision(f.r, f.discrepancy)) @ A + np.diag(P)
+    return np.asarray(np.linalg.inv(H)[f.J.shape[1]:, f.J.shape[1]:])
+
+
+def _at_least(H: Array, prior: Array) -> Array:
+    """Information (k, k) that is nowhere less than the prior's (k,)."""
+    scale = np.sqrt(prior)
+    told, axes = np.linalg.eigh(H / np.outer(scale, scale))
+    return np.asarray(np.outer(scale, scale) * ((axes * np.maximum(told, 1.0)) @ axes.T))
+
+
+def judged(region: Region, options: EvidenceOptions, h: Hypothesis, r: Array, J: Array, beside: Array | None = None) -> Fitted:
+    """A hypothesis with its evidence, where it stands. beside (n, m): slopes by the weights of its unnamed torque."""
     prior = Prior.of(h, options)
-    log, s = region.likelihood.evidence(r, J, prior.log(h.theta), prior.precision(h.theta))
+    density, precision, slopes = prior.log(h.theta), prior.precision(h.theta), J
     parts = len(h.effects) + sum(len(c.options) for c in h.effects)
-    return Fitted(h, r, J, s, log, parts * log_odds(len(region.candidates), options.expected))
+    if h.law is not None and beside is not None:
+        density, precision = density + h.law.log_prior, np.concatenate([precision, h.law.precision])
+        slopes, parts = np.hstack([J, beside]), parts + len(h.law.scales)
+    log, s = region.likelihood.evidence(r, slopes, density, precision)
+    return Fitted(h, r, J, s, log, parts * log_odds(len(region.candidates), options.expected), beside=beside)
 
 
 def fitting(region: Region, options: EvidenceOptions, start: Hypothesis, s: float, iterations: int, r: Array | None = None,

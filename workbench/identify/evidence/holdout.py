@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, side_by_side, without
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 MOST_FOLDS = 4
 """Takes that differ in nothing are kept back in so many groups: each costs a fit of every effect."""
 EXCITED = 0.1

@@ -15,13 +15,16 @@ from scipy.stats import t as student_t
 
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.robot import EffectSpec
+from workbench.types import Array
 
 if TYPE_CHECKING:
+    from workbench.identify.evidence.torque_law import TorqueLaw
     from workbench.identify.parameters import Candidate
 
-Array = NDArray[np.float64]
 FAR = EvidenceOptions.far
 """Standard deviations that a recalibrated number may go: what is beyond is a finding, by the name of the effect that does it."""
+UNNAMED = "unknown torque"
+"""Stands for a torque law among the terms of a hypothesis."""
 Term = tuple[str, tuple[str, ...], tuple[str, ...]]
 """An effect's name, where it acts, and its options."""
 Label = tuple[str, tuple[str, ...], str, int]
@@ -31,11 +34,18 @@ Label = tuple[str, tuple[str, ...], str, int]
 @dataclass(frozen=True)
 class Uncertain:
     """One number of one joint's servo that is known to `sd`: a share of its nominal value, [rad] of ZERO. z standard deviations
-    make it nominal · exp(sd z), and a zero of sd z."""
+    make it nominal · exp(sd z), and a zero of sd z. others: the numbers that change with it, and by how much for each standard
+    deviation, where an earlier diagnosis knew them only together; all z are then still independent before any data."""
 
     joint: str
     name: str
     sd: float
+    others: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def changes(self) -> dict[str, float]:
+        """How far one standard deviation moves each number: the logarithm of it, [rad] of ZERO."""
+        return {self.name: self.sd, **dict(self.others)}
 
     def __str__(self) -> str:
         return f"{self.name}({self.joint})"
@@ -57,16 +67,18 @@ def labels_of(c: Candidate) -> list[Label]:
 @dataclass(frozen=True)
 class Hypothesis:
     """Effects at their places beside the nominal law. theta (k,): standard deviations of the recalibrated numbers, then the
-    effects' sizes (`Candidate`)."""
+    effects' sizes (`Candidate`). law: a torque beside them that nobody has named."""
 
     numbers: tuple[Uncertain, ...]
     effects: tuple[Candidate, ...]
     theta: Array = field(repr=False)
+    law: TorqueLaw | None = None
 
     @property
     def key(self) -> frozenset[Term]:
-        """Which effects there are, whatever their sizes."""
-        return frozenset(term_of(c) for c in self.effects)
+        """Which effects there are, whatever their sizes, and on what an unnamed torque depends."""
+        unnamed = () if self.law is None else [(UNNAMED, (self.law.joint,), tuple(sorted(self.law.scales)))]
+        return frozenset([*(term_of(c) for c in self.effects), *unnamed])
 
     @property
     def z(self) -> Array:
@@ -86,7 +98,8 @@ class Hypothesis:
 
     def alike(self) -> list[list[int]]:
         """Pairs of theta that stand for one number of the law: what is recalibrated, and the effect of that name there."""
-        at: dict[tuple[str, tuple[str, ...]], int] = {(n.name, (n.joint,)): k for k, n in enumerate(self.numbers)}
+        at: dict[tuple[str, tuple[str, ...]], int] = {
+            (n.name, (n.joint,)): k for k, n in enumerate(self.numbers) if not n.others}
         both = ((at.get((c.name, c.where)), s) for c, s in zip(self.effects, self.slices()) if c.size == 1)
         return [[k, s.start] for k, s in both if k is not None]
 

@@ -7,14 +7,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.conclusions import Residuals, unexplained
 from workbench.identify.problem import TakeEvidence, in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import Dependence
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 EVENT = 0.5
 """Length of a stretch that is told as one event [s]."""
 STANDS = 0.1

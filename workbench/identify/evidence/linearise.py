@@ -16,8 +16,8 @@ from workbench.identify.evidence.hypothesis import Hypothesis, Prior, labels_of
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 AMOUNTS, ENDLESS = (1.0, 4.0), (1.0, 2.0, 4.0)
 """Sizes at which an effect is looked at, in typical ones; the latter of what vanishes at infinity, as a ceiling, which shows
 nothing until it is met."""

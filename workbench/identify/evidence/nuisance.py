@@ -6,10 +6,14 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from workbench.effects.registry import estimated_by
 from workbench.identify.evidence.hypothesis import Uncertain
 from workbench.identify.evidence.options import EvidenceOptions, SinceThen
 from workbench.robot import EffectSpec, RobotModel, ServoConstants
+from workbench.robot.law_covariance import LawCovariance
+from workbench.types import Array
 
 ZERO = "zero"
 ZERO_SD = math.radians(1.15)
@@ -28,11 +32,17 @@ apart."""
 
 
 def uncertain_since(model: RobotModel, joint: str, zeroed: bool, drift: SinceThen) -> list[Uncertain]:
-    """The same of a robot that was diagnosed before, whose constants carry the standard deviations of that."""
+    """The same of a robot that was diagnosed before: known as that diagnosis knew them, together, and as far as they drift.
+
+    Torque, friction and load friction are known much better together than one by one: their difference lifts an arm. Each
+    number returned moves those after it, so that all are independent (Cholesky's factor of the covariance)."""
     servo = model.servo(joint)
-    known = {name: drift.of(name, servo.share_known(name)) for name in UNITS if name != ZERO}
-    out = [Uncertain(joint, name, sd) for name, sd in known.items() if nominal_value(servo, name) > 0]
-    return out if zeroed else [*out, Uncertain(joint, ZERO, drift.of(ZERO, 0.0))]
+    names = [name for name in UNITS if name != ZERO and nominal_value(servo, name) > 0] + ([] if zeroed else [ZERO])
+    known = (np.diag([0.0 if name == ZERO else servo.share_known(name)**2 for name in names]) if servo.covariance is None
+             else servo.covariance.among(names))
+    L = np.linalg.cholesky(known + np.diag([drift.of(name)**2 for name in names]))
+    return [Uncertain(joint, name, float(L[k, k]), tuple((names[i], float(L[i, k])) for i in range(k + 1, len(names)) if L[i, k]))
+            for k, name in enumerate(names)]
 
 
 def uncertain_numbers(model: RobotModel, joint: str, zeroed: bool, sheet: float = EvidenceOptions.sheet) -> list[Uncertain]:
@@ -51,12 +61,31 @@ def recalibrated(model: RobotModel, z: Mapping[Uncertain, float]) -> RobotModel:
     """The robot with numbers z standard deviations from nominal; a zero becomes an effect `zero_offset`."""
     servos = {j: model.servo(j) for j in model.joints}
     zeros: list[EffectSpec] = []
-    for number, by in z.items():
-        if number.name == ZERO:
-            zeros += [turned_horn(number.joint, number.sd * by)] if by else []
+    for (joint, name), by in changed_by(z).items():
+        if name == ZERO:
+            zeros += [turned_horn(joint, by)] if by else []
         else:
-            servos[number.joint] = _scaled(servos[number.joint], number.name, math.exp(number.sd * by))
+            servos[joint] = _scaled(servos[joint], name, math.exp(by))
     return model.with_physics(servos, (*model.effects, *zeros))
+
+
+def changed_by(z: Mapping[Uncertain, float]) -> dict[tuple[str, str], float]:
+    """By joint and name, how far z standard deviations move each number: the logarithm of it, [rad] of ZERO."""
+    out: dict[tuple[str, str], float] = {}
+    for number, by in z.items():
+        for name, each in number.changes.items():
+            out[number.joint, name] = out.get((number.joint, name), 0.0) + by * each
+    return out
+
+
+def mixing(numbers: Sequence[Uncertain]) -> Array:
+    """How far each number (row), in the order of `numbers`, moves for one standard deviation of each (column), (k, k)."""
+    rows = {(n.joint, n.name): i for i, n in enumerate(numbers)}
+    out = np.zeros((len(numbers), len(numbers)))
+    for k, n in enumerate(numbers):
+        for name, by in n.changes.items():
+            out[rows[n.joint, name], k] = by
+    return out
 
 
 def turned_horn(joint: str, angle: float) -> EffectSpec:
@@ -79,17 +108,31 @@ def _scaled(servo: ServoConstants, name: str, by: float) -> ServoConstants:
     return replace(servo, **{name: getattr(servo, name) * by})  # type: ignore[arg-type]
 
 
-def with_known(model: RobotModel, sds: Mapping[Uncertain, float]) -> RobotModel:
-    """The robot whose servo constants carry how well they are known now: sds, of the logarithm, by number."""
+def with_known(model: RobotModel, numbers: Sequence[Uncertain], covariance: Array) -> RobotModel:
+    """The robot whose servo constants carry how well they are known now. covariance (k, k): of the numbers' z."""
     servos = {j: model.servo(j) for j in model.joints}
-    for number, sd in sds.items():
-        servo = servos[number.joint]
-        if number.name in OF_SHEET:
-            servos[number.joint] = replace(servo, **{OF_SHEET[number.name][0]: sd})  # type: ignore[arg-type]
-        elif number.name != ZERO:
-            known = dict(servo.sd) | {number.name: sd * nominal_value(servo, number.name)}
-            servos[number.joint] = replace(servo, sd=tuple(sorted(known.items())))
+    M = mixing(numbers)
+    C = M @ covariance @ M.T
+    for joint in dict.fromkeys(n.joint for n in numbers):
+        own = [k for k, n in enumerate(numbers) if n.joint == joint]
+        names = [numbers[k].name for k in own]
+        servo = replace(servos[joint], covariance=LawCovariance.of(names, C[np.ix_(own, own)]))
+        for name, k in zip(names, own):
+            sd = math.sqrt(C[k, k])
+            if name in OF_SHEET:
+                servo = replace(servo, **{OF_SHEET[name][0]: sd})  # type: ignore[arg-type]
+            elif name != ZERO:
+                servo = replace(servo, sd=tuple(sorted((dict(servo.sd) | {name: sd * nominal_value(servo, name)}).items())))
+        servos[joint] = servo
     return model.with_physics(servos, model.effects)
+
+
+def widened(covariance: Array, by: float) -> Array:
+    """A covariance (k, k) of numbers whose variance was 1 before any data, with the data's information as if errors were `by`
+    times as large. Directions of which the data hold no information keep their variance."""
+    variances, axes = np.linalg.eigh(covariance)
+    told = np.maximum(1.0 / np.clip(variances, 1e-12, 1.0) - 1.0, 0.0)
+    return np.asarray((axes / (1.0 + told / by**2)) @ axes.T)
 
 
 def as_mapping(numbers: Sequence[Uncertain], z: Iterable[float]) -> dict[Uncertain, float]:

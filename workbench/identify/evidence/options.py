@@ -3,29 +3,54 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
 class SinceThen:
-    """By how much a robot that was diagnosed may have changed since, without anything to report: standard deviations of the
-    logarithm, `zero` [rad]. widened: times the standard deviations of the last diagnosis, as those are formal ones.
+    """How much a robot that was diagnosed before may have changed since, with nothing to report: standard deviations of the
+    logarithm, `zero` [rad].
 
     torque, back-EMF: one STS3215 differed by 3 to 6 % per duty between days at 28, 34 and 37 deg C. friction: grease and wear,
-    20 to 40 % there. law: what firmware does, which does not drift; how logs are stamped may. zero: a link taken off and put on
-    again."""
+    20 to 40 % there. law: firmware does not drift, but the way logs are stamped may. zero: a link removed and mounted again."""
 
-    widened: float = 3.0
     torque: float = 0.06
     friction: float = 0.3
     law: float = 0.02
     zero: float = math.radians(0.3)
 
-    def of(self, name: str, sd: float) -> float:
-        """Standard deviation of a number that was known to `sd`."""
+    def of(self, name: str) -> float:
+        """Standard deviation of a number's change."""
         own = {"torque_at_full_duty": self.torque, "back_emf": self.torque, "zero": self.zero} | dict.fromkeys(
             ("coulomb_friction", "viscous_friction", "load_friction"), self.friction)
-        return math.hypot(self.widened * sd, own.get(name, self.law))
+        return own.get(name, self.law)
+
+
+@dataclass(frozen=True)
+class LawOptions:
+    """A repeatable torque that nobody has named, beside the effects.
+
+    shares: standard deviations of its weights that are tried, as shares of the servo's torque at full duty: from a torque that a
+    log barely shows to one that is felt by hand, a factor of three apart, about what a log tells of such a size. of_angle,
+    of_duty, of_speed: how many functions cover what a joint did: about every 10 degrees of a usual motion, at most ten for what
+    friction and motor do smoothly. knots: rows of a table for each function. covered: quantiles of the motion between which
+    functions lie. slow [rad/s]: below it speeds are covered evenly, above it by their logarithm. least_travel [rad]: of a joint
+    that could show such a torque. iterations: of a fit; shares_of_step: of its steps that are tried. behind [nats]: a law
+    predicted this far behind the likeliest model is not fitted. reweighted: rounds in which Student's weights settle.
+    """
+
+    shares: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1)
+    of_angle: int = 14
+    of_duty: int = 6
+    of_speed: int = 9
+    knots: int = 4
+    covered: tuple[float, float] = (0.01, 0.99)
+    slow: float = 0.3
+    least_travel: float = 0.02
+    iterations: int = 3
+    shares_of_step: tuple[float, ...] = (1.0, 0.5, 0.2)
+    behind: float = 7.0
+    reweighted: int = 3
 
 
 @dataclass(frozen=True)
@@ -58,12 +83,16 @@ class EvidenceOptions:
     processor, several times what twelve logs of a servo need.
 
     drift: where the nominal robot is one that was diagnosed before, what may have changed since; None: it is one as drawn.
+    formal: how many times its formal standard deviations a servo's law is off: differences through stick and slip claim to know
+    more than they do, by a factor of 2 to 8 on three weighed rigs. A diagnosis writes down its law with errors so much larger.
+    law: the torque that nobody has named, beside the effects.
 
     The posterior. occam [nats]: models this far behind the best no longer count (D. Madigan and A. Raftery, JASA 89, 1994: a
-    factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: by which unseen takes must speak against an
-    effect to take it out, odds of twenty. alike: share of what an effect does from which on other torques that do as much stand
-    for it. sure: standard errors by which a servo's own register must refute a name, and refuted: the share of an effect's
-    typical size that it then rules out, which no recording would show.
+    factor of twenty, here of a thousand, as fits end some nats apart). veto [nats]: an effect is rejected where unseen takes are
+    less likely with it by this much, odds of twenty. alike: an effect is tied to torque if a change of all torques does at least
+    this share of the same. apart: gravity over torque is reported where it differs from the nominal by so many standard
+    deviations, its variation between days included. sure: standard errors by which a servo's own register must refute a name, and
+    refuted: the share of an effect's typical size that it then rules out, which no recording would show.
     """
 
     tails: float = 4.0
@@ -91,7 +120,10 @@ class EvidenceOptions:
     occam: float = 7.0
     veto: float = 3.0
     alike: float = 0.5
+    apart: float = 2.0
     drift: SinceThen | None = None
+    formal: float = 3.0
+    law: LawOptions = field(default_factory=LawOptions)
     sure: float = 3.0
     refuted: float = 0.3
 

@@ -7,15 +7,13 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import Parameter
 from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.results.reasons import AtItsEnd, Reason
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def at_their_end(h: Hypothesis, pool: Sequence[Candidate]) -> dict[Candidate, Reason]:

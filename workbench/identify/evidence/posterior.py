@@ -27,6 +27,21 @@ class RegionPosterior:
     families: Mapping[Family, float]
 
     @property
+    def unnamed(self) -> float:
+        """Probability of a torque that nobody has named."""
+        return min(1.0, sum(w for f, w in self.weights if f.hypothesis.law is not None))
+
+    def unnamed_instead(self, of: Named) -> tuple[tuple[str, ...], float]:
+        """On what an unnamed torque depends in the likeliest model that has one in the place of an effect, and the probability of
+        all such models."""
+        models = [(f, w) for f, w in self.weights if f.hypothesis.law is not None and of not in _names(f)]
+        if not models:
+            return (), 0.0
+        law = models[0][0].hypothesis.law
+        assert law is not None
+        return tuple(law.scales), sum(w for _, w in models)
+
+    @property
     def best(self) -> Fitted:
         """The likeliest model."""
         return self.weights[0][0]

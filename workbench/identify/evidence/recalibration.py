@@ -1,21 +1,24 @@
-"""What of the nominal law was recalibrated, for the report."""
+"""Recalibrated numbers of the nominal law, for the report."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from workbench.identify.evidence.hypothesis import Uncertain
-from workbench.identify.evidence.nuisance import UNITS, ZERO, nominal_value
+from workbench.identify.evidence.nuisance import UNITS, ZERO, changed_by, mixing, nominal_value
 from workbench.identify.results.findings import Recalibrated
 from workbench.robot import RobotModel
 
 
 def what_changed(model: RobotModel, z: Mapping[Uncertain, float]) -> tuple[Recalibrated, ...]:
     """Nominal and recalibrated values, those that went furthest first."""
+    sds = {(n.joint, n.name): float(sd) for n, sd in zip(z, np.linalg.norm(mixing(list(z)), axis=1))}
     out = []
-    for number, by in z.items():
-        nominal = 0.0 if number.name == ZERO else nominal_value(model.servo(number.joint), number.name)
-        value = number.sd * by if number.name == ZERO else nominal * math.exp(number.sd * by)
-        out.append(Recalibrated(number.name, (number.joint,), nominal, value, number.sd * (nominal or 1.0), UNITS[number.name]))
+    for (joint, name), by in changed_by(z).items():
+        nominal = 0.0 if name == ZERO else nominal_value(model.servo(joint), name)
+        value = by if name == ZERO else nominal * math.exp(by)
+        out.append(Recalibrated(name, (joint,), nominal, value, sds[joint, name] * (nominal or 1.0), UNITS[name]))
     return tuple(sorted(out, key=lambda r: -abs(r.sigmas)))

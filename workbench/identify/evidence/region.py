@@ -13,12 +13,11 @@ from workbench.identify.evidence.likelihood import Likelihood, correlation_time
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import TakeEvidence
+from workbench.types import Array, Mask
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.hypothesis import Uncertain
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 SPAN = 0.02
 """Between the frames that are looked at [s]: neighbours closer than that tell the same."""
 LOST = 1.0

@@ -13,8 +13,9 @@ from workbench.identify.evidence.hypothesis import Hypothesis
 from workbench.identify.evidence.linearise import linearised
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.robot_wide import Together, Whole
-from workbench.identify.evidence.search import Found, Report, begun, gone_on, lockstep, search, searched, standing
+from workbench.identify.evidence.search import Found, begun, gone_on, lockstep, search, searched, standing
 from workbench.identify.parameters import Candidate, Key
+from workbench.types import Progress
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts
@@ -41,7 +42,7 @@ class RobotFound:
         return float(1.0 / (1.0 + np.exp(others).sum()))
 
 
-def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: EvidenceOptions, report: Report) -> RobotFound:
+def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: EvidenceOptions, report: Progress) -> RobotFound:
     """Searches joints and robot. names: effects that act in all joints at once. What acts in all goes first where it explains a
     good part of what the best effect in each joint would, and is then weighed against the search without it; else it is looked
     for beside what the joints are found to have."""
@@ -63,7 +64,7 @@ def search_robot(rollouts: Rollouts, names: Sequence[Candidate], options: Eviden
     return _weighed(at, RobotFound(alone, alone_found, together), names, options)
 
 
-def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Report
+def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], options: EvidenceOptions, report: Progress
            ) -> tuple[Rollouts, tuple[Found, ...]]:
     """What was begun, with an effect of the whole robot where that comes first."""
     report("effects of the whole robot", None)
@@ -79,7 +80,7 @@ def _first(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate
 
 
 def _to_the_end(rollouts: Rollouts, found: Sequence[Found], names: Sequence[Candidate], step: float, options: EvidenceOptions,
-                report: Report) -> RobotFound:
+                report: Progress) -> RobotFound:
     """Joints searched, and effects of the whole robot added as long as they pay."""
     rollouts, found = searched(rollouts, found, step, options, report)
     for _ in range(NUMERICS.rounds):

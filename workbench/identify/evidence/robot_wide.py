@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Fitted, judged
 from workbench.identify.evidence.hypothesis import Hypothesis, Prior, log_odds
@@ -22,11 +21,10 @@ from workbench.identify.evidence.linearise import Probe, led_after, on_lines, po
 from workbench.identify.evidence.options import NUMERICS, EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

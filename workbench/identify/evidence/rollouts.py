@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain, start
 from workbench.identify.evidence.nuisance import as_mapping, recalibrated
@@ -15,8 +14,8 @@ from workbench.identify.evidence.region import Region
 from workbench.identify.evidence.step_errors import StepErrors
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Wants = tuple[int, Hypothesis]
 """A region, by its index, and what it wants rolled out."""
 
@@ -57,6 +56,8 @@ class Rollouts:
         for h in hypotheses:
             z |= as_mapping(h.numbers, h.z)
         model = recalibrated(self.nominal, z)
+        for law in (h.law for h in hypotheses if h.law is not None):
+            model = law.added_to(model)
         return model.with_effects((*model.effects, *(spec for h in (*hypotheses, self.shared) for spec in h.specs())))
 
     def around_here(self, step: float, horizon: float | None = None) -> Rollouts:

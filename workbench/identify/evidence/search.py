@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.evidence.fit import Asks, Fitted, fitting, judged, polished, side_by_side, without
 from workbench.identify.evidence.hypothesis import Hypothesis, Term, start
@@ -17,13 +16,12 @@ from workbench.identify.evidence.region import Region
 from workbench.identify.fitting.levenberg_marquardt import together
 from workbench.identify.options import PROBLEM
 from workbench.identify.parameters import Candidate
+from workbench.types import Progress
 
 if TYPE_CHECKING:
     from workbench.identify.evidence.rollouts import Rollouts
 
-Array = NDArray[np.float64]
 Key = frozenset[Term]
-Report = Callable[[str, float | None], None]
 
 
 @dataclass(frozen=True)
@@ -49,12 +47,12 @@ class Found:
         return sorted(self.fits.values(), key=lambda f: -f.log_posterior)[:options.beam]
 
 
-def search(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
+def search(rollouts: Rollouts, options: EvidenceOptions, report: Progress) -> tuple[Rollouts, tuple[Found, ...]]:
     """Searches all regions side by side, level by level; returns them with what stands in each."""
     return searched(*begun(rollouts, options, report), rollouts.step, options, report)
 
 
-def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple[Rollouts, tuple[Found, ...]]:
+def begun(rollouts: Rollouts, options: EvidenceOptions, report: Progress) -> tuple[Rollouts, tuple[Found, ...]]:
     """The nominal law recalibrated in all regions, at the coarse step of exploring."""
     report("the nominal law recalibrated", None)
     rollouts = replace(rollouts, step=PROBLEM.coarse, horizon=options.horizon)
@@ -63,7 +61,7 @@ def begun(rollouts: Rollouts, options: EvidenceOptions, report: Report) -> tuple
     return standing(rollouts, found), found
 
 
-def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Report,
+def searched(rollouts: Rollouts, found: Sequence[Found], step: float, options: EvidenceOptions, report: Progress,
              horizon: float | None = None) -> tuple[Rollouts, tuple[Found, ...]]:
     """What was begun searched to its end. step, horizon [s]: of rollouts by which it is judged; None: `_judging_horizon`.
 
@@ -90,14 +88,14 @@ def _judging_horizon(rollouts: Rollouts, found: Sequence[Found], options: Eviden
     return np.inf if np.mean(grown) < np.log(options.grown) else options.horizon
 
 
-def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Report
+def gone_on(rollouts: Rollouts, found: Sequence[Found], options: EvidenceOptions, report: Progress
             ) -> tuple[Rollouts, tuple[Found, ...]]:
     """The search gone on with from what was found, as after names were taken out."""
     rollouts, on = _all_levels(standing(rollouts, found), list(found), options, False, report)
     return rollouts, tuple(on)
 
 
-def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions, exploring: bool, report: Report
+def _all_levels(rollouts: Rollouts, found: list[Found], options: EvidenceOptions, exploring: bool, report: Progress
                 ) -> tuple[Rollouts, list[Found]]:
     """Level by level until no region's best fit has anything to be added, dropped or exchanged."""
     what = "exploring" if exploring else "judging"

@@ -12,13 +12,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.options import PROBLEM
 from workbench.identify.rollouts.evaluator import RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Residuals = Mapping[int, Array]
 Roll = Callable[[Sequence[RolloutRequest]], list[dict[int, Array]]]
 

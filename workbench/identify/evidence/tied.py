@@ -1,7 +1,7 @@
-"""What a servo's own angles tell as one number: gravity against torque.
+"""Gravity against torque: servo logs determine their ratio only.
 
-Angles do not change if all torques and inertias grow alike. A load, a centre of mass elsewhere, another supply and a stronger
-motor are therefore told apart by what was known before alone, however small the errors that a fit claims: stick and slip answer
+Angles do not change if all torques and inertias grow by one factor. A load, a moved centre of mass, another supply and a stronger
+motor can therefore be separated by prior knowledge alone, however small the errors that a fit claims: stick and slip answer
 small changes with noise, which differences take for information. So an effect that does what other torques would do is believed
 by no more than the prior odds of both.
 """
@@ -9,28 +9,42 @@ by no more than the prior odds of both.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from workbench.identify.evidence.fit import Fitted
-from workbench.identify.evidence.hypothesis import Prior, log_odds
+from workbench.identify.evidence.hypothesis import Prior, Uncertain, log_odds
+from workbench.identify.evidence.nuisance import mixing
 from workbench.identify.evidence.options import EvidenceOptions
 from workbench.identify.evidence.region import Region
 from workbench.identify.parameters import Candidate
+from workbench.types import Array
 
+GRAVITY = "gravity against torque"
+"""The tie of what gravity does with what all torques do."""
 TORQUES = ("torque_at_full_duty", "back_emf", "coulomb_friction", "viscous_friction", "reflected_inertia")
 """Numbers of the nominal law that are torques, or make them."""
 
 
 @dataclass(frozen=True)
 class AsTorque:
-    """An effect beside all torques of the servo. by: of these the change that does most like it, of the logarithm; alike: share
-    of what the effect does that this does; share: probability that it is the effect, where both explain the same."""
+    """An effect compared with a change of all torques of the servo. by: the change of their logarithm that resembles the effect
+    most; alike: the share of the effect's response that this change reproduces; share: probability that it is the effect, where
+    both explain the same; known: standard deviation of the logarithm of the servo's common torque scale, before any data."""
 
     by: float
     alike: float
     share: float
+    known: float
+
+    def covariance(self, formal: Array, size: Array) -> Array:
+        """Of the effect's sizes (k, k): no better known along `size` (k,) than the torques are that do the same, whatever a fit
+        claims (`formal`), as no angle tells the two apart."""
+        along = size / max(float(np.linalg.norm(size)), 1e-12)
+        least = self.alike * float(size @ size) * (self.known / max(abs(self.by), 1e-6))**2
+        return np.asarray(formal + max(0.0, least - float(along @ formal @ along)) * np.outer(along, along))
 
     @property
     def sentence(self) -> str:
@@ -42,25 +56,30 @@ class AsTorque:
 
 
 def as_torque(region: Region, options: EvidenceOptions, f: Fitted, c: Candidate) -> AsTorque | None:
-    """Of a fit's effect; None where it is no such, or no other torques do what it does."""
+    """Of a fit's effect; None where it is not of this tie, or no change of torque resembles it."""
     h, prior = f.hypothesis, Prior.of(f.hypothesis, options)
-    known = [k for k, n in enumerate(h.numbers) if n.name in TORQUES]
-    if c.effect.tied != "gravity against torque" or not known or not c.size:
+    more = all_torques(h.numbers)
+    if c.effect.tied != GRAVITY or not more.any() or not c.size:
         return None
     own = h.slices()[h.effects.index(c)]
-    sds = np.array([h.numbers[k].sd for k in known])
     precision = region.likelihood.precision(f.r, f.discrepancy)
-    does, torques = f.J[:, own] @ h.theta[own], f.J[:, known] @ (1.0 / sds)
+    does, torques = f.J[:, own] @ h.theta[own], f.J[:, :len(more)] @ more
     both, size = float(does @ (precision * torques)), float(torques @ (precision * torques))
     by, alike = both / max(size, 1e-12), both**2 / max(size * float(does @ (precision * does)), 1e-12)
     if alike < options.alike:
         return None
-    z = h.z[known]
-    torque = -0.5 * float(np.sum(np.square(z + by / sds) - np.square(z)))
+    torque = -0.5 * float(np.sum(np.square(h.z + by * more) - np.square(h.z)))
     nothing = h.theta.copy()
     nothing[own] = prior.center[own]
     H = (f.J[:, own].T * precision) @ f.J[:, own] + np.diag(prior.precision(h.theta)[own])
     density = float(prior.log(h.theta) - prior.log(nothing)) + float(np.sum(prior.at_center[own]))
     occam = 0.5 * c.size * math.log(2 * math.pi) - 0.5 * float(np.linalg.slogdet(H)[1])
     effect = density + occam + log_odds(len(region.candidates), options.expected)
-    return AsTorque(by, alike, 1.0 / (1.0 + math.exp(min(torque - effect, 700.0))))
+    return AsTorque(by, alike, 1.0 / (1.0 + math.exp(min(torque - effect, 700.0))), float(1.0 / np.linalg.norm(more)))
+
+
+def all_torques(numbers: Sequence[Uncertain]) -> Array:
+    """By how many standard deviations the numbers (k,) have to move for all torques to grow by a factor of e, and nothing else to
+    change; zero where none of them is a torque."""
+    target = np.array([float(n.name in TORQUES) for n in numbers])
+    return np.asarray(np.linalg.solve(mixing(numbers), target)) if target.any() else target

@@ -13,6 +13,7 @@ from workbench.identify.options import FIT
 from workbench.identify.problem import in_file_units
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import ParameterDrift
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.fitting.fit import Fit, Slopes
@@ -21,13 +22,11 @@ if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Drift:
-    """A number of an effect (its index) that fixed-base takes want to change: its values at a take's beginning and end; what a
-    number that stays leaves for that, and what chance does, a standard error: RMS over sigma."""
+    """A parameter (its index) that fixed-base takes require to change: its values at a take's beginning and end; the RMS error
+    over sigma caused by a constant value, and by chance, one standard error."""
 
     effect: Candidate
     number: int
@@ -72,8 +71,8 @@ def drift(c: Candidate, x: Array, k: int, t: Trend) -> Drift | None:
 
 
 class Trend(NamedTuple):
-    """Of the number of one column of slopes: by how much it surely changes over a take, the standard error of that, and the RMS
-    over sigma that a change of one makes."""
+    """For the parameter of one column of slopes: its significant change over a take, the standard error of that, and the RMS
+    over sigma caused by a change of one."""
 
     column: int
     change: float
@@ -91,9 +90,9 @@ def _trends(evaluator: RolloutEvaluator, fit: Fit, s: Slopes) -> Iterator[Trend]
 
 
 def trends(r: Array, J: Array, clock: Array, stretches: NDArray[np.int_]) -> Iterator[Trend]:
-    """Numbers that surely change over a take: a test of constancy against a linear trend, with standard errors over stretches
-    (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`). r (n,): what a fit leaves, over sigma; J (n, k): of r by the
-    numbers; clock (n,): -1/2 at a take's beginning, 1/2 at its end."""
+    """Parameters that significantly change over a take: a test of constancy against a linear trend, with standard errors over
+    stretches (J. Nyblom, JASA 84, 1989; clusters as in `covariance_of`). r (n,): residuals of a fit, over sigma; J (n, k):
+    derivatives of r by the parameters; clock (n,): -1/2 at a take's beginning, 1/2 at its end."""
     _, which = np.unique(stretches, return_inverse=True)
     for n, slope in enumerate(J.T):
         z = slope * clock

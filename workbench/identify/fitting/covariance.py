@@ -1,4 +1,4 @@
-"""How unsure a fit's numbers are: by what its stretches say differently, and by what is the same in all of them."""
+"""Uncertainty of a fit's parameters: from the scatter between stretches, and from errors common to all of them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from workbench.identify.fitting.levenberg_marquardt import Solved
 from workbench.identify.options import FIT
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, take_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def covariance_of(
@@ -27,7 +26,7 @@ def covariance_of(
 
 
 def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], stretches: NDArray[np.int_]) -> Array:
-    """Share of what is known of each number that floating-base takes identify."""
+    """Share of the information on each parameter that comes from floating-base takes."""
     free = [i for i in takes if evaluator.any_floating((i,))]
     information = np.sum(solved.J**2, axis=0)
     floating = np.sum(solved.J[np.isin(take_of(stretches), free)] ** 2, axis=0)
@@ -35,16 +34,17 @@ def _walked(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], s
 
 
 def _bent_by_contact(evaluator: RolloutEvaluator, solved: Solved, takes: Sequence[int], joint: str | None) -> Array:
-    """By how much the other contact model would move each number: it is as right as this one, in every stretch alike."""
+    """Change of each parameter under the other contact model: both are equally valid, and the change is common to all
+    stretches."""
     other = evaluator.vector({i: evaluator.evidence[i].contact / evaluator.evidence[i].sigma for i in takes}, "fit", joint)
     scale = np.sqrt(np.sum(solved.J**2, axis=0)) + 1e-9
     return np.asarray(np.linalg.lstsq(solved.J / scale, other, rcond=1e-6)[0] / scale)
 
 
 def clustered(solved: Solved, stretches: NDArray[np.int_], temper: float = 1.0) -> Array:
-    """Of a block's sizes: what the scatter between stretches says, as neighbouring frames and joints err together (clustered
-    sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), at least what that between frames does and what chi squared over
-    temper says; infinite where nothing depends on them."""
+    """Covariance of a block's sizes: from the scatter between stretches, since errors of neighbouring frames and joints are
+    correlated (clustered sandwich; K.-Y. Liang and S. L. Zeger, Biometrika 73, 1986), and at least that from the scatter between
+    frames and from chi squared over temper; infinite where nothing depends on them."""
     H = solved.J.T @ solved.J
     known = np.diag(H) > 1e-9
     out = np.full(H.shape, np.inf)

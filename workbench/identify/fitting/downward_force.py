@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.effects.base import si_values
 from workbench.identify.fitting.fit import Fit
@@ -14,8 +13,7 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.results.findings import Unexplained
 from workbench.identify.results.reasons import DownwardPull
 from workbench.robot import GRAVITY
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def pulls_down(c: Candidate, x: Array) -> bool:

@@ -1,4 +1,4 @@
-"""Effects fitted together: sizes, covariance, what they cost and leave."""
+"""Effects fitted together: sizes, covariance, cost and residuals."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from workbench.identify.parameters import Candidate, Key, with_effects
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Sizes = list[tuple[Candidate, Array]]
 """Effects, each with its sizes."""
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """What some numbers of a fit (indices of x) do to what is fitted (`vector`) on some takes, in the search's step. joint: whose
-    channels alone, None for all."""
+    """Derivatives of the fitted `vector` by some parameters of a fit (indices of x) on some takes, at the search's step. joint:
+    whose channels alone, None for all."""
 
     numbers: NDArray[np.int_]
     takes: tuple[int, ...]
@@ -30,7 +30,7 @@ class Slopes:
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects fitted together. x: sizes of all their numbers; covariance of x, infinite where the data say nothing.
+    """Effects fitted together. x: sizes of all their parameters; covariance of x, infinite where the data do not constrain it.
 
     cost: chi squared by use ("fit", "choose", "validate"); residuals by take.
     """
@@ -58,15 +58,15 @@ class Fit:
         return [(c, x[s]) for c, s in zip(self.effects, self.slices())]
 
     def sizes_without(self, key: Key) -> Sizes:
-        """Those of all effects but one."""
+        """Those of every effect but one."""
         return [s for s in self.sizes() if s[0].key != key]
 
     def sizes_with(self, key: Key, x: Array) -> Sizes:
-        """Those of all effects, one at other sizes."""
+        """Those of every effect, with one at other sizes."""
         return [(c, x if c.key == key else own) for c, own in self.sizes()]
 
     def sizes_by_key(self) -> dict[Key, Array]:
-        """Of each effect, by what it is and where."""
+        """Name and place of each effect."""
         return {c.key: x for c, x in self.sizes()}
 
     def bounds(self) -> tuple[Array, Array]:

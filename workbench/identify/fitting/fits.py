@@ -18,10 +18,9 @@ from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, with_effects
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-Report = Callable[[str, float | None], None]
 
 
 class Search:
@@ -69,8 +68,8 @@ class Search:
         return floating_base if floating_base and alone else takes
 
     def resettled(self, current: Fit, *more: Candidate) -> tuple[Search, Fit]:
-        """`current` with those that are settled, and `more`, fitted anew on fixed-base takes, and the search in which these are
-        settled: for when one went or another came."""
+        """`current` with the settled effects, and `more`, fitted again on fixed-base takes, and the search in which these are
+        settled: for when an effect was dropped or added."""
         there = [s for s in current.sizes() if self.is_settled(s[0]) or s[0].key in {c.key for c in more}]
         free = self.with_settled(None)
         fitted = free.refitted(free.evaluated(there), self.fixed_base, FIT.refit_steps, range(len(there)))
@@ -79,8 +78,8 @@ class Search:
         return self.with_settled(settled), self.evaluated([(c, known.get(c.key, x)) for c, x in current.sizes()])
 
     def with_timing_refitted(self, current: Fit) -> Fit:
-        """A fit on fixed-base takes with its numbers of timing identified from all takes: contact bends much, but not when
-        commands come. As it was where fixed-base takes speak against that: then floating-base takes lack something else."""
+        """A fit on fixed-base takes with its timing parameters identified from all takes: contact changes much, but not the times
+        of commands. Unchanged if fixed-base takes contradict that: then something else is missing on floating-base takes."""
         timing = [i for i, c in enumerate(current.effects) if c.effect.layer == "timing" and c.size]
         if not timing or not self.floating_base(self.fitted):
             return current
@@ -98,7 +97,7 @@ class Search:
         return self.side_by_side([self.evaluating(effects)])[0][0]
 
     def evaluating(self, *lists: Sequence[tuple[Candidate, Array]]) -> Part[list[Fit]]:
-        """Several lists of effects as they are, on all takes, as part of something that goes on beside others."""
+        """Several lists of effects as they are, on all takes, as a generator that runs alongside others."""
         answers = yield [RolloutRequest(with_effects(self.nominal, effects), self.takes) for effects in lists]
         out = []
         for effects, residuals in zip(lists, answers):
@@ -117,7 +116,7 @@ class Search:
 
     def refitting(self, current: Fit, takes: tuple[int, ...], iterations: int, free: Sequence[int] | None = None,
                   step: float = 1.0) -> Part[Fit]:
-        """The same as part of something that goes on beside others. step: in which it is fitted, in search steps."""
+        """The same as a generator that runs alongside others. step: of the time step, in search steps."""
         moved = [i for i, c in enumerate(current.effects) if not self.is_settled(c)] if free is None else list(free)
         moving = current.numbers(moved)
         if not len(moving):
@@ -187,10 +186,10 @@ class Search:
         return replace(fit, covariance=covariance, slopes=(*others, *slopes))
 
     def refined(self, fit: Fit) -> Fit:
-        """The fit with its numbers as fine steps want them, and what it leaves there: a step's error bends numbers by several per
-        cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; of the one number that
-        floating-base takes identify, if it is one, the bottom of what is seen far around. A quarter of the way counts as a
-        standard deviation more."""
+        """The fit with its parameters corrected for finer steps, and its residuals there: the step's error biases parameters by
+        several per cent. One Gauss-Newton step with the search's slopes, shortened where it makes things worse; for a single
+        parameter that floating-base takes identify, the minimum over a wide range of values. A quarter of the change is added to
+        the standard deviation."""
         if not fit.slopes or not np.isfinite(fit.covariance).any():
             return self.finely(fit, self.takes, fit.x)[0]
         before, fit = fit, self._finer(fit)
@@ -219,7 +218,7 @@ class Search:
         return self.side_by_side([self.refitting(fit, self.fitted, FIT.finer_steps, step=FIT.finer)])[0]
 
     def _newton(self, seen: Fit) -> Array:
-        """A Gauss-Newton step from what a fit leaves in fine steps, with the search's slopes."""
+        """A Gauss-Newton step from a fit's residuals at finer steps, with the search's slopes."""
         move = np.zeros(len(seen.x))
         for s in seen.slopes:
             r = self.evaluator.vector({i: seen.residuals[i] for i in s.takes}, "fit", s.joint)
@@ -228,7 +227,7 @@ class Search:
         return move
 
     def floors(self, fit: Fit) -> dict[int, Array]:
-        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: what those steps twice as long change."""
+        """Numerical floor (c,) of a refined fit's channels, over sigma, by take: the change when its step is doubled."""
         model = with_effects(self.nominal, fit.sizes())
         longer = self.evaluator.residuals([RolloutRequest(model, self.takes, 2 * PROBLEM.fine)])[0]
         return {i: np.nan_to_num(rms((longer[i] - fit.residuals[i])[self.evaluator.evidence[i].moving])) for i in self.takes}
@@ -243,7 +242,7 @@ class Search:
 
 
 def gained(evaluator: RolloutEvaluator, before: Fit, after: Fit, takes: Sequence[int], use: str) -> float:
-    """By how much less chi squared one fit leaves than another, of one use of some takes."""
+    """Reduction of chi squared from one fit to another, in one use of some takes."""
     was, now = (evaluator.cost({i: f.residuals[i] for i in takes}, use) for f in (before, after))
     return was - now
 
@@ -254,7 +253,7 @@ def contradicted_by_fixed_base(search: Search, fit: Fit, other: Fit) -> bool:
 
 
 def _with_block(covariance: Array, numbers: NDArray[np.int_], block: Array) -> Array:
-    """A covariance with that of some numbers put in; nothing is known of how they go with others."""
+    """A covariance with that of some parameters inserted; their correlation with others is unknown and set to zero."""
     out = covariance.copy()
     out[numbers], out[:, numbers] = np.inf, np.inf
     out[np.ix_(numbers, numbers)] = block

@@ -1,7 +1,7 @@
 """Levenberg-Marquardt in lockstep: many small fits whose rollouts share one batch.
 
-A fit is a generator that yields the points it wants evaluated and is sent what they leave. Its numbers fall into blocks that
-do not feel each other (one joint each), so that one rollout moves all blocks at once.
+A fit is a generator that yields the points to be evaluated and is sent their residuals. Its parameters fall into independent
+blocks (one joint each), so that one rollout moves all blocks at once.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.options import FIT
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Point = list[Array]
 """Sizes, by block."""
 Left = list[Array]
@@ -26,8 +25,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Solved:
-    """One block's end. x: sizes; r: what they leave; J: of r with respect to x, there or a step before; damping: of the next
-    step; missed: whether one from measured slopes led nowhere."""
+    """Result of one block. x: sizes; r: their residuals; J: derivative of r by x, there or a step before; damping: of the next
+    step; missed: whether a step from measured slopes brought no improvement."""
 
     x: Array
     r: Array
@@ -50,10 +49,10 @@ def fit_blocks(
     since: Sequence[Solved] = (),
     magnitudes: Array | None = None,
 ) -> Asks:
-    """Fits every block from `start`, which leaves `left`. Jacobians by one difference a number, a share `stride` of it (of a lone
-    block, one for each number), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants where there is one number).
-    Walking answers small changes with noise: there strides are long (WALKING). magnitudes: of a lone block, what they are at
-    least shares of. since: fits that ended at `start`, and go on."""
+    """Fits every block from `start`, whose residuals are `left`. Jacobians by one difference per parameter, of a share `stride`
+    of it (for a lone block, one share per parameter), then by Broyden's rule (C. G. Broyden, Math. Comp. 19, 1965: secants for
+    one parameter). Small changes of a walk are mostly noise: there strides are long (WALKING). magnitudes: of a lone block, the
+    least values to which the shares apply. since: fits that ended at `start`, and continue."""
     rough = bool(np.any(np.asarray(stride) != FIT.stride_fixed))
     blocks = [_Block(np.clip(np.asarray(s, dtype=float), *ends), r, *ends, rough) for s, r, ends in zip(start, left, bounds)]
     for b, s in zip(blocks, since):
@@ -80,9 +79,9 @@ def fit_blocks(
 
 @dataclass(eq=False)
 class _Block:
-    """One block on its way: x, what it leaves and the slopes J there; updated: by Broyden's rule, since they were measured.
-    rough: slopes may be noise. missed: a step from measured slopes led nowhere. steps: by which numbers move for slopes, and
-    differences, what was seen there. known: sizes tried so far and their cost."""
+    """State of one block: x, its residuals and the slopes J there; updated: by Broyden's rule, since they were measured.
+    rough: slopes may be noise. missed: a step from measured slopes brought no improvement. steps: by which parameters are changed
+    for slopes, and differences, the response to each. known: sizes tried so far and their cost."""
 
     x: Array
     r: Array
@@ -109,14 +108,15 @@ class _Block:
         return self.x + np.eye(len(self.x))[i] * self.steps[i] if i < len(self.x) else self.x
 
     def differ(self, i: int, r: Array) -> None:
-        """Slope i, from what was left where number i had moved."""
+        """Slope i, from the residuals where parameter i had changed."""
         if i < len(self.x):
             self.J[:, i] = (r - self.r) / self.steps[i]
             self.differences.append((self.moved(i), r))
 
     def trials(self) -> tuple[Array, ...]:
-        """Where to go: a damped step, and on a walk a short one. Where steps led nowhere there, slopes were noise: one number
-        looks far both ways, and then takes the bottom of the parabola through what it saw for the short one."""
+        """The next points: a damped step, and on a walk also a short one. Where steps brought no improvement, slopes were noise:
+        a lone parameter is evaluated far on both sides, and the minimum of the parabola through these values replaces the short
+        step."""
         if not self.rough:
             return (_step(self.x, self.r, self.J, self.damping, self.low, self.high) if self.open else self.x,)
         if not self.open:
@@ -134,8 +134,8 @@ class _Block:
         return self.rough and len(self.x) == 1 and bool(np.ptp([at[0] for at, _ in self.known]) < FIT.wide * abs(self.x[0]))
 
     def take(self, answers: Sequence[tuple[Array, Array]]) -> None:
-        """Goes where least is left of what was tried; else once more: from new differences where slopes were updated, or in a
-        short step."""
+        """Moves to the best point tried; if none is better, tries again: from new differences where slopes were updated, or with
+        a short step."""
         tried = [*answers, *self.differences]
         self.differences = []
         costs = [float(r @ r) for _, r in tried]
@@ -158,7 +158,7 @@ class _Block:
 
 
 def steps_of(x: Array, low: Array, high: Array, stride: float | Array, magnitudes: Array | None = None) -> Array:
-    """By how much each number is moved for a difference: a share `stride` of it, or of `magnitudes`, as far as it may go."""
+    """Change of each parameter for a difference: a share `stride` of it, or of `magnitudes`, within its bounds."""
     step = stride * np.maximum(np.abs(x), FIT.least_move if magnitudes is None else magnitudes)
     return np.asarray(np.where(x + step <= high, step, -step))
 
@@ -191,7 +191,7 @@ def _step(x: Array, r: Array, J: Array, damping: float, low: Array, high: Array)
 
 def through(fit: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any], tell: Callable[[Any], Any]
             ) -> Generator[list[Any], list[Any], T]:
-    """A generator as part of another: what it wants goes out as `ask` puts it, what comes back goes in as `tell` does."""
+    """A generator as part of another: its requests are passed on through `ask`, the answers through `tell`."""
     try:
         wants = next(fit)
         while True:
@@ -203,7 +203,7 @@ def through(fit: Generator[list[Any], list[Any], T], ask: Callable[[Any], Any], 
 
 def together(asking: Mapping[T, Generator[list[Any], list[Any], Any]], answer: Callable[[list[tuple[T, Any]]], list[Any]],
              report: Callable[[float], None] = lambda share: None) -> dict[T, Any]:
-    """Runs generators side by side: what all of them want next is answered in one call. Returns what each returned."""
+    """Runs generators in lockstep: the requests of every generator are answered in one call. Returns the result of each."""
     done: dict[T, Any] = {}
     wants: dict[T, list[Any]] = {}
 

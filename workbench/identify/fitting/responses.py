@@ -8,26 +8,25 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import Bounds, minimize
 
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.rollouts.evaluator import RolloutRequest
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 Part = Generator[list[RolloutRequest], list[dict[int, Array]], T]
-"""What a part of a search asks, is answered, and returns."""
+"""A part of a search as a generator: requests, answers, result."""
 Response = tuple[list[Array], list[list[Array]]]
-"""Sizes at which a group was looked at, and what each did to what is fitted, by block."""
+"""Sizes at which a group was simulated, and the response to each, by block."""
 ResponseBank = dict[tuple[object, ...], Response]
 """By group and takes."""
 
 
 def scan_sizes(c: Candidate, walking: bool, no_fixed_base: bool) -> tuple[float, ...]:
-    """In typical ones, for an effect. no_fixed_base: whether no take had one, where joints show what they lack, however much;
-    what shows under load alone may be large on a walk even so."""
+    """Sizes at which an effect is simulated, in typical ones. no_fixed_base: whether no take had a fixed base, where joints show
+    their errors, however large; effects that show under load alone may be large on a walk even so."""
     if walking and c.effect.layer == "ground":
         return FIT.scanned_ground
     return FIT.scanned if not walking or no_fixed_base or c.effect.under_load else FIT.scanned[:1]
@@ -72,8 +71,8 @@ def linearised_estimate(
 
 
 def _between(r0: Array, seen: Sequence[tuple[float, Array]], far: float, bounds: tuple[float, float]) -> tuple[float, float]:
-    """A size, and what it takes away, by lines between those that were seen (with what each left, from none on), and the first
-    and the last of these drawn out: a servo at half its gain lags twice as much, at a fifth five times."""
+    """The best size, and its gain, by linear interpolation between the simulated ones (with the residuals of each, from none on),
+    and extrapolation beyond the first and the last: a servo at half its gain lags twice as much, at a fifth five times."""
     (_, first), last = seen[1], seen[-1]
     drawn_out = [((-far * seen[1][0], r0 - far * (first - r0)), seen[0]), (last, (far * last[0], r0 + far * (last[1] - r0)))]
     best = (seen[1][0], -np.inf)
@@ -89,9 +88,9 @@ def _between(r0: Array, seen: Sequence[tuple[float, Array]], far: float, bounds:
 
 
 def _bent_guess(r0: Array, points: Array, seen: Array, bounds: tuple[Array, Array], far: float) -> tuple[Array, float]:
-    """The same of several numbers: what is seen at points (k, n) told by a line for each number and, as a walk hardly answers in
-    lines, by squares of those that were seen both ways and the product of the first two; sizes where the sum of squares of that,
-    or of a point that was seen, is least."""
+    """The same for several parameters: the responses at points (k, n) are described by a line for each parameter and, since walks
+    respond nonlinearly, by squares of those that were simulated on both sides and the product of the first two; returns the sizes
+    that minimise the sum of squares of that, or of a simulated point."""
     both = [i for i in range(points.shape[1]) if points[:, i].min() < 0 < points[:, i].max()]
 
     def terms(x: Array) -> Array:

@@ -1,1 +1,1 @@
-"""What a diagnosis says, as types: findings, reasons, ties, and what each take was."""
+"""Results of a diagnosis, as types: findings, reasons, ties, and a report on each take."""

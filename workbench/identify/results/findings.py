@@ -1,4 +1,4 @@
-"""What a diagnosis says (docs/formats.md, section 6), typed: the verdict, where the gap is, what explains it, what does not."""
+"""Results of a diagnosis (docs/formats.md, section 6), typed: the verdict, the gap, its explanation, and the unexplained rest."""
 
 from __future__ import annotations
 
@@ -7,14 +7,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 from workbench.effects.base import Family, Layer
 from workbench.files.reading import write_together
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.results.reasons import Description, Reason
+from workbench.identify.results.recalibrated import Recalibrated
 from workbench.robot import Posterior, RobotModel
 from workbench.robot.model_file import model_text
+
+if TYPE_CHECKING:
+    from workbench.identify.results.tied_names import GravityOverTorque
+    from workbench.identify.results.unknown_torque import UnknownTorque
 
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
 Vector: TypeAlias = tuple[float, float, float]
@@ -47,7 +52,7 @@ class Estimate:
     def __post_init__(self) -> None:
         value, low, high = (x if isinstance(x, tuple) else (x,) for x in (self.value, self.low, self.high))
         if not len(value) == len(low) == len(high) in (1, 3):
-            raise ValueError("expected value, low and high alike: one number each, or three")
+            raise ValueError("expected value, low and high of the same shape: one number each, or three")
         for v, a, b in zip(value, low, high):
             if not (math.isfinite(v) and a <= v <= b):
                 raise ValueError(f"expected a finite value between its bounds, got {a} <= {v} <= {b}")
@@ -86,28 +91,6 @@ class FamilyBelief:
     def to_json(self) -> dict[str, Any]:
         """As findings.json has it."""
         return {"name": self.name, "confidence": _number(self.confidence)}
-
-
-@dataclass(frozen=True)
-class Recalibrated:
-    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding."""
-
-    number: str
-    where: tuple[str, ...]
-    nominal: float
-    value: float
-    sd: float
-    unit: str
-
-    @property
-    def sigmas(self) -> float:
-        """By how many standard deviations it was adjusted."""
-        return (self.value - self.nominal) / self.sd
-
-    def to_json(self) -> dict[str, Any]:
-        """As findings.json has it."""
-        return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
-                "unit": self.unit}
 
 
 @dataclass(frozen=True)
@@ -198,7 +181,7 @@ class GapEntry:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """RMS error that the fitted model leaves, and the floor of noise and numerics, in `unit`; description: what it depends on."""
+    """RMS error of the fitted model, and the floor of noise and numerics, in `unit`; description: the signal it depends on."""
 
     where: tuple[str, ...]
     error: float
@@ -232,10 +215,12 @@ class Diagnosis:
     """Everything found in a session.
 
     verdict: docs/formats.md, section 6. nominal: the session's robot; model: the same with the findings' effects; posterior: of
-    their parameters, in the units of section 7. gap: where, when and by how much recordings differ from the nominal model.
-    findings, rejected: effects that were kept, and not kept. unexplained: what the fitted model leaves. recalibrated: servo
-    constants adjusted within their tolerance. left_out: damaged takes, (name, reason). stopped: whether the search reached its
-    limit of work. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were used.
+    their parameters, in the units of section 7. gap: where and when recordings differ from the nominal model, and how much.
+    findings, rejected: effects that were kept, and not kept. unexplained: residuals of the fitted model. recalibrated: servo
+    constants adjusted within their tolerance. tied: the ratio of gravity to torque, which is all that angles determine. left_out:
+    damaged takes, (name, reason). stopped: whether the search reached its limit of work. unknown_torques: torques of the model
+    that no effect describes. provenance: versions, seed, seconds; searched: of long sessions, the seconds of each take that were
+    used.
     """
 
     verdict: Verdict
@@ -251,6 +236,8 @@ class Diagnosis:
     left_out: tuple[tuple[str, str], ...] = ()
     stopped: bool = False
     recalibrated: tuple[Recalibrated, ...] = ()
+    tied: tuple[GravityOverTorque, ...] = ()
+    unknown_torques: tuple[UnknownTorque, ...] = ()
 
     def __post_init__(self) -> None:
         if self.verdict not in get_args(Verdict):
@@ -265,8 +252,12 @@ class Diagnosis:
             "next_experiment": None if self.next_experiment is None else self.next_experiment.to_json(),
             "provenance": dict(self.provenance),
         }
+        if self.unknown_torques:
+            out["unknown_torques"] = [u.to_json() for u in self.unknown_torques]
         if self.recalibrated:
             out["recalibrated"] = [r.to_json() for r in self.recalibrated]
+        if self.tied:
+            out["tied"] = [t.to_json() for t in self.tied]
         if self.stopped:
             out["stopped"] = True
         if self.left_out:

@@ -1,4 +1,4 @@
-"""Why an effect was rejected, and what a residual goes with: typed values, put into words for a file or for a person."""
+"""Why an effect was rejected, and which signal a residual correlates with: typed values, with words for a file or a person."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from workbench.compare.channels import ACROSS, BODY
 Naming = Callable[[str, Sequence[str]], str]
 """How the reader wants an effect at a place called."""
 Signal = Literal["time", "angle", "size of the angle", "speed", "direction of motion"]
-"""What a residual is correlated with."""
+"""Signals with which a residual may be correlated."""
 
 
 def effect_at(effect: str, where: Sequence[str]) -> str:
@@ -60,30 +60,30 @@ class WorseInPlace(Reason):
 
 @dataclass(frozen=True)
 class ScreenedOut(Reason):
-    """By its response alone, without a fit: what that takes off chi squared at its best, `gain`, and what the best rival's does,
-    `best`, on the stretches looked at."""
+    """Rejected by its response alone, without a fit: the largest possible reduction of chi squared, `gain`, and that of the best
+    rival, `best`, on the stretches that were used."""
 
     gain: float
     best: float
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        takes = f"would take {self.gain:.0f} off chi squared at most" if self.gain >= 1 else "takes nothing off chi squared"
-        return f"its signature is not that of what is missing: it {takes}, the best rival's {self.best:.0f}"
+        takes = f"reduces chi squared by {self.gain:.0f} at most" if self.gain >= 1 else "does not reduce chi squared"
+        return f"its response does not match the residuals: it {takes}, the best rival's reduces it by {self.best:.0f}"
 
 
 @dataclass(frozen=True)
 class TooLittle(Reason):
-    """Nothing was accepted at its place."""
+    """Nothing was accepted at this joint or link."""
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return "what it takes away is no more than chance, or too little of what is missing there"
+        return "it reduces the error no more than chance would, or by too little of the excess there"
 
 
 @dataclass(frozen=True)
 class Outdone(Reason):
-    """Another effect took more off chi squared: `taken`, this one `gain`."""
+    """Another effect reduced chi squared by more: `taken`, this one by `gain`."""
 
     of_chi_squared: ClassVar[bool] = True
     effect: str
@@ -93,35 +93,35 @@ class Outdone(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return (f"{naming(self.effect, self.where)} takes {self.taken:.0f} off chi squared on the choosing stretches, this "
-                f"{self.gain:.0f}")
+        return (f"{naming(self.effect, self.where)} reduces chi squared on the choosing stretches by {self.taken:.0f}, this one "
+                f"by {self.gain:.0f}")
 
 
 @dataclass(frozen=True)
 class LessLikely(Reason):
-    """The likeliest model that has it is `behind` [nats] in log posterior."""
+    """The most probable model with it is `behind` [nats] in log posterior."""
 
     behind: float
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the likeliest model with it is {_times(self.behind)} less probable"
+        return f"the best model containing it is {_times(self.behind)} less probable"
 
 
 @dataclass(frozen=True)
 class SpokenAgainst(Reason):
-    """Takes that were kept back are less likely with it, by so many nats."""
+    """Held-out takes are less probable with it, by so many nats."""
 
     by: float
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"takes that were kept back are {_times(self.by)} less probable with it"
+        return f"the held-out takes are {_times(self.by)} less probable with it"
 
 
 @dataclass(frozen=True)
 class RefutedByRegister(Reason):
-    """What a servo's own register says of its parameter, and the standard error, in `unit`."""
+    """Value of its parameter in the servo's own register, and the standard error, in `unit`."""
 
     parameter: str
     value: float
@@ -130,12 +130,12 @@ class RefutedByRegister(Reason):
 
     def said(self, naming: Naming = effect_at) -> str:
         """The reason in words, effects named by `naming`."""
-        return f"the servos' own registers say {self.parameter} {self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
+        return f"the servos' own registers give {self.parameter} {self.value:.3g} ± {self.error:.2g}{_behind_number(self.unit)}"
 
 
 @dataclass(frozen=True)
 class AtItsEnd(Reason):
-    """Fitted, its parameter went as far as it may on this robot, to `value` in `unit`."""
+    """The fit took its parameter to the largest plausible value on this robot, `value` in `unit`."""
 
     parameter: str
     value: float
@@ -148,7 +148,7 @@ class AtItsEnd(Reason):
 
 
 def _times(nats: float) -> str:
-    """What a difference of log probability is as a factor."""
+    """A difference of log probability as a factor."""
     if nats > MANY:
         return f"more than {math.exp(MANY):,.0f} times"
     return f"{math.exp(max(nats, 0.0)):.2g} times" if nats < math.log(100) else f"{float(f'{math.exp(nats):.1g}'):,.0f} times"
@@ -160,13 +160,13 @@ def _behind_number(unit: str) -> str:
 
 
 class Description(Statement):
-    """What something that stays unexplained looks like."""
+    """Appearance of an unexplained residual."""
 
 
 @dataclass(frozen=True)
 class Dependence(Description):
-    """A channel's residual in a take, and what it goes with; None: with nothing that was looked at. worst: the event where it is
-    largest, in words."""
+    """A channel's residual in a take, and the signal it correlates with; None: with none that was tested. worst: the event where
+    it is largest, in words."""
 
     take: str
     channel: str
@@ -178,8 +178,9 @@ class Dependence(Description):
         """The reason in words, effects named by `naming`."""
         what = (f"{self.channel}, " if self.channel in BODY else
                 f"across its axis ({self.channel}), " if ACROSS in self.channel else "")
-        goes = "nothing tried" if self.signal is None else f"{self.signal} (correlation {self.correlation:.2f})"
-        return f"{self.take}: {self.worst}{'; ' if self.worst else ''}{what}goes with {goes}"
+        goes = "no correlation with any tested signal" if self.signal is None else (
+            f"correlates with {self.signal} ({self.correlation:.2f})")
+        return f"{self.take}: {self.worst}{'; ' if self.worst else ''}{what}{goes}"
 
 
 @dataclass(frozen=True)

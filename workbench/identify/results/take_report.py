@@ -1,4 +1,4 @@
-"""What one take was before and after the diagnosis, for figures and for people."""
+"""One take before and after the diagnosis, for figures and for people."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.take import Take
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class TakeReport:
-    """One take beside its simulation with the nominal and with the fitted model.
+    """One take compared with its simulation by the nominal and by the fitted model.
 
-    recorded, nominal, fitted: the takes (SI, radians, world frame of `Take`), observed alike, on one clock of N frames.
+    recorded, nominal, fitted: the takes (SI, radians, world frame of `Take`), observed the same way, on one clock of N frames.
     channels: (c) names of joints, and for a free base of the body's coordinates. noise: (c,) standard deviation of what sensor
     noise, numerics and contact models alone cause [rad or m]. before, after: (N, c) recorded less simulated by the nominal and by
     the fitted model, divided by `noise`; NaN where unseen or before the first command. unseen: (N,) frames that neither the
@@ -66,6 +65,6 @@ class TakeReport:
 
 
 def rms(x: Array) -> float:
-    """Root mean square of what is finite; NaN where nothing is."""
+    """Root mean square of the finite values; NaN if there are none."""
     seen = x[np.isfinite(x)]
     return float(np.sqrt(np.mean(np.square(seen)))) if len(seen) else float("nan")

@@ -1,4 +1,4 @@
-"""What a session leaves tied, and how it saw the robot: all that the design of the next experiment asks of a diagnosis."""
+"""Ties of a session, and how it observed the robot: all that the design of the next experiment needs of a diagnosis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from workbench.robot import RobotModel
 class ObservationModel:
     """How a recording sees the robot, on one base.
 
-    sigma: joint -> what a frame's angle may err by, noise and numerical floor [rad]; joints not named are not seen.
+    sigma: joint -> standard deviation of a frame's angle, noise and numerical floor [rad]; joints not named are not seen.
     captured: by cameras, which see the links' angles, zeroed at rest, and not the first command's time; else the servos' own log.
     rate: frames a second.
     """
@@ -26,8 +26,7 @@ class ObservationModel:
 
 @dataclass(frozen=True)
 class Tie:
-    """Two models of one session: with an effect that was found, and with its likeliest rival in its place; probability: of the
-    rival."""
+    """Two models of one session: with a finding, and with its most probable rival instead; probability: of the rival."""
 
     found: RobotModel
     rival: RobotModel

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import joblib
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,12 +18,12 @@ from workbench.identify.problem import TakeEvidence, channel_gaps
 from workbench.identify.rollouts.key import ModelKeys, take_key
 from workbench.identify.rollouts.memory import RolloutMemory
 from workbench.identify.rollouts.servo_logs import frames, is_log, log_angles
+from workbench.identify.rollouts.windows import recorded_states
 from workbench.recording.take import Take
 from workbench.robot import EffectSpec, RobotModel
 from workbench.simulation import SimulationConfig
 from workbench.simulation.batch import Job, simulate_batch, simulate_stream
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class RolloutEvaluator:
         self.n_jobs = n_jobs
         self.memory = memory if isinstance(memory, RolloutMemory) else RolloutMemory(memory, PROBLEM.remembered << 20)
         self._take_keys: dict[int, str] = {}
+        self._state_keys: dict[tuple[int, float], str] = {}
         self._model_keys = ModelKeys()
 
     @property
@@ -97,8 +99,7 @@ class RolloutEvaluator:
         answers: dict[str, Array] = {}
         keys, missing, seen = [], [], set[str]()
         for q in questions:
-            windows = "" if np.isinf(q.horizon) else f"-every{q.horizon:.6g}"
-            keys.append({i: f"log-{self._key(self._felt(q.model, i), i, q)}{windows}" for i in q.takes})
+            keys.append({i: f"log-{self._key(self._felt(q.model, i), i, q)}{self._windows_key(i, q.horizon)}" for i in q.takes})
             new = {i: k for i, k in keys[-1].items()
                    if k not in answers and k not in seen and not self._recalled(k, i, q, answers)}
             seen |= set(new.values())
@@ -259,6 +260,15 @@ class RolloutEvaluator:
         until = self._until(take, q)
         late = "" if np.isinf(until) else f"-until{until:.6g}"
         return f"{self._model_keys.of(felt)}-{self._take_keys[take]}-{q.step:g}{late}"
+
+    def _windows_key(self, take: int, horizon: float) -> str:
+        """Of the windows of a log: when and in which recorded states they begin; empty where it is rolled out whole."""
+        if np.isinf(horizon):
+            return ""
+        if (take, horizon) not in self._state_keys:
+            states = recorded_states(self.evidence[take].take, horizon)
+            self._state_keys[take, horizon] = str(joblib.hash((states.times, states.q, states.v)))
+        return f"-every{horizon:.6g}-{self._state_keys[take, horizon]}"
 
     def _until(self, take: int, q: RolloutRequest) -> float:
         """How long a question looks at a take [s]."""

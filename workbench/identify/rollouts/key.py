@@ -42,16 +42,21 @@ class ModelKeys:
 
     def __init__(self) -> None:
         self._files: dict[str, str] = {}
+        self._last: tuple[RobotModel, str] | None = None
 
     def of(self, model: RobotModel) -> str:
         """Of the description's content and of everything said about it."""
+        if self._last is not None and self._last[0] is model:  # on another take
+            return self._last[1]
         told = repr((model.base, model.ground, model.rigid_bodies, model.bus_ids, model.feet))
         source = f"{model.description} {told}"
         if source not in self._files:
             content = model.source.source.read_bytes()
             self._files[source] = hashlib.sha256(content + b" " + told.encode()).hexdigest()
         physics = repr((sorted(model.servos.items()), model.effects))
-        return hashlib.sha256(f"{self._files[source]} {physics}".encode()).hexdigest()
+        key = hashlib.sha256(f"{self._files[source]} {physics}".encode()).hexdigest()
+        self._last = (model, key)
+        return key
 
 
 def take_key(e: TakeEvidence, config: SimulationConfig) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,11 +17,11 @@ from workbench.simulation import SimulationConfig
 from workbench.simulation.compiled import NotCoveredError
 from workbench.simulation.compiled.angles import servo_angles
 from workbench.simulation.job import Job
+from workbench.types import Array
 
 if TYPE_CHECKING:
     from workbench.identify.problem import TakeEvidence
 
-Array = NDArray[np.float64]
 SETTLE = 0.02
 """Rest of a robot whose log begins elsewhere [s]: it is put there."""
 REST = 0.1
@@ -37,11 +38,17 @@ def frames(e: TakeEvidence) -> NDArray[np.bool_]:
     return np.asarray((e.since >= 0) & (e.since <= e.until))
 
 
+@lru_cache(maxsize=16)
+def _held(config: SimulationConfig) -> SimulationConfig:
+    """The configuration in which logs are rolled out."""
+    return replace(config, base="fixed", settle=SETTLE)
+
+
 def log_angles(takes: Sequence[TakeEvidence], model: RobotModel, config: SimulationConfig, horizon: float = math.inf
                ) -> list[Array] | None:
     """Angles (M, c) [rad] of a model at each log's `frames`; None where the compiled station does not know the model's physics.
     config: base and rest apart, which are a log's. horizon [s]: of windows, each of which starts from the recorded state."""
-    held = replace(config, base="fixed", settle=SETTLE)
+    held = _held(config)
     models: dict[str, RobotModel] = {}
     jobs = []
     for e in takes:

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections import OrderedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.session_takes import RegisteredTake
 from workbench.identify.options import PROBLEM
 from workbench.simulation.steady import JointStates
 
-Array = NDArray[np.float64]
 _known: OrderedDict[tuple[int, float], tuple[RegisteredTake, JointStates]] = OrderedDict()
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.compare.channels import joint_of
 from workbench.identify.fitting.fit import Fit
@@ -17,13 +16,12 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ACCEPTANCE, SCHEDULING, SUBSETS
 from workbench.identify.selection.record import SelectionStep, before_rough, taken
 from workbench.identify.selection.scheduling import standing_out
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...], share: float = ACCEPTANCE.least_share
                ) -> dict[str, float]:
-    """Channels with a gap that is not just what is left of a larger one before, `share` of it where the base is fixed."""
+    """Channels with a gap that is not just the remainder of a larger one before, `share` of it where the base is fixed."""
     evidence = search.evaluator.evidence
     out: dict[str, float] = {}
     for i in takes:
@@ -35,7 +33,7 @@ def remaining(search: Search, current: Fit, before: Fit, takes: tuple[int, ...],
 
 
 def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> Array:
-    """By channel of a take, the share that effects may err by, of what they brought from `before` to `now`."""
+    """By channel of a take, the allowance for errors of the accepted effects: a share of their gain from `before` to `now`."""
     e = search.evaluator.evidence[take]
     shares = np.full(len(e.channels), share)
     if not search.evaluator.any_floating((take,)):
@@ -48,14 +46,15 @@ def _may_err(search: Search, before: Fit, now: Fit, take: int, share: float) -> 
 
 
 def _of_joints(e: TakeEvidence, residual: Array) -> dict[str, float]:
-    """What is beyond noise, of chi squared by frame, in each joint's channels."""
+    """Chi squared beyond noise, by frame, in each joint's channels."""
     beyond = np.nan_to_num(np.maximum(np.nanmean(np.square(residual[e.moving]), axis=0) - 1.0, 0.0))
     return {j: float(np.sum(beyond[e.columns(j)])) for j in e.joints}
 
 
 def least_closed(search: Search, nominal: Fit, current: Fit) -> float:
-    """Share that an effect on the ground must take away, beside what fixed-base takes identified. More, where a joint that was
-    given an effect still goes wrong on a fixed base: no known name is what it lacks, and it leads all others astray."""
+    """Share of the excess error that an effect on the ground must remove in addition to those identified by fixed-base takes.
+    Higher if a joint with an accepted effect still has a gap on the fixed base, since its true cause is then not in the
+    vocabulary and biases all other effects."""
     given = {c.joint for c in current.effects}
     part = any(joint_of(c) in given for c in remaining(search, current, nominal, search.fixed_base, ACCEPTANCE.rough_share))
     return ACCEPTANCE.last_closed if part else ACCEPTANCE.least_closed
@@ -111,8 +110,8 @@ def is_acceptable(search: Search, t: CandidateFit, takes: Sequence[int], rounds:
 
 
 def _beyond_error(search: Search, t: CandidateFit, takes: Sequence[int], before: Fit, now: Fit, share: float) -> float:
-    """An effect's gain less what those that led from `before` to `now` may err by, this share of what they brought channel by
-    channel: a strong effect in one joint must not hide what moves all others, nor one in all joints what moves one."""
+    """An effect's gain less the allowance for errors of the effects accepted from `before` to `now`, a share of their gain
+    channel by channel: a strong effect in one joint must not hide one that moves all others, nor the reverse."""
     here = search.telling([t.candidate], tuple(takes))
     was, left = (search.evaluator.by_channel({i: fit.residuals[i] for i in here}, "choose", t.joint)[0] for fit in (before, now))
     evidence = search.evaluator.evidence
@@ -122,10 +121,10 @@ def _beyond_error(search: Search, t: CandidateFit, takes: Sequence[int], before:
 
 
 def explained_at_the_end(search: Search, r: SelectionStep, t: CandidateFit, now: Fit) -> float:
-    """Share of what was beyond noise at an effect's place, when it was taken, that is explained now: in its joint alone, where
-    that was judged or stood out; on fixed-base takes alone, where they identified it. Of a joint that floating-base takes
-    identify, its own gap, if it has one, counts as much as all that follows from it, and not what is left to the effects of
-    others."""
+    """Share of the excess error at an effect's joint or link, at the time it was accepted, that is explained now: in its joint
+    alone, if that was judged or stood out; on fixed-base takes alone, if they identified it. For a joint identified on
+    floating-base takes, its own gap, if it has one, counts as much as all channels that depend on it, and the residuals of other
+    effects do not count."""
     joint = t.candidate.joint
     outstanding = joint in standing_out(search, r.before, search.fitted)
     takes = search.fixed_base if search.is_settled(t.candidate) else search.fitted

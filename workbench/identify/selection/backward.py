@@ -13,7 +13,8 @@ from workbench.identify.selection.record import SelectionStep
 
 
 def without_part_answers(search: Search, current: Fit, rounds: Sequence[SelectionStep]) -> Fit:
-    """Without effects, from the last one back, that left half of what was there and that no other completed."""
+    """Backward elimination, from the last effect to the first: drops those that left half of the excess error and that no later
+    effect completed."""
     for r in reversed(rounds):
         for t in r.accepted:
             if explained_at_the_end(search, r, t, current) < ACCEPTANCE.last_closed:

@@ -1,6 +1,7 @@
-"""Several effects in one joint at once: what their responses together say, where no single one explains what is missing.
+"""Several effects in one joint at once: the prediction of their combined responses, where no single effect explains the
+residuals.
 
-Lines through what each was seen to do alone are cheap to add up, so that all sets are tried: best subsets, not one at a time
+Linear interpolation between the responses of single effects is cheap, so that all sets are tried: best subsets, not one at a time
 (A. J. Miller, Subset Selection in Regression, 2002). Only the best sets are fitted.
 """
 
@@ -22,13 +23,12 @@ from workbench.identify.options import FIT
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS
 from workbench.identify.selection.record import SelectionStep
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class Response:
-    """What an effect does to what is fitted in a joint: responses (m, k), each at the sizes in a row of points (k, n)."""
+    """Change of a joint's residuals caused by an effect: responses (m, k), each at the sizes in a row of points (k, n)."""
 
     trial: CandidateFit
     responses: Array
@@ -73,7 +73,7 @@ def subsets_for(
 
 
 def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tuple[list[Array], list[Array]] | None:
-    """Sizes at which a candidate was looked at, and what each did."""
+    """Sizes at which a candidate was simulated, and the response to each."""
     for name, (points, seen) in search.responses.items():
         if name[-1] == takes and t.candidate.key in name[:-1]:
             b = name.index(t.candidate.key)
@@ -82,7 +82,7 @@ def _signatures(search: Search, t: CandidateFit, takes: tuple[int, ...]) -> tupl
 
 
 def _rows(search: Search, current: Fit, takes: tuple[int, ...], judged: str | None, joint: str) -> NDArray[np.bool_]:
-    """Of the vector of the channels of `judged` (None: of all), what is of a joint."""
+    """The entries of the vector of the channels of `judged` (None: of every channel) that belong to a joint."""
     inside = {}
     for i in takes:
         e = search.evaluator.evidence[i]
@@ -104,7 +104,7 @@ def variants(t: CandidateFit, points: Sequence[Array], responses: Sequence[Array
 
 
 def best_sets(seen: Sequence[Response], r0: Array) -> list[list[CandidateFit]]:
-    """The best sets of each size by what they would leave of the residuals `r0` if they were linear, the best first."""
+    """The best sets of each size by the predicted linear remainder of the residuals `r0`, the best first."""
     lines = _NormalEquations(seen, r0)
     best = lines.whole
     out: list[list[CandidateFit]] = []
@@ -127,7 +127,7 @@ def best_sets(seen: Sequence[Response], r0: Array) -> list[list[CandidateFit]]:
 
 
 class _NormalEquations:
-    """Responses added up: what is missing, r0, less what they do in shares of what was seen."""
+    """The residuals r0 less a linear combination of the responses."""
 
     def __init__(self, seen: Sequence[Response], r0: Array) -> None:
         A = np.concatenate([s.responses for s in seen], axis=1)
@@ -180,8 +180,8 @@ def _fitted_from(search: Search, sizes: Sizes, takes: tuple[int, ...], steps: in
 
 
 def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) -> Fit:
-    """A fit, or a far better end that it comes to from elsewhere: numbers that shape an effect bend what it does, and a fit may
-    end beside the valley. steps: of the last fit."""
+    """A fit, or a far better one from another starting point: parameters that shape an effect make its response nonlinear, and a
+    fit may end in a local minimum. steps: of the last fit."""
     starts = [fit.sizes_with(c.key, np.clip(np.where(c.shapes, x + doublings, x * share), *c.bounds()))
               for c, x in fit.sizes() if c.shapes.any() for share, doublings in SUBSETS.again]
     if not starts:
@@ -192,7 +192,7 @@ def begun_again(search: Search, fit: Fit, takes: tuple[int, ...], steps: int) ->
 
 
 def penalised_cost(fit: Fit) -> float:
-    """What a fit leaves on the choosing stretches, and what its numbers have to bring."""
+    """Residual cost of a fit on the choosing stretches, with the gain required for its parameters."""
     return fit.cost["choose"] + FIT.least_gain * len(fit.x)
 
 

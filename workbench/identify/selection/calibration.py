@@ -1,4 +1,4 @@
-"""Calibration of probabilities: what makes a finding less sure, whatever its rivals do."""
+"""Calibration of probabilities: conditions that make a finding less certain, independent of its rivals."""
 
 from __future__ import annotations
 
@@ -16,16 +16,15 @@ from workbench.identify.parameters import Candidate
 from workbench.identify.problem import ratios
 from workbench.identify.selection.model_comparison import NamePosterior
 from workbench.identify.selection.options import CALIBRATION, COMPARISON, SCHEDULING
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def calibrated(search: Search, fit: Fit, posteriors: Sequence[NamePosterior], floors: Mapping[int, Array],
             changing: Collection[Candidate] = (), idle: Collection[Candidate] = ()) -> list[NamePosterior]:
-    """Standings less sure where fixed-base takes, which identified the effect, leave much at its place, or want its numbers to
-    change; of the whole robot at joints that no other effect is to answer for; where a floor is nearly the
-    model's, a number as far as it may go, or nearly nothing; where it, or about as likely a rival, pulls straight down; where in
-    fine steps it is `idle`. floors: of the fit, by take."""
+    """Lowers each probability by a factor for: large residuals at the effect's joint or link on the fixed-base takes that
+    identified it, or parameters that these would change (for an effect on every joint, at joints without an effect of their own);
+    ground friction close to the model's; a parameter at its bound or close to zero; a purely vertical pull, or an almost equally
+    probable rival of that kind; an effect that is `idle` at a finer step. floors: of the fit, by take."""
     left = [(channel, r) for i in search.fixed_base if i in floors
             for channel, r in ratios(search.evaluator.evidence[i], fit.residuals[i] / np.hypot(1.0, floors[i]), "choose").items()]
     out, theirs = [], {c.joint for c in fit.effects}
@@ -63,7 +62,7 @@ def _hardly_another_floor(c: Candidate, x: Array) -> bool:
 
 
 def _may_be_nothing(c: Candidate, x: Array, covariance: Array, makes: NDArray[np.bool_]) -> bool:
-    """Whether all numbers that make an effect are within CALIBRATION.nothing of what it vanishes at."""
+    """Whether all parameters that scale an effect are within CALIBRATION.nothing of the values at which it vanishes."""
     half = CALIBRATION.nothing * np.sqrt(np.diag(covariance))
     makes = makes & np.isfinite(half)
     return not c.read_off and bool(makes.any()) and bool(np.all(np.abs(x) < half, where=makes))
@@ -77,10 +76,10 @@ def _may_hang(c: Candidate, x: Array, s: NamePosterior) -> bool:
 
 
 def _becomes(c: Candidate, s: NamePosterior) -> bool:
-    """Whether what an effect is at its end stands beside it: of a load that weighs nothing, a centre of mass elsewhere."""
+    """Whether the limiting case of an effect is another candidate: a load without mass, a displaced centre of mass."""
     return any(r.candidate.key == (c.effect.reduces_to, c.where) for r in s.rivals)
 
 
 def _at_its_limit(c: Candidate, x: Array) -> bool:
-    """Whether a number is at the end of what is possible, away from where the effect vanishes."""
+    """Whether a parameter is at its bound, away from the value at which the effect vanishes."""
     return not c.read_off and any(np.any(np.isclose(x, end, rtol=1e-3) & (end != 0) & ~c.shapes) for end in c.bounds())

@@ -6,20 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.parameters import Candidate
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """A candidate fitted beside the effects there were. gain: of chi squared by use; by_channel: that of "choose", as
-    `RolloutEvaluator.by_channel` has them, empty of one that was not fitted; closed: share of what was beyond noise on the
-    choosing stretches; joint: whose channels alone were looked at, None for all. screened_out: whether responses alone said so
-    much less of it than of a rival that no fit was made; promised: what its response then takes off chi squared, and what the
-    best rival's does."""
+    """A candidate fitted together with the effects accepted before. gain: of chi squared by use; by_channel: that of "choose", as
+    in `RolloutEvaluator.by_channel`, empty if it was not fitted; closed: share of the excess error on the choosing stretches that
+    it removes; joint: whose channels alone were considered, None for all. screened_out: whether its response alone predicted so
+    much less than a rival's that it was not fitted; promised: the predicted reduction of chi squared by its response, and by the
+    best rival's."""
 
     candidate: Candidate
     x: Array
@@ -33,10 +31,10 @@ class CandidateFit:
 
 @dataclass(frozen=True)
 class Race:
-    """What rivals that are fitted side by side know of each other: the best gain that an earlier screening's responses predict,
-    that those seen now do, and that a first step reached, by joint; wide: what is predicted of each that all channels judge, of
-    one number, as coarse steps show it, and of several; least: what must be predicted of one that is fitted; no_fixed_base:
-    whether no take had a fixed base, so that floating-base takes alone tell what joints lack, however much."""
+    """Best gains so far, per joint, shared by candidates that are screened together: predicted by the responses of an earlier
+    screening, predicted by the current ones, and achieved by a first step. wide: predicted gain of each candidate that is judged
+    by every channel, with one parameter, at coarse steps, and with several; least: gain that must be predicted for a candidate to
+    be fitted; no_fixed_base: whether no take had a fixed base, so that only floating-base takes constrain the joints."""
 
     remembered: dict[str | None, float] = field(default_factory=dict)
     predicted: dict[str | None, float] = field(default_factory=dict)
@@ -53,5 +51,5 @@ def note_best(best: dict[str | None, float], joints: Sequence[str | None], gains
 
 
 def best_at(best: dict[str | None, float], joint: str | None) -> float:
-    """At a joint; of all, for what concerns all."""
+    """At a joint; over all joints, for effects of the whole robot."""
     return max(best.values()) if joint is None else best[joint]

@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.compare.session_takes import Progress
 from workbench.identify.conclusions import ReadOff, Residuals, finding, posterior, rejected, ties, unexplained
 from workbench.identify.estimators.dropped_again import with_commands_of
 from workbench.identify.estimators.dropped_commands import DroppedCommands
-from workbench.identify.explained import Problem
 from workbench.identify.fitting.constancy import Drift, drifts
 from workbench.identify.fitting.downward_force import downward_pulls
 from workbench.identify.fitting.fit import Fit
@@ -20,8 +18,11 @@ from workbench.identify.fitting.fits import Search
 from workbench.identify.options import PROBLEM
 from workbench.identify.problem import TakeEvidence
 from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+from workbench.identify.results.tied_names import GravityOverTorque
 from workbench.identify.results.ties import Tie
+from workbench.identify.results.unknown_torque import UnknownTorque
 from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutRequest
+from workbench.identify.search_result import Problem
 from workbench.identify.selection.acceptance import idle, too_little_left
 from workbench.identify.selection.calibration import calibrated
 from workbench.identify.selection.forward import select
@@ -29,12 +30,13 @@ from workbench.identify.selection.model_comparison import NamePosterior, compare
 from workbench.identify.selection.record import SelectionResult
 from workbench.identify.subset import data_subset, floors_everywhere, rebalanced
 from workbench.robot import Posterior, RobotModel
+from workbench.types import Progress
 
 
 @dataclass(frozen=True)
 class Selected:
-    """The fit at the end (`workbench.identify.explained.Explained`). nominal: the robot before its effects; posteriors: how sure
-    each effect is; floors: numerical ones by take, over sigma; drifts: parameters that drift within a take."""
+    """The final fit (a `workbench.identify.search_result.SearchResult`). nominal: the robot without its effects; posteriors:
+    probability of each effect; floors: numerical error by take, over sigma; drifts: parameters that drift within a take."""
 
     nominal: RobotModel
     looked_at: tuple[TakeEvidence, ...]
@@ -70,6 +72,11 @@ class Selected:
         """None: the nominal law is taken as it is."""
         return ()
 
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """None: cameras and floors see more than angles."""
+        return ()
+
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
         return evaluator.on(with_commands_of(evaluator.evidence, self.search.evaluator.evidence))
@@ -90,8 +97,12 @@ class Selected:
         """The effects, in the order in which they were found."""
         return tuple(finding(evidence, self.fit, i, self.posteriors[i], before, after) for i in range(len(self.fit.effects)))
 
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """None: of filmed takes no unnamed torque is looked for."""
+        return ()
+
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-        """What is still beyond noise and numerics, and what casts doubt on what was fitted."""
+        """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
         drifting = (d.left(evidence) for d in self.drifts)
         return (*unexplained(evidence, after, floors), *drifting, *downward_pulls(self.fit))
 
@@ -100,12 +111,12 @@ class Selected:
         return too_little_left(self.search, self.fit, self.search.fitted, (), everywhere=False)
 
     def rejected(self, before: Residuals) -> tuple[Rejected, ...]:
-        """Rivals that lost, and what was tried and not taken."""
+        """Rivals that lost, and effects that were tried and not accepted."""
         cropped = {i: before[i][:len(e.recorded)] for i, e in enumerate(self.looked_at)}
         return rejected(self.looked_at, self.fit, self.chosen.rounds, self.posteriors, cropped)
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
-        """Of all numbers of the effects."""
+        """The joint posterior of the effects' parameters."""
         return posterior(self.fit, read_off)
 
     def ties(self) -> tuple[Tie, ...]:

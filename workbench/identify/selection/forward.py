@@ -1,7 +1,7 @@
-"""Forward: which effects are taken, judged on stretches that no fit saw.
+"""Forward selection: which effects are accepted, judged on stretches that no fit used.
 
-First what fixed-base takes show, where nothing but the servos moves the robot; then, with that in the model, what the ground
-adds.
+First on fixed-base takes, where only the servos move the robot; then, with those effects in the model, on takes on the
+ground.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.estimators.dropped_again import TakesAsPlayed, reestimated
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.fits import Search
 from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.problem import channel_gaps
@@ -32,12 +32,13 @@ from workbench.identify.selection.reevaluation import reevaluated
 from workbench.identify.selection.scheduling import asked, standing_out
 from workbench.identify.selection.screening import tried
 from workbench.identify.selection.swap import best_sets
+from workbench.types import Progress
 
 
-def select(search: Search, pool: Sequence[Candidate], report: Report, thorough: bool = False, played: TakesAsPlayed | None = None
-           ) -> SelectionResult:
-    """The effects that stay. thorough: without a limit of work; else, beyond it, what was tried so far decides. played: what was
-    left out of what is played; read anew by what fixed-base takes identified."""
+def select(search: Search, pool: Sequence[Candidate], report: Progress, thorough: bool = False,
+           played: TakesAsPlayed | None = None) -> SelectionResult:
+    """The accepted effects. thorough: without a limit of work; else, once it is reached, the trials so far decide. played: the
+    takes without commands that never arrived, read again with the effects identified on fixed-base takes."""
     current = nominal = search.evaluated([])
     rounds: list[SelectionStep] = []
     most = np.inf if thorough else max(FORWARD.most_work, FORWARD.most_rollouts * search.evaluator.seconds)
@@ -76,9 +77,10 @@ def _may_go_on(search: Search, fit: Fit) -> bool:
 
 
 def _phase(search: Search, pool: Sequence[Candidate], current: Fit, takes: tuple[int, ...], rounds: Sequence[SelectionStep],
-           report: Report, most_work: float, closed: float = ACCEPTANCE.least_closed) -> tuple[Search, Fit, list[SelectionStep]]:
-    """One effect after the other, as many as bring enough. closed: the share that each must take away; where that is more than
-    usual, only joints that stand out and what moves the robot as a whole are asked on the ground."""
+           report: Progress, most_work: float, closed: float = ACCEPTANCE.least_closed
+           ) -> tuple[Search, Fit, list[SelectionStep]]:
+    """Accepts effects one after the other while they gain enough. closed: the share of the excess error that each must remove; if
+    it is higher than usual, only joints that stand out and effects of the whole robot are tried on the ground."""
     stopped, rounds = False, list(rounds)
     least = ACCEPTANCE.least_walking if search.evaluator.any_floating(takes) else ACCEPTANCE.all_closed * FIT.least_gain
     for _ in range(FORWARD.most_rounds):
@@ -158,7 +160,7 @@ def _is_of_all(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, 
 
 
 def _closed_at(search: Search, current: Fit, t: CandidateFit, takes: tuple[int, ...], joint: str | None) -> float:
-    """Share of what is beyond noise in a joint that an effect judged by all channels takes away."""
+    """Share of the excess error in a joint that is removed by an effect judged by every channel."""
     if not len(t.by_channel):
         return 0.0
     here = search.telling([t.candidate], takes)

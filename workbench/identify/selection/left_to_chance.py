@@ -1,8 +1,8 @@
-"""What a loose link does within its play is chance: once it is found, its channels across the servo's axis count by that.
+"""The motion of a loose link within its play is random: once play is found, the sigma of its off-axis channels includes it.
 
-Which end it lies at, no model predicts for long. Two links that rattle each by chance are apart by a sixth of the square of
-their play, in the mean square, which is far beyond noise: else whatever happens to shake the model's link at the right moment
-looks like the next cause, and hides a load on the body.
+No model can predict for long at which end of the gap the link lies. Two independently rattling links differ by a sixth of the
+square of their play, in the mean square, which is far beyond noise: without this, any effect that happens to shake the model's
+link at the right moment looks like the next cause, and hides a load on the body.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How sure each effect is: its rivals put in its place, with all other effects in theirs, on all takes."""
+"""Probability of each effect: compared with rivals that replace it, with all other effects refitted, on all takes."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
-from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.fits import Search
 from workbench.identify.options import CONCLUSIONS
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.acceptance import explained_at_the_end
@@ -18,8 +17,7 @@ from workbench.identify.selection.odds import chi_squared_lead, dispersion, is_b
 from workbench.identify.selection.options import COMPARISON, RIVAL
 from workbench.identify.selection.record import SelectionResult
 from workbench.identify.selection.rivals import TakenIn, put_in_place, rivals_near
-
-Array = NDArray[np.float64]
+from workbench.types import Array, Progress
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ class NamePosterior:
     rivals: tuple[Rival, ...]
 
 
-def compare_models(search: Search, chosen: SelectionResult, report: Report) -> tuple[Search, Fit, list[NamePosterior]]:
+def compare_models(search: Search, chosen: SelectionResult, report: Progress) -> tuple[Search, Fit, list[NamePosterior]]:
     """The effects that stay, and how probable each is: a rival that does better in an effect's place takes it. The search as it
     is then."""
     fit = chosen.fit

@@ -1,11 +1,10 @@
-"""By how much one model is better than another, and what such a lead is worth: log odds from differences of chi squared."""
+"""Log odds of models from differences of chi squared."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search, gained
@@ -13,8 +12,6 @@ from workbench.identify.options import FIT
 from workbench.identify.parameters import Candidate
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import ODDS
-
-Array = NDArray[np.float64]
 
 
 def is_equivalent(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
@@ -37,9 +34,9 @@ def dispersion(search: Search, fit: Fit, c: Candidate, taken: CandidateFit) -> f
 
 
 def misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
-    """What a fit leaves on the choosing stretches in shares of what a right model does, at least 1: by how much more than noise
-    alone would have them chi squared differences are left to chance. joint: that was judged alone on a fixed base, and does
-    not feel what goes wrong elsewhere."""
+    """Cost of a fit on the choosing stretches relative to a correct model, at least 1: the factor by which chi squared
+    differences are larger than noise alone would make them. joint: one that was judged alone on a fixed base, and so is
+    independent of errors elsewhere."""
     if joint is None:
         return max(1.0, fit.cost["choose"] / max(1.0, search.evaluator.expected(search.fitted, "choose")))
     left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in search.fixed_base}, "choose", joint)
@@ -47,7 +44,7 @@ def misfit(search: Search, fit: Fit, joint: str | None = None) -> float:
 
 
 def chi_squared_lead(search: Search, fit: Fit, rival: Fit, taken: CandidateFit) -> float:
-    """By how much a fit with a rival in an effect's place is better, of chi squared, numbers priced."""
+    """Improvement in chi squared by a rival that replaces an effect, including the price of its parameters."""
     price = max(ODDS.number, ODDS.number_share * taken.gain["choose"])
     own = [c.key for c in rival.effects]
     (replaced,) = (i for i, c in enumerate(fit.effects) if c.key not in own)
@@ -68,18 +65,19 @@ def is_outpriced(search: Search, fit: Fit, i: int, rival: Fit) -> bool:
 
 
 def better_by_both(fit: Fit, rival: Fit) -> float:
-    """By how much a rival is better of an effect that all takes identify, of chi squared on the choosing stretches: twice as many
-    are fitted, and say as much of each; what more numbers make of these is in their price."""
+    """Improvement by a rival of an effect that all takes identify, in chi squared on the choosing stretches: twice as many
+    stretches are fitted, each with the same weight; the price of the parameters accounts for overfitting."""
     return by_both({use: fit.cost[use] - rival.cost[use] for use in ("choose", "fit")})
 
 
 def by_both(of: Mapping[str, float]) -> float:
-    """Of chi squared, what both the fitted and the choosing stretches say, as much as the latter would."""
+    """Chi squared of the fitted and the choosing stretches together, scaled to the length of the latter."""
     return (of["choose"] + of["fit"] / 2) / 2
 
 
 def better_on_fixed_base(search: Search, fit: Fit, rival: Fit) -> float:
-    """By how much a rival of an effect that fixed-base takes identified is better: these take the word first."""
+    """Improvement by a rival of an effect that fixed-base takes identified: these takes dominate, and floating-base takes add at
+    most `most_from_floating`."""
     floating = _better(search, fit, rival, search.floating_base(search.fitted)) * ODDS.temper / FIT.overdispersion_free
     most = ODDS.most_from_floating
     return _better(search, fit, rival, search.fixed_base) + float(np.clip(floating, -most, most))

@@ -15,18 +15,18 @@ class ScreeningOptions:
     """Times the size it was looked at that an effect's response is believed to grow: a foot grips or slips, which no line
     tells."""
     calm: float = 0.5
-    """Share of what is beyond noise that responses of several numbers must explain. If they do not on all floating-base takes,
-    but do on one of them, what that one says is tried: where a joint gives way early or late by chance, a walk tells nothing, and
-    a calmer one may."""
+    """Share of the excess error that responses of several parameters must explain. If they explain it not on all floating-base
+    takes together but on one of them, that take alone is used: where a joint gives way early or late by chance, one walk may
+    show nothing where a calmer one does."""
     worth: float = 0.3
     worth_walking: float = 0.5
-    """Share of the best gain at its place, as responses predict it, from which on an effect is fitted: where the base is fixed,
-    where that is cheap, and on a walk."""
+    """Share of the best gain at the same joint or link, as predicted by responses, above which an effect is fitted: where the
+    base is fixed, where that is cheap, and on a walk."""
     doubted: float = 0.6
     """Share of the least gain from which on the best are fitted where none is predicted all of it: responses say too little where
     only one of the walks was looked at."""
     behind: float = 0.6
-    """Share of the best gain at its place after one step of the fit, from which on an effect is fitted to its end."""
+    """Share of the best gain at the same joint or link after one step of the fit, above which an effect is fitted to the end."""
     remembered: float = 0.15
     remembered_least: float = 0.25
     """Shares of the best gain and of the least, as responses of a screening beside fewer effects predict it, from which on an
@@ -36,7 +36,7 @@ class ScreeningOptions:
     predicted."""
     steps: int = 3
     steps_walking: int = 2
-    """Of a fit. On the ground what is ahead is fitted again in finer steps, with all that was chosen."""
+    """Steps of a fit. On the ground the leading candidate is fitted again at a finer time step, with all accepted effects."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +45,17 @@ class SchedulingOptions:
 
     tiers: int = 8
     tiers_of_all: int = 6
-    """On the ground the first are what moves the robot as a whole, and joints that stand out."""
+    """On the ground, effects of the whole robot and joints that stand out come first."""
     stands_out: float = 4.0
-    """Times the next worst of what is beyond noise on a take on the ground, of chi squared, that a joint's own is from which on
-    it lacks something, not the robot as a whole."""
+    """Ratio of a joint's excess chi squared to the next largest, on a take on the ground, above which the joint is taken to have
+    an error of its own, rather than the whole robot."""
     ill: float = 0.25
     """Joints whose gap is this share of the worst joint's are asked about."""
     few: int = 2
     """Joints that may be ill without the robot as a whole being asked about before them and, on the ground, with the body as the
     model has it, without zero offsets of others being asked about."""
     moved: float = 0.1
-    """Angle [rad] beyond which a joint has moved enough to show what it lacks."""
+    """Angle [rad] beyond which a joint has moved enough to show its errors."""
 
 
 @dataclass(frozen=True)
@@ -63,26 +63,26 @@ class SubsetOptions:
     """Best subsets of effects in one joint."""
 
     nearly_all: float = 0.9
-    """Share of a gap from which on less likely effects are not asked for on a fixed base, as what a hand carries looks like a
-    weak shoulder, nor sets of them."""
+    """Share of a gap above which less likely effects, and sets of effects, are not tried on a fixed base: a load in the hand
+    looks like a weak shoulder."""
     half: float = 0.5
-    """Share of what the best smaller set leaves, as responses predict it, that the best with one more effect may leave."""
+    """Residual of the best set with one more effect, as predicted by responses, relative to the best smaller set, to be tried."""
     sizes: tuple[int, int] = (2, 3)
     fitted: int = 6
     as_good: float = 2.0
-    """Effects in a set, and how many sets of a size are fitted: of those that leave less than `as_good` times what the best does,
-    as lines predict roughly."""
+    """Effects in a set, and how many sets of a size are fitted: those whose predicted residual is less than `as_good` times the
+    best, since linear prediction is rough."""
     ahead: int = 2
     exchanges: int = 3
     right: float = 1.2
-    """Sets that are fitted to the end; how often sets with one effect replaced are asked for; and what a set may leave, in shares
-    of what a right model does, for which none is replaced."""
+    """Sets that are fitted to the end; how often sets with one effect replaced are tried; and the residual of a set, relative to
+    a correct model, at which no effect is replaced."""
     again: tuple[tuple[float, float], ...] = tuple(product((0.75, 1.33), (-0.7, 0.7)))
     """Where a fit of an effect that a number shapes is begun again: shares of its size, and doublings of the shape."""
     most_steps: int = 5
     together_steps: int = 12
-    """Of a fit of all effects: when one was added, and where it is begun again; when several were, where lines predict them, and
-    where others must take one's place. It ends where little changes."""
+    """Steps of a fit of the whole model: when one was added, and where it is restarted; when several were added from linear
+    predictions; and when others must compensate for a removed one. It ends when little changes."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class ReevaluationOptions:
 
 @dataclass(frozen=True)
 class RecordOptions:
-    """What is said of a finished selection."""
+    """Statements about a finished selection."""
 
     complete: float = 0.97
     """Share of a gap that one effect closes, from which on it is not doubted for what else is there: true effects close more."""
@@ -121,19 +121,20 @@ class AcceptanceOptions:
     """Share of `FIT.least_gain` that is enough of what closes all of a joint's gap: it is small, and its shape is right."""
     least_share: float = 0.01
     walking_share: float = 0.02
-    """Of what the effects before it brought at its place, that an effect must bring on a fixed base and on the ground, and of a
-    fixed-base channel's gap that counts as one again: two engines, or a robot and a model, differ by hundredths of what an effect
-    does, and a second effect must not live on that."""
+    """Share of the gain of earlier effects at the same joint or link that a further effect must gain, on a fixed base and on the
+    ground, and share of a fixed-base channel's gap that counts as a new gap: two simulators, or a robot and a model, differ by
+    some hundredths of an effect's response, and a second effect must not be based on that."""
     alone: float = 0.25
-    """Of `least_share`, for a joint on a fixed base that nothing was given to and of which much more than of any other is left:
-    what engines play differently of an effect that all joints show, they do in all."""
+    """Multiple of `least_share` for a joint on a fixed base without an effect and with a much larger residual than any other:
+    where simulators differ in an effect that all joints show, they differ in every joint."""
     rough_share: float = 0.04
     left_share: float = 0.02
-    """The same of a channel's gap on the ground, where engines differ more; and of all that is left there, for another round."""
+    """The same share of a channel's gap on the ground, where simulators differ more; and of the total residual there, for
+    another round."""
     least_closed: float = 0.15
     last_closed: float = 0.5
-    """Share of what is beyond noise at its place that an effect must take away when it is taken, and with all that came after: of
-    several, the first may leave much to the next, but a name that leaves half at the end is not what is missing."""
+    """Share of the excess error at its joint or link that an effect must remove when it is accepted, and together with later
+    ones: the first of several may leave much to the next, but an effect that still leaves half at the end is not the cause."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ class BackwardOptions:
     """Backward elimination."""
 
     clearly: float = 5.0
-    """Times that gain, from which on an effect is missed whatever the others do in its place."""
+    """Multiple of that gain above which an effect is missing regardless of how well the others can compensate for it."""
 
 
 @dataclass(frozen=True)
@@ -177,14 +178,15 @@ class ForwardOptions:
     replayed_steps: int = 4
     """Of a fit to takes that are played otherwise."""
     last_steps: int = 3
-    """Of a fit of all effects when one was dropped at the end; it ends where little changes."""
+    """Steps of a fit of the whole model after one was dropped at the end; it ends when little changes."""
     most_rivals: int = 2
     close: float = 0.15
     halfway: float = 0.5
     """Rivals that are fitted in an effect's place, and how far behind its gain they may be where all channels of a walk judge; at
     a joint, where the best leaves more than a tenth: there some fit has not come to its end."""
     alike: float = 0.25
-    """Joints whose best gain is this share of the greatest, or `nearly_all` of what they lack, are taken in the same round."""
+    """Joints whose best gain is this share of the largest, or `nearly_all` of their excess error, are accepted in the same
+    round."""
 
 
 @dataclass(frozen=True)
@@ -192,8 +194,8 @@ class OddsOptions:
     """From differences of chi squared to odds."""
 
     temper: float = 4.0
-    """Neighbouring frames err alike: what chi squared differences are divided by when they become probabilities, where
-    floating-base takes do not identify it."""
+    """Errors of neighbouring frames are correlated: divisor of chi squared differences when they become probabilities, where
+    floating-base takes do not identify the effect."""
     rough: float = 0.015
     """The same as a share of an effect's gain: where that is more, floating-base takes leave more open."""
     better: float = 30.0
@@ -201,9 +203,9 @@ class OddsOptions:
     than a right model does."""
     number: float = 40.0
     number_share: float = 0.03
-    """What each number that a name has more than another must bring, of the same: `temper` times the logarithm of how many frames
-    speak (G. Schwarz, Annals of Statistics 6, 1978); at least this share of the effect's gain, as two engines, or a robot and a
-    model, differ by some hundredths of it, and a name with more numbers makes more of that."""
+    """Gain required for each additional parameter: `temper` times the logarithm of the number of frames (G. Schwarz, Annals of
+    Statistics 6, 1978), and at least this share of the effect's gain, since two simulators, or a robot and a model, differ by
+    some hundredths of it, and an effect with more parameters fits more of that."""
     most_from_floating: float = 2 * temper
     """The most of chi squared that floating-base takes add to what fixed-base takes say of a name: odds of e to one. Small
     differences send a walk elsewhere, and a wrong name may happen to go that way."""
@@ -215,8 +217,8 @@ class RivalOptions:
 
     near: float = 400.0
     near_fixed: float = 0.05
-    """Of chi squared on the choosing stretches: a rival further behind at its place is not put in the effect's place; nor one
-    that is this share of the effect's gain behind (`close` where a walk in coarse steps said it)."""
+    """Deficit in chi squared on the choosing stretches beyond which a rival at the same joint or link is not tried as a
+    replacement; nor is one with a deficit of this share of the effect's gain (`close` for a walk at coarse steps)."""
     steps: int = 4
     """Of a fit: names that differ by little are told apart at their best alone."""
     shape_end: float = 0.5
@@ -233,9 +235,9 @@ class ComparisonOptions:
     """The least odds of a finding's equivalent effect that floating-base takes identify, where it came near enough to be put in
     its place, and of a name that fixed-base takes find better but for the price of its numbers."""
     closed: tuple[tuple[float, float], ...] = ((0.9, 1.0), (0.75, 0.85), (0.5, 0.45))
-    """Share of what was beyond noise at its place that an effect took away, and the factor on its confidence; `least` below the
-    last. True effects close 97 % and more on a stand, 90 % on the ground; what the vocabulary lacks, its nearest name closes in
-    part."""
+    """Share of the excess error at its joint or link that an effect removed, and the factor on its confidence; `least` below the
+    last. True effects remove 97 % and more on a stand, 90 % on the ground; out-of-vocabulary physics is removed only in part by
+    the nearest available effect."""
     least: float = 0.2
 
 
@@ -252,17 +254,17 @@ class CalibrationOptions:
     changing: float = 0.5
     """The factor for an effect whose numbers would have to change within a take: something else that does so looks like it."""
     about_as_likely: float = 0.5
-    """Of a finding's probability, what a rival that pulls straight down has at least where a load is not told from what hangs: of
-    true loads it is up to 0.4."""
+    """Least probability of a purely vertical pull as a rival, relative to the finding's, where a load cannot be separated from a
+    hanging mass: for true loads it is up to 0.4."""
     alike_floor: float = 0.15
     hardly: float = 0.5
-    """By how much [a logarithm] a floor's friction has to differ from the model's, and the factor for one that differs by less:
-    of robots that lack nothing, played by another engine, floating-base takes want up to 5 % more, and a mass that swings looks
-    like 12 % more. The same for a number that would go further if it might, or may be nothing, and for a pull straight down: it
-    makes up for something else."""
+    """Difference [of the logarithm] between the floor's friction and the model's, and the factor for a smaller difference: for
+    robots without any effect, simulated by another engine, floating-base takes ask for up to 5 % more, and a mass that swings
+    looks like 12 % more. The same for a parameter at its bound, or close to zero, and for a purely vertical pull: it compensates
+    for something else."""
     nothing: float = 3.0
-    """Standard deviations from neutral within which a number may be nothing: a mass that swings below a body looked like a load
-    of 2.7, true ones come to 3.3 and more."""
+    """Standard deviations from neutral within which a parameter may be zero: a mass that swings below a body looked like a load
+    at 2.7, true ones are at 3.3 and more."""
 
 
 SCREENING = ScreeningOptions()

@@ -1,20 +1,19 @@
-"""Pair moves, for confounded causes: a force that lifts the robot explains much of what a slope and a slippery floor do together.
+"""Pair moves, for confounded causes: a force that lifts the robot explains much of the joint response of a slope and a slippery
+floor.
 
-What explains most by itself is found first, and then nothing completes it. So it and what came near it are given company,
-predicted by lines around each one's own fit, in which all that floating-base takes identified gives way: a motor that ends early
-makes up for much of a body that leans.
+The single effect that explains most is found first, and then nothing completes it. Therefore that effect and its closest rivals
+are tried in pairs, predicted linearly around each one's own fit, in which all effects identified on floating-base takes may
+adapt: a saturating motor compensates for much of a leaning body.
 """
-
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit, Sizes
-from workbench.identify.fitting.fits import Report, Search
+from workbench.identify.fitting.fits import Search
 from workbench.identify.fitting.levenberg_marquardt import steps_of
 from workbench.identify.options import FIT, PROBLEM
 from workbench.identify.parameters import Candidate, Key, with_effects
@@ -25,11 +24,10 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import PAIR_MOVE, RECORD
 from workbench.identify.selection.record import SelectionStep, judged_by_all
 from workbench.identify.selection.swap import NOTHING, in_place
+from workbench.types import Array, Progress
 
-Array = NDArray[np.float64]
 
-
-def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Report
+def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: Sequence[SelectionStep], report: Progress
            ) -> tuple[Fit, list[SelectionStep]]:
     """The fit, with two effects in the place of the last that floating-base takes identified, one of them at least of the ground
     or of masses, where that left much and these bring enough more, and the rounds with them."""
@@ -56,20 +54,20 @@ def with_pair(search: Search, pool: Sequence[Candidate], current: Fit, rounds: S
 
 
 def _beside_tried(taken: SelectionStep, first: SelectionStep) -> SelectionStep:
-    """A round with what else was tried at first: a pull's equivalent effect is to be put in its place."""
+    """A round with the other first candidates: the equivalent effect of a pull has to be tried as its replacement."""
     fitted = {t.candidate.key for t in taken.trials}
     return replace(taken, trials=(*taken.trials, *(t for t in first.trials if t.candidate.key not in fitted)))
 
 
 def _may_pair(c: Candidate) -> bool:
-    """What the ground does, and where masses are; not how heavy what is carried is, which floating-base takes identify last."""
+    """Effects of the ground, and positions of masses; not the mass of a load, which floating-base takes identify last."""
     return c.size > 0 and c.effect.layer in ("ground", "inertia") and not c.effect.point_mass
 
 
 @dataclass(frozen=True)
 class _Around:
-    """What is asked around a fit with one effect: each number that floating-base takes identify moved, and each other effect
-    beside it."""
+    """Questions around a fit with one effect: each parameter that floating-base takes identify is perturbed, and each other
+    effect is added."""
 
     one: CandidateFit
     fit: Fit
@@ -92,7 +90,7 @@ class _Around:
             yield from ([*self.fit.sizes(), (c, p)] for p in points)
 
     def predictions(self, left: Array, answers: Iterator[Array]) -> Iterator[tuple[float, list[CandidateFit]]]:
-        """What each pair would leave, and its sizes. left: by this fit; answers: what is left of all that is asked."""
+        """Predicted residual of each pair, and its sizes. left: residuals of this fit; answers: those of every question."""
         plain = next(answers)
         slopes = [np.column_stack([(next(answers) - plain) / size for size in move]) for _, _, move in self.moves]
         moving, x = [e for e, _, _ in self.moves], [x for _, x, _ in self.moves]

@@ -1,4 +1,4 @@
-"""What a search went through, round by round, and what it chose."""
+"""Record of a search, round by round, with the accepted effects."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 
 @dataclass(frozen=True)
 class SelectionStep:
-    """One step of the selection: rivals tried beside what had been chosen, the best first; accepted: those taken; stopped: by the
-    limit of work, before all that could be asked was."""
+    """One step of the selection: rivals tried in addition to the accepted effects, the best first; accepted: those that were
+    taken; stopped: by the limit of work, before every question was answered."""
 
     before: Fit
     trials: tuple[CandidateFit, ...]
@@ -22,15 +22,15 @@ class SelectionStep:
     stopped: bool = False
 
     def rivals(self, trial: CandidateFit) -> list[CandidateFit]:
-        """What was tried at the same place, the best first, `trial` among them; an effect of the whole robot rivals all."""
+        """Trials at the same joint or link, the best first, `trial` among them; an effect of the whole robot rivals all."""
         place = trial.joint
         return [t for t in self.trials if place is None or t.joint in (place, None)]
 
 
 @dataclass(frozen=True)
 class SelectionResult:
-    """The effects that stay, fitted together, and how they were found; search: as it was at the end, with what is settled and
-    the takes as they were played; missed: poses that servos never got."""
+    """The accepted effects, fitted together, and how they were found; search: its final state, with the settled effects and the
+    takes as they were played; missed: poses that servos never received."""
 
     search: Search
     fit: Fit
@@ -44,7 +44,7 @@ class SelectionResult:
 
 
 def taken(rounds: Sequence[SelectionStep]) -> list[CandidateFit]:
-    """What was taken of physics."""
+    """The accepted physical effects."""
     return [t for r in rounds for t in r.accepted if not _exact(t)]
 
 

@@ -1,7 +1,7 @@
-"""Re-evaluation of terms that were accepted early: their rivals are fitted in their place beside what was accepted since.
+"""Re-evaluation of effects that were accepted early: their rivals are fitted as replacements, together with later effects.
 
-A spring in one joint bends what all joints seem to have in common, so that a weak supply came ahead of one that sags; beside a
-soft knee a longer leg came ahead of a joint that is zeroed askew.
+A spring in one joint distorts the common error of all joints, so that a weak supply was preferred to one that sags; with a soft
+knee, a longer leg was preferred to a wrongly zeroed joint.
 """
 
 from __future__ import annotations
@@ -57,5 +57,5 @@ def _reevaluated(
 
 
 def _weighable(search: Search, t: CandidateFit) -> bool:
-    """Whether another may stand for it: not for how cameras saw the robot."""
+    """Whether another effect may replace it: not for effects on how cameras see the robot."""
     return judged_by_all(search, t) and t.candidate.effect.layer != "measurement"

@@ -1,11 +1,10 @@
-"""Rivals of an effect: which came near enough, and their fit in its place."""
+"""Rivals of an effect: the close ones, each fitted as its replacement."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
@@ -15,17 +14,16 @@ from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.odds import by_both, is_by_floating_base
 from workbench.identify.selection.options import FORWARD, RIVAL
 from workbench.identify.selection.record import SelectionStep
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 TakenIn = dict[Key, tuple[SelectionStep, CandidateFit]]
 """By effect, when it was taken and on what."""
 
 
 def rivals_near(search: Search, taken_in: TakenIn, effects: Sequence[Candidate], c: Candidate, x: Array) -> list[CandidateFit]:
-    """Who came near an effect when it was taken, and is not among those that stay; its equivalent effect; what it is at its
-    shape's end; where floating-base takes identify it, what moves another link's centre of mass, which tips the robot as much
-    once it is fitted to its end."""
+    """Rivals that came close to an effect when it was accepted, and are not in the model; its equivalent effect; the limiting
+    case of its shape; where floating-base takes identify it, displaced centres of mass of other links, which tip the robot as
+    much once they are fitted to the end."""
     r, trial = taken_in[c.key]
     taken = {e.key for e in effects}
     reach = max(RIVAL.near, (FORWARD.close if trial.joint is None else RIVAL.near_fixed) * trial.gain["choose"])
@@ -41,7 +39,7 @@ def rivals_near(search: Search, taken_in: TakenIn, effects: Sequence[Candidate],
 
 
 def _behind(trial: CandidateFit, t: CandidateFit) -> float:
-    """By how much a rival was behind; where all channels of a walk judge, what was fitted says as much as what was not."""
+    """Deficit of a rival; where all channels of a walk judge, a prediction counts as much as a fit."""
     behind = {use: trial.gain[use] - t.gain[use] for use in trial.gain}
     return min(behind["choose"], by_both(behind)) if trial.joint is None else behind["choose"]
 
@@ -53,9 +51,9 @@ def _at_its_end(c: Candidate, x: Array) -> bool:
 
 
 def put_in_place(search: Search, fit: Fit, i: int, rival: CandidateFit) -> Part[Fit]:
-    """The fit with a rival in effect i's place and its numbers fitted there, with those of others in its joint where fixed-base
-    takes identify them; the same effect elsewhere begins at the size that the other has, and what the other becomes where that
-    does the same, if that is better."""
+    """The fit with a rival in place of effect i and its parameters fitted, together with those of others in its joint where
+    fixed-base takes identify them; the same effect elsewhere starts from the size of the other, and a rival from the equivalent
+    values, if that is better."""
     others = [s for j, s in enumerate(fit.sizes()) if j != i]
     own, size = fit.sizes()[i]
     alike = (rival.candidate.name, rival.candidate.size) == (own.name, own.size)

@@ -18,8 +18,8 @@ from workbench.identify.selection.options import SCHEDULING
 
 def asked(search: Search, pool: Sequence[Candidate], current: Fit, beyond: dict[str, float], takes: tuple[int, ...],
             tier: int) -> tuple[list[list[Candidate]], dict[int, tuple[int, ...]]]:
-    """Groups to try, and on which takes each: effects of joints at the joints with a gap, on a fixed base all joints at once,
-    as on the ground one bad joint moves all; others one by one. tier: what is likely comes first, as there is so much."""
+    """Groups to try, and the takes for each: effects of joints at the joints with a gap, on a fixed base all joints at once,
+    since on the ground one bad joint moves all; others one by one. tier: likely effects come first, to limit the work."""
     worst = max((s for c, s in beyond.items() if c not in BODY), default=0.0)
     joints = {joint_of(c) for c, s in beyond.items() if c not in BODY and s >= SCHEDULING.ill * worst}
     floating_base = search.floating_base(takes)
@@ -60,9 +60,9 @@ class _Stand:
     heavy: Sequence[str]
 
     def shows(self, c: Candidate) -> bool:
-        """Whether an effect would have shown there: what servos lack at any load, and what hangs on their links; not a stop that
-        is not reached there, nor a loose mount that gravity leaves on one side: these were read off the recordings; nor what a
-        heavy link carries on its axis."""
+        """Whether an effect would be observable there: servo effects at any load, and masses on their links; not a stop that
+        is not reached there, nor a loose mount that gravity holds on one side (these are estimated directly); nor a load of a
+        heavy link along its axis."""
         if c.read_off:
             return False
         if c.effect.layer == "inertia":
@@ -107,10 +107,10 @@ def well_on_fixed_base(search: Search, current: Fit) -> tuple[set[str], set[str]
 
 
 def _tier(c: Candidate, floating_base: bool, many: bool, heavy: Sequence[str], outstanding: Collection[str], well: bool) -> int:
-    """First what was read off: how cameras saw the robot, stops, loose mounts. On a fixed base, the whole robot, if many
-    joints are ill, joints, links. On the ground, joints that stand out and their feet, what moves the robot as a whole by one
-    number, by where feet stand, by several (for which a walk has to be looked at all around), of links that their joint carried
-    well in all axes but its own last, then joints, what links carry."""
+    """The order of trials. First direct estimates: camera frames, stops, loose mounts. On a fixed base: the whole robot, if many
+    joints have a gap; then joints; then links. On the ground: joints that stand out and their feet; effects of the whole robot
+    with one parameter; positions of feet; effects with several parameters, which need a search around the current model; links
+    whose joint has no gap except about its own axis; then joints and loads on links."""
     if c.effect.layer == "measurement" or c.read_off:
         return 0
     if not floating_base:

@@ -1,12 +1,9 @@
-"""The screening of effects for what is missing: one group's way through it, as a generator that wants rollouts."""
+"""Screening of effects: the course of one group through it, as a generator that requests rollouts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-
-import numpy as np
-from numpy.typing import NDArray
 
 from workbench.identify.fitting.fit import Fit
 from workbench.identify.fitting.fits import Search
@@ -18,9 +15,7 @@ from workbench.identify.rollouts.evaluator import RolloutEvaluator, RolloutReque
 from workbench.identify.selection.candidate_fit import CandidateFit, Race, best_at, note_best
 from workbench.identify.selection.options import SCREENING
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
-
+from workbench.types import Array
 
 Asking = Part[list[CandidateFit]]
 
@@ -50,11 +45,11 @@ def tried(search: Search, current: Fit, groups: Sequence[Sequence[Candidate]], t
 
 
 class CandidateEvaluation:
-    """One group's way through the screening: looked at, guessed, begun, fitted while it is not behind, judged.
+    """The course of one group through the screening: simulated, extrapolated, first step, fitted while it is not behind, judged.
 
     A group is one candidate, or one effect at several joints at once, each judged by its own joint's channels.
-    beside, base: effects there are already with their sizes, and what they leave on `takes`, by take. responses: of earlier
-    races; this one's are added.
+    beside, base: accepted effects with their sizes, and their residuals on `takes`, by take. responses: of earlier screenings, to
+    which this one's are added.
     """
 
     def __init__(
@@ -82,7 +77,7 @@ class CandidateEvaluation:
         self._name = (*(c.key for c in group), self.looked_at)
 
     def run(self) -> Asking:
-        """Trials of all in the group."""
+        """Trials of every candidate in the group."""
         past = yield from self._past()
         starts, gains = past or (yield from self._looked_at())
         alive = [] if past else (yield from self._worth_fitting(gains))
@@ -156,7 +151,7 @@ class CandidateEvaluation:
         return best
 
     def _guessed(self, probes: Sequence[Array], responses: Sequence[Sequence[Array]]) -> tuple[list[Array], list[float]]:
-        """Sizes to start from and what they gain, on all takes as on what was looked at."""
+        """Initial sizes and their predicted gain, on all takes and on those that were simulated."""
         looked_at = {i: self.base[i] for i in self.looked_at}
         r0 = self._left(looked_at)
         far = SCREENING.far_walking if self.walking else SCREENING.far
@@ -224,7 +219,7 @@ class CandidateEvaluation:
         return RolloutRequest(model, self.takes, PROBLEM.coarse if self.coarse else 1.0)
 
     def _told(self, answer: dict[int, Array]) -> dict[int, Array]:
-        """What an answer leaves: the difference that coarse steps tell, beside what the search's step leaves."""
+        """Residuals of an answer: the difference at coarse steps, added to the residuals at the search's step."""
         return {i: self.base[i] + r - self.without[i] for i, r in answer.items()} if self.coarse else answer
 
     def _left(self, answer: dict[int, Array]) -> list[Array]:

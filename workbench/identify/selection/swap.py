@@ -1,7 +1,7 @@
-"""Sets of effects of one joint that are fitted together, and one of them replaced: what lines around their fit say of all others.
+"""Sets of effects of one joint that are fitted together, with one of them replaced, by linear prediction around their fit.
 
-Lines drawn from a robot that lacks nothing predict poorly what an effect does beside two more. Around a fit they are short, and
-the others give way: sequential replacement (A. J. Miller, Subset Selection in Regression, 2002).
+Responses around a robot without effects predict poorly how an effect acts in combination with two more. Around a fit the
+extrapolation is short, and the others can adapt: sequential replacement (A. J. Miller, Subset Selection in Regression, 2002).
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from workbench.identify.fitting.fit import Fit, Sizes
@@ -33,8 +32,8 @@ from workbench.identify.selection.best_subsets import (
 )
 from workbench.identify.selection.candidate_fit import CandidateFit
 from workbench.identify.selection.options import SUBSETS, SWAP
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 NOTHING = {"fit": 0.0, "choose": 0.0}
 """The gain of what lines only predict."""
 
@@ -64,7 +63,7 @@ def best_sets(search: Search, current: Fit, trials: Sequence[CandidateFit], take
 
 
 def _is_right(search: Search, fit: Fit, takes: tuple[int, ...], joint: str) -> bool:
-    """Whether a fit leaves in a joint about what a right model does."""
+    """Whether the residuals of a fit in a joint are about those of a correct model."""
     left, expected = search.evaluator.by_channel({i: fit.residuals[i] for i in takes}, "choose", joint)
     return bool(left.sum() < SUBSETS.right * expected.sum())
 
@@ -86,8 +85,8 @@ def exchanges(
     joint: str,
     alone: Sequence[Candidate],
 ) -> list[list[CandidateFit]]:
-    """Sets in which another effect stands for one of `alone`, which `fit` has among others, with sizes to begin from. trials:
-    whoever was asked about the joint, on these takes, whose base is fixed."""
+    """Sets in which another effect replaces one of `alone`, which `fit` has among others, with initial sizes. trials: all
+    candidates that were tried for the joint, on these takes, whose base is fixed."""
     there = fit.sizes_by_key()
     mine = [c for c in alone if c.key in there]
     others = [t for t in trials if t.joint in (joint, None) and t.candidate.size and t.candidate.key not in there]
@@ -123,8 +122,8 @@ def _moved(c: Candidate, x: Array) -> list[Array]:
 
 def in_place(t: CandidateFit, points: Sequence[Array], did: Sequence[Array], rest: Array, staying: Sequence[Candidate],
              x: Sequence[Array], slopes: Sequence[Array]) -> list[tuple[float, list[CandidateFit]]]:
-    """What is left with an effect in another's place, and the set with its sizes: of one number, the best of those at which it
-    was seen; of several, all at once. rest: what is left without the other."""
+    """Residuals with one effect replaced by another, and the set with its sizes: for one parameter, the best of those that were
+    simulated; for several, all at once. rest: residuals without the replaced effect."""
     ends = np.cumsum([0, *(len(size) for size in x)])
     ways: list[tuple[float, list[CandidateFit]]] = []
     for seen in variants(t, points, did):

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import read_json
@@ -16,8 +15,8 @@ from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.duty_register import duty_of
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _FULL_DUTY = 885.0
 """PWM register of an XL-330 at full duty; its load register holds the PWM, negatives as unsigned 16 bit."""
 _SUPPLY, _LEAST_VOLTS = 0.1, 0.5

@@ -15,8 +15,8 @@ from workbench.recording.body_track import BodyTrack
 from workbench.recording.formats.log_commands import order_problem
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 1e-3, "millimeters": 1e-3, "millimetres": 1e-3}
 _FEWEST = 3
 """Markers that a rigid body has at least."""

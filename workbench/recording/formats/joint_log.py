@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import write_whole
@@ -19,8 +18,8 @@ from workbench.recording.formats.numbers import column, rate_of, read_columns, s
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.formats.table_header import table_header
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _DEGREES = np.pi / 180
 _SCALE = {"goal": _DEGREES, "speed": _DEGREES, "position": _DEGREES, "velocity": _DEGREES, "duty": 1.0, "current": 1.0,
           "temperature": 1.0, "enabled": 1.0}

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import read_json, regular_file
@@ -22,8 +21,8 @@ from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
 from workbench.recording.servo_log.state import count_of
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 COUNT = 360 / 4096
 """One count of the sensors of the servos that LeRobot drives (STS3215, XL-330, XL-430) [deg]."""
 MOST = 512 << 20

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.motion.commands import Commands
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _EPOCH = 1e8
 """Seconds since 1970 are more than that [s]."""
 

@@ -24,8 +24,8 @@ from workbench.recording.formats.numbers import Bytes, column, read_columns, sta
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.quaternions import from_euler
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _BODIES = ("Rigid Body", "Bone")
 _LARGEST = 1e15  # a frame number that a float holds to the last digit
 _LEAP = 100_000  # frames at least: a quarter of an hour at 120 Hz, and a hundred times what the file holds

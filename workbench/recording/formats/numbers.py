@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import compute as arrow_compute
 from pyarrow import csv as arrow_csv
 
@@ -18,8 +17,8 @@ from workbench.files.errors import MistypedError
 from workbench.files.numerals import number_of
 from workbench.files.reading import MOST_TEXT, regular_file
 from workbench.files.tables import HEAD, plain_table, split_row
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Bytes = bytes | mmap.mmap
 _BLOCK = 1 << 22
 """Bytes that are read at once; less is sooner read by one thread than given to several."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from workbench.files import InputError
+from workbench.files.errors import UnknownFolderError
 from workbench.files.tables import plain_head
 from workbench.recording.formats.foreign import refusal
 from workbench.recording.formats.registry import RecordingFormat, format_of, format_of_folder, known_formats
@@ -65,7 +66,7 @@ def _format(path: Path) -> RecordingFormat:
         found = format_of_folder(path)
         if found is None:
             marks = " or ".join(f.marks for f in known_formats() if f.marks)
-            raise InputError(path, f"expected a recording, found a folder without {marks}")
+            raise UnknownFolderError(path, f"expected a recording, found a folder without {marks}")
         return found
     head = plain_head(path)
     if not head:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import parse_json, read_text, write_whole
@@ -17,8 +16,7 @@ from workbench.motion.commands import Commands
 from workbench.recording.formats.log_commands import out_of_order
 from workbench.recording.formats.numbers import number_columns
 from workbench.recording.take import Take
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 _DEG = np.pi / 180
 HEADER = "# workbench rollout"

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.tables import is_binary, split_row
@@ -20,7 +19,6 @@ from workbench.recording.formats.numbers import column, rate_of, read_columns, s
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
 
-Array = NDArray[np.float64]
 _TIME = re.compile(r"%time|__time|timestamp|time|(.*[./])?header[./]stamp", re.IGNORECASE)
 _SECONDS = re.compile(r"(?:.*[./])?(?:stamp|time)[./]secs?", re.IGNORECASE)
 _NANO = re.compile(r"(?:.*[./])?(?:stamp|time)[./](?:nano_?sec|nsec)s?", re.IGNORECASE)

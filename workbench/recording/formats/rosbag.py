@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.kinds import kind_of_file
@@ -17,8 +16,8 @@ from workbench.recording.formats.log_commands import commands_of_rows
 from workbench.recording.formats.numbers import rate_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 Samples = dict[str, list[tuple[float, float]]]
 """By joint, times [s] and angles [rad]."""
 Pose = tuple[float, list[float], list[float]]

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-from numpy.typing import NDArray
 from pyarrow import csv as arrow_csv
 
 from workbench.files import InputError
@@ -23,8 +22,8 @@ from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.joint_names import SO101_JOINTS as JOINTS
 from workbench.recording.joint_names import URDF_JOINTS
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _FIELDS = {"t_cmd": 1, "q_cmd": 2, "t_meas": 1, "q_meas": 2}
 MOST_UNPACKED = 256 << 20
 """Of all arrays in one file [bytes]: hours of an arm's log."""
@@ -184,7 +183,6 @@ def _all_of(source: str, names: list[str], parts: list[Recording]) -> Recording:
         channels={c: np.concatenate([p.channels[c] for p in parts]) for c in common},
         metadata={"programmes": ", ".join(names)}, aliases=parts[0].aliases,
         problems=(f"holds {len(names)} programmes, each on its own clock; choose one as FILE#PROGRAMME",))
-
 
 
 def _npz(head: bytes) -> bool:

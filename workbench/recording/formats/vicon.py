@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.numerals import number_of
@@ -14,8 +13,8 @@ from workbench.recording import quaternions as quat
 from workbench.recording.formats.capture_table import METRES, Capture, recording_of
 from workbench.recording.formats.registry import RecordingFormat
 from workbench.recording.recording import Recording
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _KINDS = ("objects", "segments", "trajectories")
 
 

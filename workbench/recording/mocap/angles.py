@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import Tracks, relative_rotation, seen_joints, turned, turned_quaternion
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,11 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.mocap.tracks import Tracks
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _FIRST = 10  # frames of a body that tell where it was at first
 _LEAST = 4  # bodies that tell
 _NEAR = 0.2

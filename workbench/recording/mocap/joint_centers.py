@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import SeenJoint, Tracks
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LEAST_TURN = 0.03
 """RMS angle [rad] by which a joint has to turn for its axis to show."""
 LEAST_FRAMES = 50

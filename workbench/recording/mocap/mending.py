@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from workbench.files.problem import RoutineProblem
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.conventions import conventional
 from workbench.recording.mocap.swaps import unswap
@@ -15,8 +16,8 @@ from workbench.recording.mocap.tracks import Tracks, tracks_of
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 LONGEST_MENDED = 0.05
 """Gaps up to this long [s] are filled. In longer ones a walking servo can start and stop: nothing is invented there."""
 _SPIKE = 0.06
@@ -115,5 +116,5 @@ def _filled(tracks: Tracks, longest: float) -> Tracks:
         if len(left):
             worst = left[np.argmax(left[:, 1] - left[:, 0])]
             text += f"; {len(left)} left open, the longest {worst[1] - worst[0]} frames from {tracks.time[worst[0]]:.3f} s"
-        problems.append(text)
+        problems.append(RoutineProblem(text))
     return replace(tracks, p=p, q=q, seconds_squared=reach, mended=mended, problems=tuple(problems))

@@ -14,8 +14,7 @@ from workbench.recording.mocap.tracks import Tracks, capture_axes, model_axes, t
 from workbench.recording.recording import Measurement
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 def observe(take: Take, measurement: Measurement, model: RobotModel, time: Array) -> tuple[Take, dict[str, BodyTrack]]:

@@ -12,8 +12,8 @@ from workbench.recording import quaternions as quat
 from workbench.recording.mocap.angles import Angles, base_row
 from workbench.recording.mocap.tracks import Tracks, turned, turned_quaternion
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _PRIOR = 0.03  # [m] how far a pivot may lie from its link's centre of mass, where the data are silent
 _FRAMES = 400
 _MODEL = 1e-3  # [m] what link lengths and droop may be off by, at the least

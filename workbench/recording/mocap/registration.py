@@ -23,8 +23,8 @@ from workbench.recording.servo_log.state import count_of, count_that_stays, firs
 from workbench.recording.take import Take
 from workbench.recording.white_noise import white_noise
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _SETTLED = 0.02  # [s] before the start that are not counted as rest
 _FEW = 5  # frames of rest that are too few to tell noise from
 

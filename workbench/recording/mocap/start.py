@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
 from workbench.recording.mocap.yaw import weighted_median
 from workbench.recording.take import Take
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _LAG = 45.0
 """Natural frequency [rad/s] of the second-order lag that stands in for a servo where nothing was simulated."""
 _BEFORE, _AFTER = 0.05, 0.25  # [s] window around a joint's first motion

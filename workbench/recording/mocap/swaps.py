@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from workbench.recording import quaternions as quat
 from workbench.recording.mocap.tracks import Tracks
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _ARM = 0.1
 _LEAP = 0.01  # [m] both leaps together; less is no matter
 _FAR_BETTER = 0.3  # exchanged, the two must fit this much better

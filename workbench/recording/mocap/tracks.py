@@ -12,8 +12,8 @@ from workbench.files import InputError
 from workbench.recording import quaternions as quat
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 FARTHEST = 1000.0
 """From the capture's origin [m]; no volume is as large."""
 NOT_UNIT = 2e-3

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.mocap.tracks import Tracks
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _APART = 0.02
 """From a lost body at the origin to where it is seen before or after [m]: no walking robot gets as far in a frame."""
 _FEW = 20  # poses that tell no noise

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.motion.commands import Commands
@@ -16,8 +15,8 @@ from workbench.recording.mocap.tracks import SeenJoint, Tracks, check_assets, re
 from workbench.recording.mocap.unseen import without_unseen
 from workbench.recording.recording import Recording
 from workbench.robot import RobotModel
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _LEAST = np.deg2rad(2.0)  # a joint that turns less says little about its axis
 _CLEAR = 0.3
 

@@ -9,11 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from workbench.types import Array, Mask
+
 SIGN, FULL = 1024, 1000
 SCALES = (1, 10, 100, 1000)
 """Units in which a column may hold the register: loggers divide by them."""

@@ -7,16 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from workbench.recording.servo_log.following import JointLog, followed
+from workbench.recording.servo_log.following import JointLog
+from workbench.recording.servo_log.response import fitted, shapes
 
 
 @dataclass(frozen=True)
 class ExchangeChecks:
-    """own: share of a position's variance that its own goals give at most. other: and another joint's at least. most: rows that
-    are looked at, evenly chosen. goes: joints and goals that move less tell nothing [deg]."""
+    """own: share of a position's variance that its own goals give at most. other: and another joint's at least, and by `better`
+    more; or its own goals leave `times` as much of it. The other joint's own goals then give at most `neither`, or the two
+    positions correlate by `same`. most: rows that are looked at, evenly chosen. goes: joints and goals that move less tell
+    nothing [deg]."""
 
     own: float = 0.6
-    other: float = 0.93
+    other: float = 0.8
+    better: float = 0.4
+    neither: float = 0.95
+    times: float = 10.0
+    same: float = 0.995
     most: int = 1500
     goes: float = 4.0
 
@@ -28,18 +35,36 @@ def exchanged(logs: Mapping[str, JointLog], c: ExchangeChecks = EXCHANGE) -> dic
     """By joint, the joint whose goals its position follows instead of its own."""
     far = {j: log for j, log in logs.items() if min(np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))) >= c.goes}
     out = {}
+    own_shares = {joint: abs(_explained(log, log, c)) for joint, log in far.items()}
     for joint, log in far.items():
-        if _explained(log, log, c) > c.own:
+        own = own_shares[joint]
+        if own > c.neither:
             continue
         others = {other: _explained(that, log, c) for other, that in far.items() if other != joint}
-        best = max(others, key=lambda o: others[o], default=None)
-        if best is not None and others[best] >= c.other:
+        best = max(others, key=lambda o: abs(others[o]), default=None)
+        if best is not None and _better(own, abs(others[best]), c) and (
+                own_shares[best] <= c.neither or _same(far[best], log, c)):
             out[joint] = best
     return out
 
 
+def _better(own: float, other: float, c: ExchangeChecks) -> bool:
+    """Whether another joint's goals give so much more of a position's variance than its own."""
+    plain = own <= c.own and other >= max(c.other, own + c.better)
+    return plain or 1 - own > c.times * (1 - other)
+
+
+def _same(one: JointLog, other: JointLog, c: ExchangeChecks) -> bool:
+    """Whether two joints have one and the same position: a column that stands there twice."""
+    position = np.interp(other.time, one.time, one.position)
+    return bool(np.ptp(position) > 0 and np.corrcoef(position, other.position)[0, 1] > c.same)
+
+
 def _explained(asked: JointLog, moved: JointLog, c: ExchangeChecks) -> float:
-    """Share of a position's variance that a joint's goals give."""
+    """Share of a position's variance that a joint's goals give; negative where it goes the other way."""
     each = max(1, len(moved.rows) // c.most)
-    goal = np.interp(moved.time, asked.time, asked.goal)
-    return followed(moved.time[::each], goal[::each], moved.position[::each]).explained
+    time, position = moved.time[::each], moved.position[::each]
+    rows = np.clip(np.searchsorted(asked.time, time + 1e-9, side="right") - 1, 0, len(asked.time) - 1)
+    fit = fitted(shapes(time, asked.goal[rows]), position)
+    left = float(np.mean((position - fit.predicted) ** 2))
+    return float(np.sign(fit.gain)) * max(1 - left / max(float(np.var(position)), 1e-12), 0.0)

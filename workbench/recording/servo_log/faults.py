@@ -10,7 +10,9 @@ from workbench.recording.recording import Recording
 from workbench.recording.servo_log.astray import without_astray
 from workbench.recording.servo_log.exchanged import exchanged
 from workbench.recording.servo_log.following import JointLog, joint_logs
+from workbench.recording.servo_log.held_back import held_back
 from workbench.recording.servo_log.let_go import lets_go
+from workbench.recording.servo_log.no_answer import without_no_answer
 from workbench.recording.servo_log.relative import relative_goals
 from workbench.recording.servo_log.repeats import without_repeats
 from workbench.recording.servo_log.zero_shift import zero_shifts
@@ -33,27 +35,28 @@ def without_faults(recording: Recording, skipped: frozenset[str] = frozenset()) 
     joints = [j for j in recording.joints if f"position.{j}" in channels and j not in skipped]
     for joint in joints:
         name = f"position.{joint}"
-        for read in (without_astray, without_repeats):
+        for read in (without_astray, without_no_answer, without_repeats):
             channels[name], said = read(recording.time, channels[name])
             lines += [f"{name}: {text}" for text in said]
     mended = replace(recording, channels=channels)
     logs = {j: log for j, log in joint_logs(mended).items() if j in joints}
-    swapped = exchanged(logs)
-    no_goals = set(swapped)
+    no_goals = set()
+    for joint, log in logs.items():
+        if (text := relative_goals(log)) is not None:
+            no_goals.add(joint)
+            lines.append(f"goal.{joint}: {text}; the joint's evidence is left out")
+    swapped = exchanged({j: log for j, log in logs.items() if j not in no_goals})
+    no_goals |= set(swapped)
     for joint, other in swapped.items():
         back = " and the other way round" if swapped.get(other) == joint else ""
         lines.append(f"position.{joint}: follows goal.{other}, not goal.{joint}{back}: are the columns of {joint} and {other} "
                      "exchanged? Its evidence is left out")
     for joint, log in logs.items():
-        if joint in swapped:
-            continue
-        text = relative_goals(log)
-        if text is not None:
-            no_goals.add(joint)
-            lines.append(f"goal.{joint}: {text}; the joint's evidence is left out")
+        if joint in no_goals:
             continue
         log, said = _zeroed(channels, log)
-        lines += said + _released(channels, recording, log)
+        said += _released(channels, recording, log)
+        lines += said or [f"position.{joint}: {text}" for text in held_back(log)]
     for joint in no_goals:
         channels[f"position.{joint}"] = np.full(len(recording.time), np.nan)
     return Mended(replace(recording, channels=channels), tuple(lines), frozenset(no_goals))
@@ -71,19 +74,24 @@ def _zeroed(channels: dict[str, np.ndarray], log: JointLog) -> tuple[JointLog, l
 
 
 def _released(channels: dict[str, np.ndarray], recording: Recording, log: JointLog) -> list[str]:
-    """Blanks the positions of a joint from when on it does not depend on its goals, and says so."""
-    row = lets_go(log)
-    if row is None:
-        return []
-    name, at = f"position.{log.name}", log.rows[row]
-    duty = channels.get(f"duty.{log.name}")
-    off = duty is not None and np.nanmax(np.abs(duty[at:]), initial=0.0) < 0.02 < np.nanmax(np.abs(duty[:at]), initial=0.0)
-    stands = bool(np.ptp(log.position[row + 1:]) == 0) if row + 1 < len(log.rows) else False
-    causes = ("its duty is 0 from then on: the servo let go (overload, heat, low supply)" if off else
-              "its sensor stood still, or the servo let go (overload, heat, low supply, a cable)" if stands else
-              "the servo let go (overload, heat, low supply, a cable), or its horn slips")
-    values = channels[name].copy()
-    values[at:] = np.nan
-    channels[name] = values
-    return [f"{name}: no longer depends on goal.{log.name} from {recording.time[at]:.3f} s (row {at + 1}) on: {causes}; its "
-            "evidence ends there"]
+    """Blanks the positions of a joint where it does not depend on its goals, and says so."""
+    name = f"position.{log.name}"
+    out = []
+    for first, end in lets_go(log):
+        at, to_end = int(log.rows[first]), end == len(log.rows)
+        last = len(recording.time) - 1 if to_end else int(log.rows[end]) - 1
+        duty = channels.get(f"duty.{log.name}")
+        off = duty is not None and np.nanmax(np.abs(duty[at + 1:last + 1]), initial=0.0) < 0.02 \
+            < np.nanmax(np.abs(duty[:at]), initial=0.0)
+        stands = bool(np.ptp(log.position[min(first + 1, end - 1):end]) == 0)
+        causes = ("its duty is 0 there: the servo let go (overload, heat, low supply)" if off else
+                  "its sensor stood still, or the servo let go (overload, heat, low supply, a cable)" if stands else
+                  "the servo let go (overload, heat, low supply, a cable), or its horn slips")
+        values = channels[name].copy()
+        values[at:last + 1] = np.nan
+        channels[name] = values
+        when = f"from {recording.time[at]:.3f} s (row {at + 1}) " + (
+            "on" if to_end else f"to {recording.time[last]:.3f} s (row {last + 1}), where it follows again")
+        out.append(f"{name}: no longer depends on goal.{log.name} {when}: {causes}; its evidence "
+                   f"{'ends there' if to_end else 'of that time is left out'}")
+    return out

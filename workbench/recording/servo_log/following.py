@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.recording import Recording
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from workbench.recording.servo_log.state import count_of, resolution
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 TURN = 2 * np.pi
 _FASTEST = 40.0
 """No hobby servo turns as fast [rad/s]; the fastest reach 17."""

@@ -1,80 +1,131 @@
-"""From when on a joint no longer depends on its goals: its servo let go, or its sensor stood still."""
+"""Stretches in which a joint does not depend on its goals: its servo let go, or its sensor stood still; to the end, or for a
+time."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.recording.servo_log.following import FOLLOW, Followed, JointLog, followed
-
-Array = NDArray[np.float64]
+from workbench.recording.servo_log.following import JointLog
+from workbench.recording.servo_log.response import Response, fitted, shapes
+from workbench.types import Array, Mask
 
 
 @dataclass(frozen=True)
 class LetGoChecks:
-    """before: share of the position's variance that the goals give until then, with a gain of at least `firm`; they must have
-    gone back by `back` of their range, as a way to a stop shows no gain. stands: the joint then moves by so much of what its
-    goals ask, at most, for so long at least [s] as `lasts` says, in which the goals go on by `goes` [deg] and by `share` of what
-    they went before. leaves: RMS by which the joint is then off its way, in those before. settles: after it let go [s].
-    tries: how many times are tried. most: rows that are looked at, evenly chosen."""
+    """before: share of the position's variance that the goals give elsewhere, with a gain of at least `firm`; the goals must go
+    to and fro there by `back` of their range, as a way to a stop shows no gain. leaves: the joint is then off its way by more
+    than so many robust standard deviations, and by `least` [deg]. bridges: shorter times on or off the way do not count [s].
+    stands: the joint then moves by so much of what its goals ask, at most. lasts: for so long at least [s]. goes: meanwhile the
+    goals go on by so much [deg], and by `share` of what they do in the whole log. settles: from letting go, and after it holds
+    again, within which its movement does not count [s]. prefixes: shares of the log on which the response is fitted, beside the
+    whole. tight: a stretch begins and ends where the joint is off by so many standard deviations."""
 
-    before: float = 0.9
+    before: float = 0.85
     firm: float = 0.5
     back: float = 0.3
-    stands: float = 0.2
-    lasts: float = 0.8
-    goes: float = 5.0
-    share: float = 0.5
     leaves: float = 4.0
-    settles: float = 0.4
-    tries: int = 24
-    most: int = 800
+    least: float = 3.0
+    bridges: float = 0.25
+    stands: float = 0.25
+    lasts: float = 0.6
+    goes: float = 5.0
+    share: float = 0.4
+    settles: float = 0.35
+    prefixes: tuple[float, ...] = (0.12, 0.2, 0.35, 0.55, 1.0)
+    tight: float = 3.0
 
 
 LET_GO = LetGoChecks()
 
 
-def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> int | None:
-    """Row of the log (of its K) from which on the position does not depend on the goals; None where it does to the end."""
-    each = max(1, len(log.rows) // c.most)
-    time, goal, position = log.time[::each], log.goal[::each], log.position[::each]
-    last = time[-1] - c.lasts - c.settles
-    first = time[0] + max(0.1 * (time[-1] - time[0]), 1.0)
-    if last <= first:
-        return None
-    for start in np.linspace(first, last, c.tries):
-        until = time < start
-        if until.sum() < FOLLOW.fewest:
+def lets_go(log: JointLog, c: LetGoChecks = LET_GO) -> list[tuple[int, int]]:
+    """Stretches of the log (first row, row after the last, of its K) in which the position does not depend on the goals."""
+    if np.rad2deg(np.ptp(log.goal)) < c.goes or len(log.time) < 3:
+        return []
+    shaped = shapes(log.time, log.goal)
+    span = float(log.time[-1] - log.time[0])
+    best: list[tuple[int, int]] = []
+    for share in c.prefixes:
+        told = log.time - log.time[0] <= share * span
+        fit = fitted(shaped, log.position, told)
+        if fit.explained < c.before or fit.gain < c.firm or not _goes_back(log.goal[told], c):
             continue
-        fit = followed(time[until], goal[until], position[until])
-        follows = fit.explained >= c.before and fit.gain >= c.firm and _goes_back(goal[until], c)
-        if follows and _free(time, goal, position, start, fit, c):
-            left = np.abs(position - fit.predicted(time, goal))
-            usual = float(np.sqrt(np.mean(left[until] ** 2)))
-            gone = np.flatnonzero((left > c.leaves * usual) & (time >= start - 2 * (last - first) / c.tries))
-            return int(min(gone[0] if len(gone) else np.argmax(~until), len(time) - 1)) * each
-    return None
+        found = [s for s in _joined(log, _stretches(log.time, log.position, fit, c), fit, c)
+                 if log.time[s[1] - 1] - log.time[s[0]] >= c.lasts and _free(log, s, fit, c)]
+        rest = np.ones(len(log.time), dtype=bool)
+        for first, end in found:
+            rest[first:end] = False
+        if found and _follows(shaped, log, rest, c):
+            best = max(best, found, key=lambda of: sum(b - a for a, b in of))
+    return best
 
 
-def _free(time: Array, goal: Array, position: Array, start: float, fit: Followed, c: LetGoChecks) -> bool:
-    """Whether from `start` on to the end the joint goes its own way, while it is asked to move, and no stop holds it."""
-    until, then = time < start, time >= start + c.settles
-    asked = goal[then]
-    if np.rad2deg(np.ptp(asked)) < c.goes or np.ptp(asked) < c.share * np.ptp(goal[until]):
+def _stretches(time: Array, position: Array, fit: Response, c: LetGoChecks) -> list[tuple[int, int]]:
+    """Stretches in which the joint is off its way, each begun and ended where it is on it."""
+    away = np.abs(position - fit.predicted)
+    near = np.flatnonzero(away < c.tight * fit.spread)
+    out: list[tuple[int, int]] = []
+    for first, end in _runs(away > max(c.leaves * fit.spread, np.deg2rad(c.least))):
+        before, after = near[near < first], near[near >= end]
+        begin, stop = int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(time)
+        if out and begin < out[-1][1]:
+            continue
+        out.append((begin, stop))
+    return out
+
+
+def _joined(log: JointLog, stretches: list[tuple[int, int]], fit: Response, c: LetGoChecks) -> list[tuple[int, int]]:
+    """Stretches that a crossing of the way parts, put together: between them, too, the joint stands while it is asked to move."""
+    out: list[tuple[int, int]] = []
+    for first, end in stretches:
+        if log.time[end - 1] - log.time[first] < c.bridges:
+            continue
+        if out and (log.time[first] - log.time[out[-1][1] - 1] < c.bridges or _stands(log, (out[-1][1], first), fit, c)):
+            out[-1] = (out[-1][0], end)
+        else:
+            out.append((first, end))
+    return out
+
+
+def _stands(log: JointLog, between: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
+    rows = slice(*between)
+    asked = float(np.ptp(fit.predicted[rows]))
+    return bool(np.rad2deg(asked) > 2 * c.least and np.ptp(log.position[rows]) < c.stands * asked)
+
+
+def _free(log: JointLog, stretch: tuple[int, int], fit: Response, c: LetGoChecks) -> bool:
+    """Whether in a stretch the joint goes its own way, while it is asked to move, and no stop holds it."""
+    first, end = stretch
+    lasts_to = log.time[end - 1] - (c.settles if end < len(log.time) else 0.0)
+    settles = min(c.settles, 0.3 * float(log.time[end - 1] - log.time[first]))
+    inside = (np.arange(len(log.time)) >= first) & (np.arange(len(log.time)) < end)
+    then = inside & (log.time >= log.time[first] + settles) & (log.time <= max(lasts_to, log.time[first] + 2 * settles))
+    if then.sum() < 5:
         return False
-    predicted = fit.predicted(time, goal)
-    away = np.sqrt(np.mean((position - predicted)[then] ** 2))
-    usual = np.sqrt(np.mean((position - predicted)[until] ** 2))
-    if away < max(c.leaves * usual, np.deg2rad(c.goes) / 4):
+    asked, seen = fit.predicted[then], log.position[then]
+    if np.rad2deg(np.ptp(asked)) < c.goes or np.ptp(asked) < c.share * np.ptp(fit.predicted):
         return False
-    if np.std(position[then]) > c.stands * fit.gain * np.std(asked):
+    if np.std(seen) > c.stands * np.std(asked):
         return False
-    stands, slack = float(np.median(position[then])), 2 * usual
-    at_upper = stands >= np.max(position[until]) - slack and np.mean(predicted[then] > stands - slack) > 0.9
-    at_lower = stands <= np.min(position[until]) + slack and np.mean(predicted[then] < stands + slack) > 0.9
+    stands, slack = float(np.median(seen)), 2 * fit.spread + np.deg2rad(0.5)
+    others = log.position[~inside]
+    at_upper = stands >= np.quantile(others, 0.99) - slack and np.mean(asked > stands - slack) > 0.9
+    at_lower = stands <= np.quantile(others, 0.01) + slack and np.mean(asked < stands + slack) > 0.9
     return not (at_upper or at_lower)
+
+
+def _follows(shaped: Array, log: JointLog, rest: Mask, c: LetGoChecks) -> bool:
+    """Whether outside the stretches the joint does follow its goals."""
+    fit = fitted(shaped, log.position, rest)
+    return fit.explained >= c.before and fit.gain >= c.firm
+
+
+def _runs(true: Mask) -> list[tuple[int, int]]:
+    """First index, and the one after the last, of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _goes_back(goal: Array, c: LetGoChecks) -> bool:
@@ -82,4 +133,4 @@ def _goes_back(goal: Array, c: LetGoChecks) -> bool:
     least = c.back * np.ptp(goal)
     up = np.max(goal - np.minimum.accumulate(goal))
     down = np.max(np.maximum.accumulate(goal) - goal)
-    return bool(min(up, down) > least)
+    return bool(len(goal) and min(up, down) > least)

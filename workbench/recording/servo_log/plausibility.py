@@ -18,25 +18,25 @@ from workbench.recording.servo_log.lead import lead_problems
 from workbench.recording.servo_log.leaps import without_leaps
 from workbench.recording.servo_log.logged import as_logged
 from workbench.recording.servo_log.started import ramp_problems
+from workbench.recording.servo_log.supply import supply_problems
 from workbench.recording.servo_log.units import UNITS, unit_problems
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class LogChecks:
     """When a log is doubted.
 
-    slow: between rows of a servo's log [s]; more is another unit.
+    slow: between rows of a servo's log [s]; more is another unit. fast: rows nearer to each other are read by no bus [s].
     stands: as long as a position may repeat to the last digit while its goal goes on by `goes` [s, deg], if it then leaps by
     more than `leaps` of its other steps; a joint that sticks sets out slowly. far: as far as a goal may be from it at the
-    end [deg]. same: share of rows in which goal and position are equal from
-    which the goal is no command; shift: by so many rows at most.
-    pause: between rows, in medians of their steps. longest: a log may last [s]. largest: a number of any channel, beyond what
-    counts of 32 bits come to [SI].
+    end [deg]. same: share of rows in which goal and position are equal from which the goal is no command; shift: by so many
+    rows at most. pause: between rows, in medians of their steps. longest: a log may last [s]. largest: a number of any channel,
+    beyond what counts of 32 bits come to [SI].
     """
 
     slow: float = 0.5
+    fast: float = 6e-4
     stands: float = 0.25
     goes: float = 5.0
     leaps: float = 3.0
@@ -67,12 +67,14 @@ def checked(recording: Recording, checks: LogChecks = CHECKS) -> Recording:
             channels[name], said = without_leaps(time, channels[name])
             problems += [f"{name}: {text}" for text in said]
     read = replace(recording, channels=channels)
-    for check in (_clock, _no_command, _standing):
+    for check in (_clock, _no_command):
         problems += check(read, checks)
     problems += unit_problems(read)
+    problems += supply_problems(read)
     mended = without_faults(read, frozenset(j for j in read.joints if any(
         text.startswith((f"goal.{j}:", f"position.{j}:")) and not text.endswith("taken out") for text in problems)))
     problems += mended.lines
+    problems += _standing(mended.recording, checks)
     if not any(text.startswith("goal.") for text in problems):  # else its goals are none, or of another unit
         problems += lead_problems(mended.recording)
         problems += ramp_problems(mended.recording)
@@ -112,6 +114,8 @@ def _clock(r: Recording, c: LogChecks) -> Iterator[str]:
     if middle > c.slow:
         unit = "milliseconds" if middle < 1e3 else "microseconds" if middle < 1e6 else "nanoseconds"
         yield f"time: rows are {middle:g} s apart, {r.time[-1] - r.time[0]:g} s in all: are the times in {unit}?"
+    elif middle < c.fast:
+        yield (f"time: rows are {1e3 * middle:.3g} ms apart, faster than servos are read: are the times in minutes?")
     elif r.time[-1] - r.time[0] > c.longest:
         yield f"time: the log lasts {(r.time[-1] - r.time[0]) / 3600:.1f} h; expected at most {c.longest / 3600:g} h"
     holes = np.flatnonzero(steps > max(c.pause * middle, 0.1))

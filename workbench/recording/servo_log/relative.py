@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.servo_log.following import JointLog, followed
-
-Array = NDArray[np.float64]
+from workbench.recording.servo_log.response import fitted, shapes
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
@@ -19,7 +18,8 @@ class RelativeChecks:
     goals give. alike: of 1, how far the ratio of the two may be, for steps from row to row; from where the joint is, a servo
     makes `least` to `largest` of it. absolute: share of the position's variance that the goals give as angles, from which they
     are angles, if the joint does not go `beyond` times as far; of a swing, its own slope gives as much a quarter of a period
-    later. smaller: the goals' range is at most so much of the position's. fewest: rows that tell."""
+    later. smaller: the goals' range is at most so much of the position's. fewest: rows that tell. added:
+    share of the position's variance that goals added up give to a servo that follows late and smoothed."""
 
     spans: tuple[int, ...] = (1, 2, 3, 5, 8, 12, 20)
     later: int = 6
@@ -32,6 +32,7 @@ class RelativeChecks:
     beyond: float = 2.0
     smaller: float = 0.6
     fewest: int = 30
+    added: float = 0.9
 
 
 RELATIVE = RelativeChecks()
@@ -45,7 +46,10 @@ def relative_goals(log: JointLog, c: RelativeChecks = RELATIVE) -> str | None:
     fit = followed(log.time, goal, position)
     if fit.explained > c.absolute and fit.gain < c.beyond:
         return None
-    if _best(goal, position, c, summed=True):
+    added = fitted(shapes(log.time, np.cumsum(goal)), position)
+    steps = added.explained > c.added and abs(added.gain - 1) < c.alike and \
+        np.mean((position - added.predicted) ** 2) < (1 - c.added) * np.var(position)
+    if steps or _best(goal, position, c, summed=True):
         return ("looks like the change of the position from row to row: relative actions (deltas); add them up to angles before "
                 "use")
     if _best(goal, position, c, summed=False):

@@ -5,25 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class RepeatChecks:
-    """rows: a value has to repeat in so many rows after its own. longest: and in so many at most, else the sensor
-    stood still. counts: of the sensor that the joint moves in each row around, at least; slower joints stick and slip by
-    themselves. catches: the next reading leaps by so much of what it moves in the rows that were repeated. around: as many rows
-    on each side, in lengths of the repetition. stretches: so many at least. slowest: rows further apart tell nothing [s]."""
+    """rows: a value has to repeat in so many rows after its own. longest: and in so many at most, else the sensor stood still.
+    counts: of the sensor that the joint moves in each row around, at least; slower joints stick and slip by themselves. catches:
+    the next reading leaps by so much of what it moves in the rows that were repeated. slows: its steps before and after are at
+    least that share of it. around: as many rows on each side, in lengths of the repetition. stretches: so many at least.
+    slowest: rows further apart tell nothing [s]. regular: share of the stretches that have the same length, and of half the log
+    that they fill, where the sensor is read at a lower rate."""
 
     rows: int = 2
     longest: int = 15
     counts: float = 1.5
     catches: float = 0.6
+    slows: float = 0.4
     around: int = 2
     stretches: int = 3
     slowest: float = 0.1
+    regular: float = 0.8
 
 
 REPEATS = RepeatChecks()
@@ -41,13 +44,17 @@ def without_repeats(time: Array, position: Array, c: RepeatChecks = REPEATS) -> 
         return position, []
     count = float(moving.min())
     found = [(a, b) for a, b in runs_of_equals(values) if c.rows <= b - a < c.longest and _catches_up(values, a, b, count, c)]
-    if len(found) < c.stretches:
+    if len({values[a] for a, _ in found}) < c.stretches:  # at one angle again and again, a loop of a motion stands by itself
         return position, []
     out = position.copy()
     for a, b in found:
         out[seen[a + 1:b + 1]] = np.nan
     lengths = [b - a + 1 for a, b in found]
     rows = sum(n - 1 for n in lengths)
+    usual = int(np.median(lengths))
+    if lengths.count(usual) > c.regular * len(lengths) and rows > c.regular * len(values) * (usual - 1) / usual / 2:
+        return out, [f"is new only in every {usual}th row (in {len(found)} stretches at least): read more slowly than the log is "
+                     f"written; {rows} repeated reading(s) taken out"]
     lasts = f"{min(lengths)} to {max(lengths)}" if min(lengths) < max(lengths) else f"{lengths[0]}"
     return out, [f"repeats the same reading for {lasts} rows while the joint moves, in {len(found)} stretches, the first from "
                  f"{time[seen[found[0][0]]]:.3f} s (row {seen[found[0][0]] + 1}): as a reader does when the bus times out; "
@@ -72,4 +79,10 @@ def _catches_up(values: Array, first: int, last: int, count: float, c: RepeatChe
     slower, faster = sorted(map(abs, rates))
     if slower < c.counts * count or leap * rates[0] <= 0 or leap * rates[1] <= 0:
         return False
-    return bool(c.catches * n * slower < abs(leap) < 3 * n * faster)
+    nexts = np.flatnonzero(values[last + 2:] != values[last + 1])
+    if not len(nexts):
+        return False
+    arrives = values[first] - values[first - 1]
+    leaves = (values[last + 2 + nexts[0]] - values[last + 1]) / (nexts[0] + 1)
+    on_its_way = min(arrives * np.sign(leap), leaves * np.sign(leap)) > c.slows * slower  # else it stood there by itself
+    return bool(on_its_way and c.catches * n * slower < abs(leap) < 3 * n * faster)

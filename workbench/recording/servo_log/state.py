@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.recording.recording import Recording
 from workbench.recording.white_noise import white_noise
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 _FEW_STEPS = 10  # that tell no count
 _ROUNDED = 1e-6
 """Steps below are of rounding, not of an encoder [rad]: 2**20 counts a turn are six times as wide."""

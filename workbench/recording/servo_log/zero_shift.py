@@ -6,24 +6,25 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from workbench.recording.servo_log.following import JointLog, followed
-
-Array = NDArray[np.float64]
+from workbench.recording.servo_log.following import JointLog
+from workbench.recording.servo_log.response import fitted, shapes
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class ShiftChecks:
     """least: of a step between two rows against those beside it [deg], and `times` as much as others differ from theirs in the
-    `near` rows on each side. alike: how far, in shares of the step, the level of the readings against the goals may differ from
-    it. goal: a goal that steps by that share of it within `before` explains it [s]. rows: of a stretch, at least. slowest: rows
-    further apart tell nothing [s]. explained: share of the position's variance that the goals have to give. doubt: of two
-    levels, the one nearer to the goals counts as the right one, the first where they are alike to that share."""
+    `near` rows on each side. beyond: or so many times what all steps of the log but a hundredth are. alike: how far, in shares
+    of the step, the level of the readings against the goals may differ from it. goal: a goal that steps by that share of it
+    within `before` explains it [s]. rows: of a stretch, at least. slowest: rows further apart tell nothing [s]. explained: share
+    of the position's variance that the goals have to give. doubt: of two levels, the one nearer to the goals counts as the right
+    one, the first where they are alike to that share."""
 
     least: float = 1.0
     times: float = 4.0
     near: int = 8
+    beyond: float = 1.5
     alike: float = 0.35
     goal: float = 0.4
     before: float = 0.3
@@ -44,17 +45,20 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     steps = np.diff(log.position)
     large = np.flatnonzero(np.abs(steps) > np.deg2rad(c.least) / 2)
     inside = [int(k) for k in large if 2 <= k < len(steps) - 2]
-    at = [k for k in inside if _stands_out(steps, k, c) and not _asked(log, k, float(steps[k]) - _usual(steps, k), c)]
+    far = max(c.beyond * float(np.quantile(np.abs(steps), 0.99)), np.deg2rad(2 * c.least))
+    asked = {k for k in inside if _asked(log, k, float(steps[k]) - _usual(steps, k), c)}
+    at = [k for k in inside if k not in asked and _stands_out(steps, k, c)] or \
+        [k for k in inside if k not in asked and _leaps(log, k, abs(float(steps[k]) - _usual(steps, k)), far)]
     if not at:
         return none, []
     edges = [0, *(k + 1 for k in at), len(log.rows)]
     jumps = np.array([steps[k] - _usual(steps, k) for k in at])
     level = np.concatenate([[0.0], np.cumsum(jumps)])
     undone = log.position - np.repeat(level, np.diff(edges))
-    fit = followed(log.time, log.goal, undone)
-    if fit.explained < c.explained:
+    fit = fitted(shapes(log.time, log.goal), undone)
+    if fit.explained < c.explained or fit.gain <= 0:
         return none, []
-    away = log.position - fit.predicted(log.time, log.goal)
+    away = log.position - fit.predicted
     middle = [float(np.median(away[a:b])) for a, b in pairwise(edges)]
     for i, jump in enumerate(jumps):
         if min(edges[i + 1] - edges[i], edges[i + 2] - edges[i + 1]) < c.rows:
@@ -64,6 +68,12 @@ def zero_shifts(log: JointLog, c: ShiftChecks = SHIFT) -> tuple[Array, list[str]
     true = _true_level(level, edges, middle, fit.offset, c)
     off = np.repeat(level - level[true], np.diff(edges))
     return off, [_line(log, off, edges)]
+
+
+def _leaps(log: JointLog, k: int, jump: float, far: float) -> bool:
+    """Whether step `k` is larger than steps of the log are, with no row left out around it."""
+    around = slice(k - 2, k + 4)
+    return jump > far and bool(np.all(np.diff(log.rows[around]) == 1))
 
 
 def _stands_out(steps: Array, k: int, c: ShiftChecks) -> bool:

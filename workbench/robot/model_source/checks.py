@@ -1,4 +1,4 @@
-"""What is doubtful in a robot once Drake has built it: a base without mass, inertias and lengths of another unit, no feet."""
+"""Problems of a robot that Drake has built: a base without mass, inertias and lengths of another unit, no feet."""
 
 from __future__ import annotations
 
@@ -12,17 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.files import InputError
 from workbench.files.reading import cached_by_content
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 
 @dataclass(frozen=True)
 class ModelChecks:
-    """dummy: a link that weighs no more than that stands for a frame; nothing of its inertia matters [kg]. outside: how far a
+    """dummy: a link of at most this mass is a mere frame, whose inertia does not matter [kg]. outside: how far a
     centre of mass may lie outside the box about its link's shapes and joints, in diagonals of that. gyration: of a link's
     radius of gyration to its reach at most. smallest: a link's reach is taken as at least so much [m]. dense: no link of its
     reach weighs more [kg/m^3]; lead is 11,300. longest: of a small robot's link [m]."""
@@ -58,8 +56,8 @@ class _Errors(logging.Handler):
 
 @contextmanager
 def quiet_drake() -> Iterator[None]:
-    """Drake's warnings about a description are told as problems; its own lines would stand on stderr beside them. RuntimeError
-    where it logs an error and goes on."""
+    """Drake's warnings about a description become problems, rather than lines on stderr. RuntimeError where it logs an error and
+    does not stop."""
     log, errors = logging.getLogger("drake"), _Errors()
     passes = log.propagate
     log.addHandler(errors)
@@ -145,7 +143,7 @@ def _without_mass(plant: Any, groups: dict[str, set[str]]) -> Iterator[str]:
         if floating & group:
             yield f"link '{name}': the base floats and weighs nothing (with all that is fixed to it)"
         else:
-            yield f"link '{name}' weighs nothing, nor does what is fixed to it, though a joint moves it"
+            yield f"link '{name}' has no mass, nor do the links fixed to it, though a joint moves it"
 
 
 def _unlikely(plant: Any, scene_graph: Any, bodies: list[Any], held: str) -> Iterator[str]:

@@ -28,8 +28,8 @@ _NAMES: dict[str, str] = {}
 
 @dataclass(frozen=True)
 class ModelSource:
-    """source: the user's file. path: what Drake reads, the same file or an SDF made of it. problems: what is doubtful in it, and
-    notes: what was made otherwise for Drake, a line each."""
+    """source: the user's file. path: file that Drake reads, the same or an SDF made of it. problems: of the file, and notes:
+    changes made for Drake, one line each."""
 
     source: Path
     path: Path
@@ -43,9 +43,9 @@ def named(path: Path) -> Path:
 
 
 def prepared(source: Path, packages: Mapping[str, str] | None = None) -> ModelSource:
-    """Reads a description once, checks it, and makes what Drake cannot read readable, in the user's cache.
+    """Reads a description once, checks it, and converts parts that Drake cannot read, in the user's cache.
 
-    packages: folder of each ROS package that mesh URIs name. InputError names file, link or joint, and what was expected.
+    packages: folder of each ROS package that mesh URIs name. InputError names file, link or joint, and the expected value.
     """
     try:
         content = source.read_bytes() if source.is_file() else b""
@@ -108,7 +108,7 @@ def _with_meshes(root: Element, source: Path, packages: Mapping[str, str], cache
 
 
 def cache_folder() -> Path:
-    """Where what was made of users' files is kept, beside the compiled rollouts: drake-workbench in XDG_CACHE_HOME or ~/.cache,
+    """Cache of converted files, in the same folder as the compiled rollouts: drake-workbench in XDG_CACHE_HOME or ~/.cache,
     or where that cannot be written, in the temporary folder."""
     for root in (os.environ.get("XDG_CACHE_HOME"), os.path.expanduser("~/.cache")):
         if root and os.path.isabs(root):

@@ -1,4 +1,4 @@
-"""What an SDF's own text says that no robot can be: masses, inertias, limits, loops."""
+"""Values in an SDF's own text that no robot can have: masses, inertias, limits, loops."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
-    """An <sdf> of a <robot>, and a line for each thing in it that is otherwise here.
+    """An <sdf> of a <robot>, and a line for each change made on the way.
 
     A link's frame lies at the joint that carries it; a joint's pose is its origin in its parent. A link without <inertial>: no
     mass. A link called as a joint gets "_link" after its name, as SDF's names are of one kind. InputError names what is
@@ -56,8 +56,8 @@ def sdf_of_urdf(root: Element, path: Path) -> tuple[Element, list[str]]:
 
 
 def _free_bases(joints: list[Element], links: list[Element], path: Path) -> tuple[set[str], set[str]]:
-    """Links that a floating joint hangs on the world, or on a root that stands for it (odom, map): each is a base that floats
-    anyway, wherever the joint puts it. And those roots, which nothing else hangs on."""
+    """Links that a floating joint attaches to the world, or to a root that represents it (odom, map): each is a base that floats
+    anyway, wherever the joint puts it. And those roots, which carry nothing else."""
     free, roots = set(), set()
     weigh = {k.get("name") for k in links if k.find("inertial") is not None}
     for joint in joints:

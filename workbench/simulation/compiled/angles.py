@@ -3,24 +3,37 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from workbench.motion.commands import Commands
-from workbench.simulation.compiled.arrays import Schedule
+from workbench.simulation.compiled.arrays import Ints, Schedule
 from workbench.simulation.compiled.schedule import schedule_of
 from workbench.simulation.compiled.station import CompiledJob
 from workbench.simulation.job import Job
 from workbench.simulation.steady import JointStates
+from workbench.types import Array
 
-Array = NDArray[np.float64]
 KEPT = 256
-"""Schedules of commands that are kept, as a session's takes are played again and again."""
-_schedules: OrderedDict[Any, tuple[Commands, JointStates | None, Schedule]] = OrderedDict()
+"""Schedules of commands, and ways to read a log, that are kept, as a session's takes are played again and again."""
+
+
+class _Reading(NamedTuple):
+    """Where between rows of a log the wanted times are. row, following (M,): the rows before and after; share (M, 1): of the way
+    between them; outside (M,): times before or after the log; put: times right after a restart, each with share (k, 1) and the
+    angles (n,) at the restart."""
+
+    row: Ints
+    following: Ints
+    share: Array
+    outside: NDArray[np.bool_]
+    put: list[tuple[Ints, Array, Array]]
+
+
+_schedules: OrderedDict[Any, tuple[object, Any]] = OrderedDict()
+_readings: OrderedDict[Any, tuple[object, Any]] = OrderedDict()
 
 
 def servo_angles(jobs: Sequence[Job]) -> list[Array]:
@@ -33,44 +46,68 @@ def servo_angles(jobs: Sequence[Job]) -> list[Array]:
         compiled = machines[key].of(job) if key in machines else CompiledJob(job)
         machines.setdefault(key, compiled)
         log = compiled.log(_schedule(compiled))
-        assert job.times is not None
-        every = compiled.config.logged_every
-        time = np.arange(len(log.q)) * every - compiled.plan.lead
-        joints = compiled.machine.servos.joint
-        told = np.column_stack([np.interp(job.times, time, log.q[:, j], left=np.nan, right=np.nan) for j in joints])
-        angles = told - compiled.physics.zero
-        if job.restarts is not None:
-            rows = log.q[:, joints] - compiled.physics.zero
-            _from_where_put(angles, job.times, np.asarray(time, dtype=float), rows, job.restarts)
-        out.append(angles)
+        out.append(_read(log.q[:, compiled.machine.servos.joint] - compiled.physics.zero, _reading(compiled, len(log.q))))
     return out
 
 
-def _from_where_put(angles: Array, times: Array, time: Array, rows: Array, restarts: JointStates) -> None:
-    """Corrects angles (M, n) right after a restart, where the log's row is of the robot as it came there. time, rows: of the
-    log."""
+def _read(rows: Array, reading: _Reading) -> Array:
+    """Angles (M, n) at the wanted times, from the rows of a log; right after a restart from where the robot was put."""
+    before = rows[reading.row]
+    angles = before + reading.share * (rows[reading.following] - before)
+    for here, share, q in reading.put:
+        angles[here] = np.where(np.isnan(q), angles[here], q + share * (rows[reading.following[here]] - q))
+    angles[reading.outside] = np.nan
+    return angles
+
+
+def _reading(compiled: CompiledJob, rows: int) -> _Reading:
+    """Of a job's log of so many rows."""
+    job, lead, every = compiled.job, compiled.plan.lead, compiled.config.logged_every
+    assert job.times is not None
+    times = job.times
+
+    def made() -> _Reading:
+        time = np.asarray(np.arange(rows) * every - lead, float)
+        row = np.clip(np.searchsorted(time, times, side="right") - 1, 0, rows - 1)
+        following = np.minimum(row + 1, rows - 1)
+        share = ((times - time[row]) / every)[:, None]
+        put = [] if job.restarts is None else _after_restarts(times, time, job.restarts)
+        return _Reading(row, following, share, (times < time[0]) | (times > time[-1]), put)
+
+    return _kept(_readings, (rows, every, lead, times.tobytes(), id(job.restarts)), job.restarts, made)  # type: ignore[no-any-return]
+
+
+def _after_restarts(times: Array, time: Array, restarts: JointStates) -> list[tuple[Ints, Array, Array]]:
+    """`_Reading.put`: the log's row at a restart is of the robot as it came there. time: of the log's rows."""
     k = np.searchsorted(time, times, side="left")  # the row at or after each time
     at = np.round(restarts.times / (time[1] - time[0])).astype(int) - round(time[0] / (time[1] - time[0]))
+    found = []
     for row, q in zip(at.tolist(), restarts.q):
         here = np.flatnonzero((k == row + 1) & (k < len(time)))
         if len(here):
-            share = ((times[here] - time[row]) / (time[row + 1] - time[row]))[:, None]
-            angles[here] = np.where(np.isnan(q), angles[here], q + share * (rows[row + 1] - q))
+            found.append((here, ((times[here] - time[row]) / (time[row + 1] - time[row]))[:, None], q))
+    return found
 
 
 def _schedule(compiled: CompiledJob) -> Schedule:
     """Of a job; made once for the same commands."""
     job, plan, config = compiled.job, compiled.plan, compiled.config
-    kept = plan.heard_as_sent and job.commands is not None and job.steadied is None
-    key = (id(job.commands), replace(config), compiled.model.joints, plan.lead, plan.duration, job.elapsed, id(job.restarts))
-    if kept and key in _schedules:
-        return _schedules[key][2]
-    schedule = schedule_of(config, plan.commands, plan.lead, plan.duration, job.elapsed, job.steadied, job.restarts)
-    if kept:
-        assert job.commands is not None
-        _schedules[key] = (job.commands, job.restarts, schedule)  # holds them, so that their ids stay theirs
-        while len(_schedules) > KEPT:
-            _schedules.popitem(last=False)
-    return schedule
+
+    def made() -> Schedule:
+        return schedule_of(config, plan.commands, plan.lead, plan.duration, job.elapsed, job.steadied, job.restarts)
+
+    if not plan.heard_as_sent or job.commands is None or job.steadied is not None:
+        return made()
+    key = (id(job.commands), *vars(config).values(), compiled.model.joints, plan.lead, plan.duration, job.elapsed,
+           id(job.restarts))
+    return _kept(_schedules, key, (job.commands, job.restarts), made)  # type: ignore[no-any-return]
 
 
+def _kept(known: OrderedDict[Any, tuple[object, Any]], key: object, of: object, made: Callable[[], Any]) -> Any:
+    """What was made under a key before, or is made now. of: objects whose ids are in the key; held, so that these stay theirs."""
+    found = known.get(key)
+    if found is None:
+        found = known[key] = (of, made())
+        while len(known) > KEPT:
+            known.popitem(last=False)
+    return found[1]

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from workbench.types import Array
+
 Ints = NDArray[np.int64]
 
 
@@ -60,7 +61,8 @@ class Servos(NamedTuple):
     friction at rest and the speed at which it fades. rubbing (m,): friction by load; still (c, m), still_speed (c,): more of it
     at rest; backwards (m,): more where the load drives the motor. bend (m,): one over the torque at which a motor saturates.
     lopsided (d, m): shares by which friction is more forwards, by term. derivative [duty per rad/s], ramp [rad/s], lag [s] (m,):
-    of the law."""
+    of the law. table_servo, table_of (t,): the servo of each torque table, and what it depends on (`workbench.servo.tabled`);
+    table_at, table_torque (t, K): its knots and torques."""
 
     joint: Ints
     zero: Array
@@ -89,6 +91,10 @@ class Servos(NamedTuple):
     backwards: Array
     bend: Array
     lopsided: Array
+    table_servo: Ints
+    table_of: Ints
+    table_at: Array
+    table_torque: Array
 
 
 class Shapes(NamedTuple):

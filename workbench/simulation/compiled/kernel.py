@@ -21,7 +21,7 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "_nrt": False, "fastmath": {"contract
 """No GIL; nothing is allocated, so nothing is counted; a product and a sum may be one instruction, with one rounding, but nothing
 is taken to be finite; 1/0 is infinity."""
 _SOURCES = ("arrays", "contact", "kernel", "links", "put", "run", "servo", "solve", "tree", "vectors", "../steady",
-            "../../servo/term_bank")
+            "../../servo/tabled", "../../servo/term_bank")
 
 
 @cache

@@ -12,6 +12,7 @@ from workbench.effects.apply import Physics
 from workbench.effects.sdf import SPRING_TIME
 from workbench.robot import RobotModel
 from workbench.servo.bank import HOLDING_DAMPING, MOST_CREEP
+from workbench.servo.tabled import arrays_of
 from workbench.servo.terms import TermNumbers, most_friction
 from workbench.simulation.compiled.arrays import OTHER, Array, Ints, Servos, Shapes, Tree
 from workbench.simulation.compiled.tables import NotCoveredError, ShapeTable, Tables
@@ -35,7 +36,11 @@ def machine_of(model: RobotModel, physics: Physics, tables: Tables, free: bool, 
     if missing:
         raise NotCoveredError(f"joint '{missing[0]}' does not turn")
     joint = np.array([tables.joints.index(j) for j in model.joints], dtype=np.int64)
-    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), _shapes(model, physics, tables, free, apart))
+    kept = f"shapes, {'apart' if apart else 'touching'}"
+    shapes = None if free else tables.derived.get(kept)  # of a held robot nothing but the tables decides them
+    if not isinstance(shapes, Shapes):
+        shapes = tables.derived[kept] = _shapes(model, physics, tables, free, apart)
+    return Machine(_tree(physics, tables, joint, dt), _servos(physics, joint), shapes)
 
 
 def _tree(physics: Physics, tables: Tables, joint: Ints, dt: float) -> Tree:
@@ -69,6 +74,7 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
     lopsided = [t.lopsided for t in numbers if t.lopsided is not None]
     sticking = [t for t in numbers if t.sticking is not None]
     most = most_friction(physics.servo_terms, law)
+    table_servo, table_of, table_at, table_torque = arrays_of([t for said in numbers for t in said.tables])
     return Servos(
         joint=joint, zero=_array(physics.zero), gain=_array(law.gain), margin=_array(law.margin), punch=_array(law.punch),
         full_torque=_array(law.full_torque), back_emf=_array(law.back_emf), viscous=_array(law.viscous),
@@ -79,7 +85,8 @@ def _servos(physics: Physics, joint: Ints) -> Servos:
         speed=np.array([t.speed for t in sticking]), rubbing=rubbing,
         still=_array([t.rubbing_still for t in still]).reshape(len(still), n),
         still_speed=_array([t.rubbing_speed for t in still]),
-        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n))
+        backwards=backwards, bend=bend, lopsided=_array(lopsided).reshape(len(lopsided), n),
+        table_servo=table_servo, table_of=table_of, table_at=table_at, table_torque=table_torque)
 
 
 def _shapes(model: RobotModel, physics: Physics, tables: Tables, free: bool, apart: bool) -> Shapes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -61,6 +62,7 @@ def _sent(every: float, times: np.ndarray, end: float) -> tuple[np.ndarray, np.n
     return at[kept], kept
 
 
+@lru_cache(maxsize=16)
 def settling(config: SimulationConfig, servos: int) -> Schedule:
     """Nothing but time, before the first command."""
     still = schedule_of(config, None, 0.0, whole_steps(config, config.settle), 0.0, None)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from workbench.servo.tabled import ANGLE_DIRECTION, DUTY, DUTY_DIRECTION, SPEED, TURNING
 from workbench.servo.term_bank import LOAD_SMOOTHING, MOVING
 from workbench.simulation.compiled.arrays import Schedule, Servos, State, Tree, Work
 from workbench.simulation.compiled.kernel import part
@@ -14,6 +15,8 @@ from workbench.simulation.compiled.vectors import INFINITY, clamp
 
 _SMOOTHING = float(LOAD_SMOOTHING)
 _MOVING = float(MOVING)
+_TURNING = float(TURNING)
+_ANGLE_DIRECTION, _DUTY, _DUTY_DIRECTION, _SPEED = ANGLE_DIRECTION, DUTY, DUTY_DIRECTION, SPEED
 
 
 @part
@@ -105,7 +108,10 @@ def _push_with_terms(servos: Servos, elapsed: float, free: int, state: State, w:
     fade = math.exp(-servos.fade * elapsed) if servos.fade > 0.0 else 1.0
     for i in range(servos.joint.shape[0]):
         v = state.v[free + servos.joint[i]]
-        torque = w.motor[i] * servos.full_torque[i]
+        torque, tabled = w.motor[i] * servos.full_torque[i], 0.0
+        for t in range(servos.table_servo.shape[0]):
+            if servos.table_servo[t] == i:
+                tabled += _tabled(servos, t, state.q[servos.joint[i]], v, w.motor[i])
         for a in range(servos.sag.shape[0]):
             torque *= max(1.0 - servos.sag[a] * drawn / servos.supply[i], 0.0)
         torque *= fade
@@ -116,7 +122,38 @@ def _push_with_terms(servos: Servos, elapsed: float, free: int, state: State, w:
             w.motor[i] = _acting(servos, i, now)
         else:
             w.push[i], w.motor[i] = servos.back_emf[i] * ahead, 0.0
+        w.push[i] += tabled
         w.relief[i] = _relief(servos, i, v, w.motor[i], state) if servos.varies else 0.0
+
+
+@part
+def _tabled(servos: Servos, t: int, angle: float, v: float, duty: float) -> float:
+    """The torque of one table."""
+    kind = servos.table_of[t]
+    x = angle
+    if kind == _DUTY:
+        x = duty
+    elif kind == _DUTY_DIRECTION:
+        x = abs(duty)
+    elif kind == _SPEED:
+        x = v
+    low, high = 0, servos.table_at.shape[1]  # the first knot beyond x is among them
+    while low < high:
+        middle = (low + high) // 2
+        if servos.table_at[t, middle] <= x:
+            low = middle + 1
+        else:
+            high = middle
+    if low == 0:
+        value = servos.table_torque[t, 0]
+    elif low == servos.table_at.shape[1]:
+        value = servos.table_torque[t, low - 1]
+    else:
+        share = (x - servos.table_at[t, low - 1]) / (servos.table_at[t, low] - servos.table_at[t, low - 1])
+        value = servos.table_torque[t, low - 1] + share * (servos.table_torque[t, low] - servos.table_torque[t, low - 1])
+    if kind in (_ANGLE_DIRECTION, _DUTY_DIRECTION):
+        value *= v / math.sqrt(v * v + _TURNING * _TURNING)
+    return value
 
 
 @part

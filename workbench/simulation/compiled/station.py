@@ -19,7 +19,8 @@ from workbench.simulation.compiled.kernel import is_compiled
 from workbench.simulation.compiled.machine import Machine, machine_of
 from workbench.simulation.compiled.run import DONE, TOUCHED, run, stand
 from workbench.simulation.compiled.schedule import rows_of, schedule_of, settling, whole_steps
-from workbench.simulation.compiled.tables import NotCoveredError, Tables, tables_of
+from workbench.simulation.compiled.structures import tables_of
+from workbench.simulation.compiled.tables import NotCoveredError, Tables
 from workbench.simulation.job import Job
 from workbench.simulation.rollout import Start, first_reference
 from workbench.simulation.structure import Structure
@@ -94,15 +95,16 @@ class CompiledJob:
         self.free = self.config.base == "free"
         self.model.check_base(floating=self.free)
         self.physics: Physics = physics_of(self.model)
-        self.tables: Tables = tables_of(self.model, self.physics.description, self.free)
+        self.tables: Tables = tables_of(self.model, self.physics.build, self.free)
         self.machine: Machine = machine_of(self.model, self.physics, self.tables, self.free, self.config.time_step, apart)
         self._settled: list[State] = []  # of this robot: at most one, which jobs made by `of` share
+        self._work: list[Work] = []  # likewise: they are not played at the same time
         self.plan = self._plan()
 
     def _plan(self) -> _Plan:
         job = self.job
         sent = None if job.commands is None else job.commands.reordered(self.model.joints)
-        commands = None if sent is None else played(sent, self.model)
+        commands = played(sent, self.model) if sent is not None and self.physics.retimed else sent
         duration = job.duration if job.duration is not None else commands.end if commands is not None else None
         if duration is None:
             raise ValueError("expected commands, a trajectory or a duration")
@@ -132,9 +134,10 @@ class CompiledJob:
     def log(self, schedule: Schedule) -> Log:
         """Settles and plays; NotCoveredError as in `take`."""
         config, plan = self.config, self.plan
-        work = work_for(self.machine.tree, self.machine.servos, self.machine.shapes)
         if not self._settled:
-            self._settled.append(self.at_rest(work))
+            self._work.append(work_for(self.machine.tree, self.machine.servos, self.machine.shapes))
+            self._settled.append(self.at_rest(self._work[0]))
+        work = self._work[0]
         state = State(*(a.copy() for a in self._settled[0]))  # type: ignore[arg-type]
         if self.job.start is not None:
             self._put(Start(*self.job.start), state)

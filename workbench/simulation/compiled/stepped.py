@@ -75,7 +75,7 @@ class CompiledSteppedRun:
         """The take logged so far, from the start of the run; angles as the servos have them, no forces."""
         q, v, base = (np.concatenate([p[k] for p in self._pieces]) for k in range(3))
         joint = self._job.machine.servos.joint
-        time = np.arange(len(q)) * self.config.logged_every
+        time = np.asarray(np.arange(len(q)) * self.config.logged_every, float)
         return Take(name=name, source="simulation", time=time, joints=self.model.joints, q=q[:, joint], starts_at=0.0,
                     base=self.config.base, v=v[:, joint], p_WB=base[:, 4:], quat_WB=base[:, :4], torque=None, contact={},
                     commands=self._sent)

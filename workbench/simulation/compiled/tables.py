@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.etree import ElementTree
 
@@ -29,8 +28,6 @@ from workbench.robot import ConfigureParser, RobotModel
 from workbench.simulation.compiled.arrays import BOX, CYLINDER, OTHER, Array, Ints, Tree
 from workbench.simulation.contact import SelectFeet
 
-KEPT_TABLES = 64
-
 
 class NotCoveredError(Exception):
     """The compiled station does not know something about this robot; the text says what."""
@@ -55,36 +52,32 @@ class ShapeTable:
 
 
 @dataclass(frozen=True)
+class LinkWeight:
+    """A link, the body (-1: the root) that it is part of, its pose there, and its inertia about that body's origin, in its axes.
+    """
+
+    link: str
+    body: int
+    X: RigidTransform
+    M: SpatialInertia
+
+
+@dataclass(frozen=True)
 class Tables:
     """What does not depend on servos, floor and step. joints: names, as the arrays number them. tree: as the description has it,
-    without servos' friction, gravity and pull. X_WBase: pose of a fixed base link in W. derived: what others have worked out from
-    these and keep."""
+    without servos' friction, gravity and pull. X_WBase: pose of a fixed base link in W. links: what they weigh. derived: what
+    others have worked out from these and keep."""
 
     joints: tuple[str, ...]
     tree: Tree
     X_WBase: RigidTransform
     shapes: ShapeTable
+    links: tuple[LinkWeight, ...]
     derived: dict[str, object] = field(default_factory=dict)
 
 
-_known: OrderedDict[tuple[str, str, bool], Tables] = OrderedDict()
-
-
-def tables_of(model: RobotModel, description: str | None, free: bool) -> Tables:
-    """Of a description (SDF text; None: the model's file) on a free or held base; NotCoveredError says what is not known.
-
-    Kept by the description's content."""
-    text = model.path.read_bytes() if description is None else description.encode()
-    key = (hashlib.sha256(text).hexdigest(), f"{model.path} {model.base}", free)
-    if key not in _known:
-        _known[key] = _read(model, description, free)
-    _known.move_to_end(key)
-    while len(_known) > KEPT_TABLES:
-        _known.popitem(last=False)
-    return _known[key]
-
-
-def _read(model: RobotModel, description: str | None, free: bool) -> Tables:
+def read_tables(model: RobotModel, description: str | None, free: bool) -> Tables:
+    """Of a description (SDF text; None: the model's file) on a free or held base; NotCoveredError says what is not known."""
     builder = RobotDiagramBuilder(time_step=1e-3)
     plant, parser = builder.plant(), builder.parser()
     ConfigureParser(parser)
@@ -170,7 +163,8 @@ class _Reader:
             X = on_root @ X if parent[i] < 0 else X
             R[i], p[i], axis[i] = X.rotation().matrix(), X.translation(), j.revolute_axis()
         path = np.concatenate([np.arange(-1, o - 1, dtype=np.int64), np.where(parent >= 0, parent + o, o - 1)])
-        mass, com, inertia = self._weights(n)
+        links = self._links()
+        mass, com, inertia = weigh(links, n)
         stiffness, rest = self._springs()
         tree = Tree(
             free=self.free, parent=parent, path=path, row=np.arange(-1, len(path) - 1, dtype=np.int64), group=_groups(path), R=R,
@@ -180,7 +174,7 @@ class _Reader:
             upper=np.array([j.position_upper_limit() for j in self.turning]), brake=np.zeros(n), brake_gain=np.zeros(n),
             gravity=np.zeros(3), pull=np.zeros(3))
         return Tables(joints=tuple(j.name() for j in self.turning), tree=tree, X_WBase=self._X_WBase(),
-                      shapes=self._shapes(n, on_root))
+                      shapes=self._shapes(n, on_root), links=links)
 
     def _X_WBase(self) -> RigidTransform:
         """Of a held base; the origin for a free one."""
@@ -191,20 +185,13 @@ class _Reader:
             raise NotCoveredError(f"the base '{self.base.name()}' turns against the world")
         return X
 
-    def _weights(self, n: int) -> tuple[Array, Array, Array]:
-        """Mass, centre and inertia of each body, of all links that are part of it; the root's last."""
-        sums: list[SpatialInertia] = [SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0)) for _ in range(n + 1)]
+    def _links(self) -> tuple[LinkWeight, ...]:
+        found = []
         for index in self.plant.GetBodyIndices(self.instance):
             on, X = self.anchors[int(index)]
-            M = self.plant.get_body(index).default_spatial_inertia().ReExpress(X.rotation()).Shift(-X.translation())
-            sums[on] = M if sums[on].get_mass() == 0.0 else _sum(sums[on], M)
-        mass = np.array([M.get_mass() for M in sums])
-        com = np.array([M.get_com() for M in sums])
-        inertia = np.empty((n + 1, 6))
-        for i, M in enumerate(sums):
-            about = M.Shift(M.get_com()).CalcRotationalInertia()
-            inertia[i] = np.concatenate([about.get_moments(), about.get_products()])
-        return mass, com, inertia
+            link = self.plant.get_body(index)
+            found.append(LinkWeight(link.name(), on, X, carried(link.default_spatial_inertia(), X)))
+        return tuple(found)
 
     def _armature(self) -> Array:
         """Reflected inertia of joints by the description; servos' replace it."""
@@ -277,6 +264,23 @@ def _groups(path: Ints) -> Ints:
         group[k] = trees if before < 0 else group[before]
         trees += int(before < 0)
     return group
+
+
+def carried(M: SpatialInertia, X: RigidTransform) -> SpatialInertia:
+    """A link's inertia about its own origin as one about the origin of the body in which its pose is X."""
+    return M.ReExpress(X.rotation()).Shift(-X.translation())
+
+
+def weigh(links: Sequence[LinkWeight], n: int) -> tuple[Array, Array, Array]:
+    """Mass, centre and inertia of each of n bodies and the root, its last, of all links that are part of it."""
+    sums: list[SpatialInertia] = [SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0)) for _ in range(n + 1)]
+    for link in links:
+        sums[link.body] = link.M if sums[link.body].get_mass() == 0.0 else _sum(sums[link.body], link.M)
+    mass, com, inertia = np.array([M.get_mass() for M in sums]), np.array([M.get_com() for M in sums]), np.empty((n + 1, 6))
+    for i, M in enumerate(sums):
+        about = M.Shift(M.get_com()).CalcRotationalInertia()
+        inertia[i] = np.concatenate([about.get_moments(), about.get_products()])
+    return mass, com, inertia
 
 
 def _sum(a: SpatialInertia, b: SpatialInertia) -> SpatialInertia:

@@ -8,16 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from workbench.compare.metrics import heading, travelled, turned
 from workbench.recording.take import Take
+from workbench.types import Array
 from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import OTHERS, RECORDED, SIMULATED, legend_above, new_figure, styled
 from workbench.view.playback import names_of, since_start
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from workbench.identify.results.take_report import TakeReport
 from workbench.robot import RobotModel
+from workbench.types import Array
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.heat import BIN, DARKEST, HEAT, SCALE, cells
 from workbench.view.figures.stance import intervals
 from workbench.view.figures.style import ACCENT, COMMAND, NOISE, RECORDED, SIMULATED, STANCE, legend_above, new_figure, styled
 from workbench.view.shapes import robot_shapes
 
-Array = NDArray[np.float64]
 SHOWN = 3.0
 """Longest stretch that a before-and-after figure shows [s]."""
 _DEGREES = 180 / np.pi

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, to_hex
-from numpy.typing import NDArray
 
+from workbench.types import Array
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.style import RECORDED
 
-Array = NDArray[np.float64]
 BIN = 0.1
 """Width of a cell [s]."""
 DARKEST = 30.0

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from workbench.compare.comparison import aligned
 from workbench.compare.metrics import rms
 from workbench.dynamics.derivatives import differentiate
 from workbench.recording.take import Take
+from workbench.types import Array
 from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import (
     COMMAND,
@@ -27,8 +27,6 @@ from workbench.view.figures.style import (
     styled,
 )
 from workbench.view.playback import names_of, since_start
-
-Array = NDArray[np.float64]
 
 LEAST_SPAN = 4.0
 """Of an angle's axis [deg]."""

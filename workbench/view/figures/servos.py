@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from workbench.compare.metrics import rms
 from workbench.robot.model import RobotModel
+from workbench.servo import ServoLaw
+from workbench.types import Array
 from workbench.view.figures.stance import Stance
 from workbench.view.figures.style import ACCENT, ERROR, NOISE, OTHERS, RECORDED, SIMULATED, STANCE, new_figure, panels, styled
-
-Array = NDArray[np.float64]
 
 _PARTS = {"t": ("top joints", OTHERS[2]), "m": ("middle joints", SIMULATED), "b": ("bottom joints", ACCENT),
           "": ("other joints", OTHERS[0])}
@@ -54,11 +53,11 @@ def servo_margins(model: RobotModel, joints: Sequence[str], motor_torque: Array,
     """
     figure = new_figure(12, 0.27 * len(joints) + 2.0)
     plane, bars = figure.subplots(1, 2, width_ratios=[1.2, 1])
-    top = max(model.servo(j).no_load_speed * model.servo(j).supply_voltage / model.servo(j).rated_voltage for j in joints)
+    top = max(float(model.servo(j).line.no_load_speed) for j in joints)
     speed = np.linspace(-1.15 * top, 1.15 * top, 200)
     for servo in {model.servo(j) for j in joints}:
         for sign in (-1, 1):
-            plane.plot(np.degrees(speed), sign * servo.torque_at_full_duty - servo.back_emf * speed, color="#888888",
+            plane.plot(np.degrees(speed), sign * servo.line.motor_torque(sign * speed), color="#888888",
                        linewidth=1.2, label="servo at full duty" if sign > 0 else None)
         plane.axhspan(-servo.stall_torque / 5, servo.stall_torque / 5, color=STANCE, linewidth=0, zorder=0.5,
                       label="a fifth of stall torque, advised")
@@ -128,12 +127,9 @@ def base_wrench(
 
 def _shares(model: RobotModel, joints: Sequence[str], torque: Array, v: Array) -> tuple[Array, Array]:
     """Largest share of the torque that the servo has at the moment's speed, and of its no-load speed, per joint."""
-    servos = [model.servo(j) for j in joints]
-    full = np.array([s.torque_at_full_duty for s in servos])
-    back_emf = np.array([s.back_emf for s in servos])
-    left = np.maximum(full - back_emf * v * np.sign(torque), 0.05 * full)
-    fastest = full / back_emf
-    return np.nanmax(np.abs(torque) / left, axis=0, initial=0), np.nanmax(np.abs(v) / fastest, axis=0, initial=0)
+    line = ServoLaw.of([model.servo(j) for j in joints]).line
+    left = np.maximum(line.motor_torque(v * np.sign(torque)), 0.05 * line.full_torque)
+    return np.nanmax(np.abs(torque) / left, axis=0, initial=0), np.nanmax(np.abs(v) / line.no_load_speed, axis=0, initial=0)
 
 
 def _part(joint: str) -> str:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from workbench.compare.footfalls import FootPhases
 from workbench.recording.take import Take
 from workbench.robot import RobotModel, legs
+from workbench.types import Array
 from workbench.view.playback import since_start
-
-Array = NDArray[np.float64]
 
 Stance = Mapping[str, Array]
 """Foot (by its knee's joint) -> (K, 2) times of touchdown and lift-off [s] since the first command."""

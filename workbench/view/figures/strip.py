@@ -6,15 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from workbench.recording.take import Take
 from workbench.robot.model import RobotModel
+from workbench.types import Array
 from workbench.view.figures.style import COMMAND, RECORDED, SIMULATED, new_figure, styled
 from workbench.view.playback import STAND_CLEARANCE, Playback, common_span, names_of, play
 from workbench.view.shapes import robot_shapes
 
-Array = NDArray[np.float64]
 WIDEST = 2.5
 """Most that a picture reaches, by how far the simulated robot itself does."""
 

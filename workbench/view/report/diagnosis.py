@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.identify.options import PROBLEM
-from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Recalibrated, Rejected
+from workbench.identify.results.findings import Diagnosis, Estimate, Finding, GapEntry, Rejected
 from workbench.identify.results.take_report import TakeReport
+from workbench.types import Progress
 from workbench.view.figures import body_path, film_strip
 from workbench.view.figures.errors import LIMIT
 from workbench.view.figures.gap import before_after, gap_map, robot_map, unseen_errors
 from workbench.view.figures.heat import DARKEST
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
+from workbench.view.report.servo_law import recalibrated_section, tied_section, unknown_torque_section
 from workbench.view.report.tables import folded, place_of, rivals, tried
 from workbench.view.report.words import (
     capital,
@@ -42,7 +44,6 @@ from workbench.view.scene.replay import write_replay
 
 PATH = 0.03
 """A body that moved less far than this did not go anywhere [m]."""
-Progress = Callable[[str, float | None], None]
 
 
 def write_diagnosis(diagnosis: Diagnosis, takes: Sequence[TakeReport], folder: Path, title: str,
@@ -94,8 +95,12 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
     for finding in diagnosis.findings:
         elsewhere = {place for f in diagnosis.findings if f is not finding for place in f.where}
         report.add(_finding(finding, diagnosis.rejected, takes, drawn, elsewhere))
+    if diagnosis.tied:
+        report.add(tied_section(diagnosis.tied))
+    for unknown in diagnosis.unknown_torques:
+        report.add(unknown_torque_section(unknown))
     if diagnosis.recalibrated:
-        report.add(_recalibrated(diagnosis.recalibrated))
+        report.add(recalibrated_section(diagnosis.recalibrated))
     if takes:
         report.add(_unseen(takes))
     report.add(_left(diagnosis))
@@ -108,7 +113,7 @@ def diagnosis_report(diagnosis: Diagnosis, takes: Sequence[TakeReport], title: s
 
 
 def _summary(diagnosis: Diagnosis, takes: Sequence[TakeReport]) -> str:
-    what = [sentence_of(f) for f in diagnosis.findings]
+    what = [*(sentence_of(f) for f in diagnosis.findings), *(u.evidence for u in diagnosis.unknown_torques)]
     seconds = sum(s.time[-1] for s in takes)
     if takes:
         what.append(f"Evaluated on stretches of {listed([s.name for s in takes])} ({seconds:.0f} s in all) that neither "
@@ -231,16 +236,6 @@ def _finding(finding: Finding, rejected: Sequence[Rejected], takes: Sequence[Tak
         parts.append(Text("Tried in its place, and rejected:"))
         parts += tried(instead, "more rivals")
     return Section(capital(title_of(finding.effect, finding.where)), parts)
-
-
-def _recalibrated(numbers: Sequence[Recalibrated]) -> Section:
-    """Of the nominal law, within what was known of it."""
-    shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
-    rows = [[r.number.replace("_", " "), listed(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}", unbroken(unit),
-             f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
-    said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
-    return Section("What was recalibrated", [Text(said), *folded(
-        ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
 
 
 def _best_view(finding: Finding, takes: Sequence[TakeReport], drawn: set[tuple[int, str]], others: Collection[str]

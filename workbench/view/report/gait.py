@@ -15,6 +15,7 @@ from workbench.gait.certificate import CLAIM, PUPPY_CLAIM, Certificate
 from workbench.gait.limits import each
 from workbench.gait.measure import GaitMeasure, measure
 from workbench.gait.optimize import WALK, Optimized
+from workbench.gait.plan_compare import PlanComparison
 from workbench.gait.table import GaitTable
 from workbench.motion import load_motion
 from workbench.recording.take import Take
@@ -32,6 +33,7 @@ from workbench.view.figures import (
     stance_of,
 )
 from workbench.view.figures.gait import draw_ranges, limit_bars, short
+from workbench.view.figures.plan import plan_and_run
 from workbench.view.report.page import Details, Part, Picture, Provenance, Replay, Report, Section, Table, Text
 from workbench.view.scene.replay import write_replay
 
@@ -55,6 +57,8 @@ def write_gait_page(folder: Path, model: RobotModel, result: Optimized) -> Path:
         report.add(Section("Not met", [Text(result.problem)]))
     report.add(Section("The gait", [Replay(replay, "From rest, with the ground's forces." + ghost, strip),
                                     *_walking(take, on, result.table, walk)]))
+    if result.plan is not None:
+        report.add(_plan_section(result.plan))
     report.add(_limits_section(certificate))
     report.add(_draws_section(certificate))
     report.add(_way_section(certificate))
@@ -131,6 +135,19 @@ def _walking(take: Take, model: RobotModel, table: GaitTable, walk: tuple[Take, 
             Picture(body_attitude(take, others=others))])]
 
 
+def _plan_section(c: PlanComparison) -> Section:
+    rows = [[asset, f"{1000 * e.position:.1f}", f"{math.degrees(e.rotation):.1f}"] for asset, e in c.errors.items()]
+    joints = [[joint, f"{math.degrees(error):.1f}"] for joint, error in c.joints.items()]
+    feet = [[foot, f"{1000 * error:.1f}"] for foot, error in c.feet.items()]
+    return Section("Planned and simulated", [
+        Text(f"The table has {100 * c.speed:.0f} % of the planned speed. Below, errors are RMS over the cycles after the first, "
+             "between where the plan has each tracked body and where the simulated robot has it, seen from a frame that goes at "
+             "the planned speed."),
+        Picture(plan_and_run(c), "Base and feet over one cycle; simulated: the mean of the cycles."),
+        Table(["tracked body", "position [mm]", "rotation [deg]"], rows),
+        Details("Joints and feet", [Table(["joint", "RMS [deg]"], joints), Table(["foot", "RMS [mm]"], feet)])])
+
+
 def _limits_section(certificate: Certificate) -> Section:
     rows = [[m.name, m.where, short(m.value), short(m.limit), m.unit, f"{100 * m.margin:.0f} %",
              "advice" if m.advice else "kept" if m.use <= 1 else "broken"] for m in certificate.margins]
@@ -153,6 +170,11 @@ def _draws_section(certificate: Certificate) -> Section:
                   *([Table(["draw", "robot", "what happened"], incidents)] if incidents else []),
                   Picture(draw_ranges(certificate), "Thick: 5 to 95 % of the robots; thin: all; circle: the median; green: the "
                           "nominal robot.")]
+    trimmed = d.get("straightened")
+    if trimmed and trimmed["after one metre deg/m RMS"] is not None:
+        before, one, three = (trimmed[f"{k} deg/m RMS"] for k in ("untrimmed", "after one metre", "after 3 metres"))
+        parts.append(Text(f"Heading over {trimmed['robots']} of them: {before:.1f} deg/m RMS as they are; {one:.1f} after "
+                          f"one recorded metre and one correction by `workbench trim`, {three:.1f} after three."))
     steps = ", ".join(f"{k} {100 * v:.1f}" for k, v in floor["speed"].items())
     unit = "0.01 rad/s" if certificate.nominal.unit == "rad/s" else "cm/s"
     parts.append(Text(f"Numerical floor: the speed of the nominal robot by step and contact model is {steps} {unit}; heading "
@@ -201,7 +223,8 @@ def _table_section(table: GaitTable) -> Section:
     cycle = table.cycle
     rows = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, goals)] for k, goals in enumerate(cycle.goals)]
     speeds = [[str(k + 1), str(cycle.dwells_ms[k]), *map(str, s)] for k, s in enumerate(cycle.speeds)]
-    shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in vars(table.shape).items())
+    numbers = {k: v for k, v in vars(table.shape).items() if k != "offsets"}
+    shape = ", ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in numbers.items())
     return Section("The table", [
         Text("The cycle; `gait.csv` has start and stop around it. `simulate`, `run`, `play`, `flash` and `export` take that "
              "file, and all but the first ask for `certificate.json` beside it."),

@@ -37,6 +37,9 @@ def headline(diagnosis: Diagnosis) -> str:
         case "partly_explained":
             sure = "" if len(likely) == len(diagnosis.findings) else " with certainty"
             return f"{explain} part of what the model missed; the rest is not identified{sure} yet."
+        case "unexplained" if diagnosis.unknown_torques:
+            where = listed([u.joint for u in diagnosis.unknown_torques])
+            return f"A torque at {where} that no known effect describes explains at least part of what the model missed."
         case "unexplained":
             return "The recordings differ from the model, and no effect that the workbench knows explains how."
 

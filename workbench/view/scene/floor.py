@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, Rgba
 
+from workbench.types import Array
 from workbench.view.scene.keyframes import kept_keys
 
-Array = NDArray[np.float64]
 GRID = 0.05
 """Spacing of the lines on the floor [m]; every tenth is darker."""
 

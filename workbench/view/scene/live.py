@@ -14,11 +14,12 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from workbench.compare.compare_session import roll_out, run_of
 from workbench.compare.session import Session
-from workbench.compare.session_takes import Progress, no_progress, read_takes, register_takes
+from workbench.compare.session_takes import read_takes, register_takes
 from workbench.files import InputError
 from workbench.recording.take import Take
 from workbench.robot import RobotModel
 from workbench.simulation import SimulationConfig
+from workbench.types import Progress, no_progress
 from workbench.view.playback import Playback, common_span, play
 from workbench.view.shapes import RobotShapes, robot_shapes
 

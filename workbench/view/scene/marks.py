@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, Rgba, Sphere
 from pydrake.math import RigidTransform
 
 from workbench.compare.channels import BODY, joint_of
 from workbench.robot.model import RobotModel
+from workbench.types import Array
 from workbench.view.figures.heat import BIN, cells, colours, shares
 from workbench.view.playback import Playback
 from workbench.view.scene.keyframes import kept_keys
 
-Array = NDArray[np.float64]
 PATH, TILT = "path", "tilt"
 """Of the body: where it goes and turns to, shown on the floor under it; how it leans and sinks, shown at the base."""
 LARGEST, SMALLEST = 0.085, 0.3

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from workbench.files.reading import write_whole
 from workbench.recording.take import Take
 from workbench.robot.model import GRAVITY, RobotModel
+from workbench.types import Array
 from workbench.view.figures.style import ACCENT, RECORDED, SIMULATED, rgb
 from workbench.view.playback import Playback, common_span, names_of, play, since_start
 from workbench.view.scene.floor import GRID, add_grid, ribbon
@@ -24,8 +25,6 @@ from workbench.view.scene.keyframes import kept_keys
 from workbench.view.scene.marks import Errors, Marker
 from workbench.view.scene.overlay import LIBRARY, Copy, Legend, with_overlay
 from workbench.view.shapes import RobotShapes, VisualShape, robot_shapes
-
-Array = NDArray[np.float64]
 
 FRAME_RATE = 30.0
 MAX_FRAMES = 900

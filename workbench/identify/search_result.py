@@ -1,4 +1,4 @@
-"""What a search of either kind hands over: its model, and what it has to say of it. The rest of a diagnosis asks no more."""
+"""The interface of both searches: the problem they are given, and the result that the rest of a diagnosis uses."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from workbench.types import Progress
+
 if TYPE_CHECKING:
-    from workbench.compare.session_takes import Progress
     from workbench.identify.conclusions import ReadOff, Residuals
     from workbench.identify.estimators.dropped_again import TakesAsPlayed
     from workbench.identify.estimators.dropped_commands import DroppedCommands
@@ -15,16 +16,18 @@ if TYPE_CHECKING:
     from workbench.identify.parameters import Candidate
     from workbench.identify.problem import TakeEvidence
     from workbench.identify.results.findings import Finding, Recalibrated, Rejected, Unexplained
+    from workbench.identify.results.tied_names import GravityOverTorque
     from workbench.identify.results.ties import Tie
+    from workbench.identify.results.unknown_torque import UnknownTorque
     from workbench.identify.rollouts.evaluator import RolloutEvaluator
     from workbench.robot import Posterior, RobotModel
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be explained. nominal: the robot with what was read off; residuals: what it leaves, by take; pool: effects that
-    may act; played: commands that never arrived, which a search may read again; thorough: without a limit of work; options: of a
-    search of servo logs."""
+    """The problem for a search. nominal: the robot with the direct estimates; residuals: its residuals, by take; pool: effects
+    that may act; played: commands that never arrived, which a search may estimate again; thorough: without a limit of work;
+    options: of a search of servo logs."""
 
     evaluator: RolloutEvaluator
     nominal: RobotModel
@@ -36,12 +39,12 @@ class Problem:
     options: EvidenceOptions
 
 
-class Explained(Protocol):
-    """What a search found."""
+class SearchResult(Protocol):
+    """Result of a search."""
 
     @property
     def model(self) -> RobotModel:
-        """The robot with the effects that were found, beside the commands that never arrived."""
+        """The robot with the effects that were found, in addition to the commands that never arrived."""
 
     @property
     def calibrated(self) -> RobotModel:
@@ -63,6 +66,10 @@ class Explained(Protocol):
     def recalibrated(self) -> tuple[Recalibrated, ...]:
         """Numbers of the nominal law that are used otherwise."""
 
+    @property
+    def tied(self) -> tuple[GravityOverTorque, ...]:
+        """What angles tell as one number, with all effects that could be it."""
+
     def takes_of(self, evaluator: RolloutEvaluator) -> RolloutEvaluator:
         """Whole takes with their commands as the search read them."""
 
@@ -72,8 +79,11 @@ class Explained(Protocol):
     def findings(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[Finding, ...]:
         """The model's effects. before, after: residuals of the nominal model and of this one."""
 
+    def unknown_torques(self, evidence: Sequence[TakeEvidence], before: Residuals, after: Residuals) -> tuple[UnknownTorque, ...]:
+        """Torques in the model that no effect describes; before, after as in `findings`."""
+
     def unexplained(self, evidence: Sequence[TakeEvidence], after: Residuals, floors: Residuals) -> tuple[Unexplained, ...]:
-        """What is beyond noise and numerics, and what casts doubt on what was fitted."""
+        """Residuals beyond noise and numerical error, and doubts about the fitted effects."""
 
     def is_slight(self) -> bool:
         """Whether all that shows on frames that were searched is too little for a name."""
@@ -82,7 +92,7 @@ class Explained(Protocol):
         """Effects that were tried and are not in the model, and why."""
 
     def posterior(self, read_off: Sequence[ReadOff]) -> Posterior:
-        """Of all numbers of the model's effects; read_off: those that no search identified."""
+        """Joint posterior of the model's effects; read_off: those that were estimated directly."""
 
     def ties(self) -> tuple[Tie, ...]:
         """Findings and their rivals that are worth an experiment."""

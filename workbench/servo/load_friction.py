@@ -5,19 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.servo.law import ServoLaw
 from workbench.servo.terms import Instant, ServoTerm, TermNumbers
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 MOST_LOAD = 2.0
 """Of the torque at full duty: beyond it friction grows no further, as the solver needs a bound."""
 
 
 @dataclass(frozen=True)
-class Rubbing(ServoTerm):
+class LoadFrictionTerm(ServoTerm):
     """Shares of the load (n,): coefficient always, static more at rest, which fades as exp(-(w / speed)^2), speed [rad/s],
     backdrive more where the load drives the motor."""
 
@@ -40,11 +38,3 @@ class Rubbing(ServoTerm):
         """All of it."""
         return TermNumbers(rubbing=self.coefficient, rubbing_still=self.static, rubbing_speed=self.speed,
                            rubbing_backwards=self.backdrive)
-
-
-def nominal_terms(law: ServoLaw) -> tuple[ServoTerm, ...]:
-    """What servos do by the nominal law beyond motor, Coulomb and viscous friction: none, or load friction."""
-    if not law.load_friction.any():
-        return ()
-    none = np.zeros_like(law.load_friction)
-    return (Rubbing(law.load_friction, none, 1.0, none),)

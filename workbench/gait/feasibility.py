@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from workbench.dynamics import RobotTrajectory
 from workbench.files import InputError
@@ -16,8 +15,7 @@ from workbench.gait.request import Request
 from workbench.gait.shape import KNEES, GaitShape
 from workbench.gait.space import in_range, random_shape, space_of
 from workbench.gait.table import paths_of
-
-Array = NDArray[np.float64]
+from workbench.types import Array
 
 STANDING = "RMS torque of standing still"
 WITHOUT_NEAREST = ("slope", STANDING)
@@ -50,8 +48,8 @@ def out_of_reach(machine: GaitMachine, request: Request) -> Margin | None:
 def _foot_speed(machine: GaitMachine, request: Request) -> Margin | None:
     if request.speed is None:
         return None
-    law = machine.law
-    legs = {leg.foot: max(float(law.full_torque[i] / law.back_emf[i]) for i in map(machine.model.joints.index, leg.joints))
+    no_load = machine.law.line.no_load_speed
+    legs = {leg.foot: max(float(no_load[i]) for i in map(machine.model.joints.index, leg.joints))
             for leg in machine.legs}
     fastest = min(2 * legs[leg.foot] * leg.length for leg in machine.legs)  # two joints of a leg that add up
     if request.way == "turn":

@@ -1,0 +1,75 @@
+"""Gravity over torque: one number, with the size of each effect that would explain it alone."""
+
+import json
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from tests.evidence.linear import JOINT, Linear, candidate, region
+from workbench.identify.evidence.fit import fitting
+from workbench.identify.evidence.hypothesis import Uncertain, start
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.posterior import posterior_of
+from workbench.identify.evidence.search import lockstep
+from workbench.identify.evidence.tied_names import gravity_over_torque, names_of_tie, ratio_of
+
+OPTIONS = EvidenceOptions()
+SHIFT = 0.04
+"""Change of the logarithm of torque that one typical size of either effect equals."""
+
+
+@dataclass(frozen=True)
+class Scaled(Linear):
+    """A number does as much as it changes, however well it is known."""
+
+    def left(self, h):
+        scaled = replace(h, theta=np.concatenate([[n.sd * z for n, z in zip(h.numbers, h.z)], h.theta[len(h.numbers):]]))
+        return super().left(scaled)
+
+
+def found(log_ratio, sd, options=OPTIONS):
+    """A rig with this ratio of gravity to torque, whose torque is known to sd: its region, its plain fit, and fits of the tie."""
+    names = [candidate(name) for name in ("ground_tilt", "parallel_spring", "backlash")]
+    here = replace(region(names), numbers=(Uncertain(JOINT, "torque_at_full_duty", sd),))
+    rng = np.random.default_rng(3)
+    torque, play = rng.normal(size=(2, 1600)) * 0.1
+    does = {"torque_at_full_duty": torque, "backlash.gap": play}
+    does |= {f"{c.name}.{c.parameters[0].name}": -SHIFT * torque for c in names[:2]}
+    truth = -log_ratio * torque + 1e-3 * rng.normal(size=1600)
+    rig = Scaled(None, None, (here,), (start(here.numbers),), None, None, truth=truth, does=does)
+    fit = lockstep(rig, {0: fitting(here, options, start(here.numbers), 0.1, 2 * options.iterations)})[0]
+    fits = lockstep(rig, {0: names_of_tie(here, options, fit)})[0]
+    return here, fit, fits
+
+
+def test_a_motor_stronger_than_its_data_sheet_is_reported_as_a_ratio_with_all_names():
+    here, fit, fits = found(math.log(0.6), 0.5)
+    ratio = ratio_of(here, OPTIONS, fit)
+    assert math.exp(ratio.log) == pytest.approx(0.6, rel=0.01)
+    tied = gravity_over_torque(here, OPTIONS, posterior_of([fit], OPTIONS), fits)
+    assert tied.confidence == 0.0
+    assert "ground_tilt" in {n.effect for n in tied.names}
+    sizes = {g.hypothesis.effects[0].name: g.hypothesis.sizes()[0][1][0] for g in fits}
+    assert sizes["ground_tilt"] == pytest.approx(math.log(0.6) / SHIFT, rel=0.3)
+    said = json.dumps(tied.to_json())
+    assert "times that of the files" in said
+    assert "`load:`" in said
+    assert "`--model`" in said
+
+
+def test_variation_between_days_is_not_reported():
+    assert found(0.05, 0.5)[2] == []
+
+
+def test_beside_an_earlier_diagnosis_the_change_is_the_ratio():
+    since = EvidenceOptions(drift=SinceThen())
+    here, fit, fits = found(math.log(1.3), 0.06, since)
+    best = max(fits, key=lambda g: g.log_posterior)
+    said = gravity_over_torque(here, since, posterior_of([fit, *fits], since), fits)
+    assert said.ratio.value == pytest.approx(1.3, rel=0.02)
+    assert said.ratio.low < 1.3 < said.ratio.high
+    assert said.confidence > 0.8
+    assert best.log_posterior > fit.log_posterior
+    assert "--model" not in said.said()

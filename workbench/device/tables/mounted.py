@@ -1,0 +1,36 @@
+"""Pose tables in the servos' own counts, where a servo does not have its joint's angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from workbench.motion import PoseTable
+from workbench.robot.mounting import Mounting
+
+
+def zeros(table: PoseTable, mountings: Mapping[str, Mounting]) -> list[int]:
+    """Count at which each joint of the table is at zero."""
+    out = []
+    for joint, units in zip(table.joints, table.units):
+        m = mountings.get(joint, Mounting())
+        out.append(round(m.zero) if m.zero is not None else units.centre + round(m.offset / units.count))
+    return out
+
+
+def in_servo_counts(table: PoseTable, mountings: Mapping[str, Mounting]) -> PoseTable:
+    """The table with the goals as the servos' registers hold them; InputError names pose and joint of one that does not fit."""
+    if not mountings:
+        return table
+    signs = np.array([mountings.get(joint, Mounting()).direction for joint in table.joints])
+    centres = np.array([units.centre for units in table.units])
+    return replace(table, goals=np.array(zeros(table, mountings)) + signs * (table.goals - centres))
+
+
+def in_joint_counts(table: PoseTable, mountings: Mapping[str, Mounting]) -> PoseTable:
+    """The inverse of `in_servo_counts`."""
+    signs = np.array([mountings.get(joint, Mounting()).direction for joint in table.joints])
+    centres = np.array([units.centre for units in table.units])
+    return replace(table, goals=centres + signs * (table.goals - np.array(zeros(table, mountings))))

@@ -1,0 +1,107 @@
+"""Gravity over torque as one number, and the size of each effect that would explain it alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from workbench.identify.conclusions import estimates
+from workbench.identify.evidence.fit import Asks, Fitted, fitting, side_by_side
+from workbench.identify.evidence.hypothesis import Hypothesis, Uncertain
+from workbench.identify.evidence.linearise import linearised
+from workbench.identify.evidence.nuisance import mixing
+from workbench.identify.evidence.options import EvidenceOptions, SinceThen
+from workbench.identify.evidence.plausible import at_their_end
+from workbench.identify.evidence.posterior import RegionPosterior
+from workbench.identify.evidence.region import Region
+from workbench.identify.evidence.tied import GRAVITY, TORQUES, all_torques, as_torque
+from workbench.identify.options import CONCLUSIONS
+from workbench.identify.results.findings import Estimate
+from workbench.identify.results.tied_names import GravityOverTorque, TiedName
+
+SCALE = "torque_at_full_duty"
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Logarithm of gravity over torque, in times the nominal one, with its standard deviation."""
+
+    log: float
+    sd: float
+
+    def is_apart(self, options: EvidenceOptions) -> bool:
+        """Whether it differs from one by more than its error and the variation of a servo's torque between days."""
+        between_days = (options.drift or SinceThen()).torque
+        return abs(self.log) > options.apart * math.hypot(self.sd, between_days)
+
+    def estimate(self) -> Estimate:
+        """With its 90 % interval."""
+        half = CONCLUSIONS.z90 * CONCLUSIONS.wider * self.sd
+        return Estimate(math.exp(self.log), math.exp(self.log - half), math.exp(self.log + half), "1")
+
+
+def ratio_of(region: Region, options: EvidenceOptions, f: Fitted) -> Ratio | None:
+    """Of a fit: the torque that it recalibrated, and its effects that do what torques do; None where no torque is uncertain."""
+    h = f.hypothesis
+    scale = [k for k, n in enumerate(h.numbers) if n.name == SCALE]
+    if not scale:
+        return None
+    slope = np.zeros(len(h.theta))
+    slope[:len(h.numbers)] = -mixing(h.numbers)[scale[0]]
+    log = float(slope @ h.theta)
+    for c, own in zip(h.effects, h.slices()):
+        tie, x = as_torque(region, options, f, c), h.theta[own]
+        if tie is not None:
+            log -= tie.by
+            slope[own] = -tie.by * x / float(x @ x)
+    return Ratio(log, math.sqrt(max(0.0, float(slope @ f.covariance(region, options) @ slope))))
+
+
+def names_of_tie(region: Region, options: EvidenceOptions, f: Fitted) -> Asks[list[Fitted]]:
+    """Fits of each effect of the tie alone, with the servo's torques at their nominal values but for their variation between
+    days; the likeliest first. Empty where gravity over torque is nominal."""
+    ratio = ratio_of(region, options, f)
+    members = tuple(c for c in region.candidates if c.effect.tied == GRAVITY)
+    if ratio is None or not members or not ratio.is_apart(options):
+        return []
+    told = replace(region, numbers=tuple(as_told(region.numbers, options)), candidates=members)
+    rest = [(c, x) for c, x in f.hypothesis.sizes() if c.effect.tied != GRAVITY]
+    without = Hypothesis(told.numbers, tuple(c for c, _ in rest), np.concatenate([0.0 * f.hypothesis.z, *(x for _, x in rest)]))
+    bare = yield from fitting(told, options, without, f.discrepancy, options.iterations)
+    moves = yield from linearised(told, options, bare)
+    fits = yield from side_by_side([fitting(told, options, m.hypothesis, f.discrepancy, options.iterations) for m in moves])
+    within = [g for g in fits if not at_their_end(g.hypothesis, members) and np.any(g.hypothesis.sizes()[-1][1])]
+    return sorted(within, key=lambda g: -g.log_evidence)
+
+
+def as_told(numbers: Sequence[Uncertain], options: EvidenceOptions) -> list[Uncertain]:
+    """The numbers with torques that may vary no more than between days, so that an effect has to explain the rest."""
+    drift = options.drift or SinceThen()
+    more = all_torques(numbers)
+    if any(n.others for n in numbers) or not more.any():
+        return list(numbers)  # an earlier diagnosis knew them together
+    return [replace(n, sd=min(n.sd, drift.of(n.name))) if n.name in TORQUES else n for n in numbers]
+
+
+def gravity_over_torque(region: Region, options: EvidenceOptions, p: RegionPosterior, fits: Sequence[Fitted]
+                        ) -> GravityOverTorque | None:
+    """The tie as it is reported; None where gravity over torque is nominal. fits: of `names_of_tie`."""
+    ratio = ratio_of(region, options, p.best)
+    if ratio is None or not fits:
+        return None
+    names = []
+    for g in fits:
+        c, x = g.hypothesis.sizes()[-1]
+        own, tie = g.hypothesis.slices()[-1], as_torque(region, options, g, c)
+        formal = g.covariance(region, options)[own, own]
+        covariance = formal if tie is None else tie.covariance(formal, x)
+        names.append(TiedName(c.name, c.where, estimates(c, x, covariance), c.effect.sentence(c.spec(x)),
+                              fits[0].log_evidence - g.log_evidence))
+    ties = [as_torque(region, options, p.best, c) for c in p.best.hypothesis.effects]
+    share = min((t.share for t in ties if t is not None), default=1.0)
+    there = sum(w for f, w in p.weights if any(c.effect.tied == GRAVITY for c in f.hypothesis.effects))
+    return GravityOverTorque(region.joints, ratio.estimate(), min(1.0, CONCLUSIONS.surest * share * there), tuple(names),
+                             options.drift is not None)

@@ -1,0 +1,28 @@
+"""Constants of the servo law that a diagnosis adjusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Recalibrated:
+    """A constant of the servo law (its key in servo.yaml) that was adjusted, as far as its `sd` allows: no finding."""
+
+    number: str
+    where: tuple[str, ...]
+    nominal: float
+    value: float
+    sd: float
+    unit: str
+
+    @property
+    def sigmas(self) -> float:
+        """By how many standard deviations it was adjusted."""
+        return (self.value - self.nominal) / self.sd
+
+    def to_json(self) -> dict[str, Any]:
+        """As findings.json has it."""
+        return {"number": self.number, "where": list(self.where), "nominal": self.nominal, "value": self.value, "sd": self.sd,
+                "unit": self.unit}

@@ -1,0 +1,74 @@
+"""Joints that do not do what their goals ask: that never follow, that end at one value, or that stand off by a constant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from workbench.recording.servo_log.following import JointLog
+from workbench.recording.servo_log.response import Response, fitted, shapes
+
+
+@dataclass(frozen=True)
+class HeldBackChecks:
+    """goes: a goal that moves less tells nothing [deg]. follows: a joint whose goals give less of its variance, or that moves
+    over less than `moves` of their range, does not follow them. piles: share of the rows at which a joint stands at its
+    extreme reading, to the last digit, while its goals ask for `beyond` more [deg]; `visits`: so many times at least, each over
+    `rows` rows. off: a constant distance from the goals [deg], of a joint that follows them with a gain within `alike` of 1, to
+    `explained` of its variance, and with a residual of at most `share` of that distance."""
+
+    goes: float = 5.0
+    follows: float = 0.3
+    moves: float = 0.15
+    piles: float = 0.04
+    beyond: float = 6.0
+    visits: int = 3
+    rows: int = 3
+    off: float = 12.0
+    alike: float = 0.15
+    explained: float = 0.95
+    share: float = 0.25
+
+
+HELD_BACK = HeldBackChecks()
+
+
+def held_back(log: JointLog, c: HeldBackChecks = HELD_BACK) -> Iterator[str]:
+    """A line for what keeps a joint from its goals in the whole log, without the channel's name."""
+    if np.rad2deg(np.ptp(log.goal)) < c.goes:
+        return
+    shaped = shapes(log.time, log.goal)
+    fit = fitted(shaped, log.position)
+    asked, seen = np.rad2deg(np.ptp(log.goal)), np.rad2deg(np.ptp(log.position))
+    if seen < c.moves * asked and fit.explained < c.follows:
+        yield (f"does not follow goal.{log.name}: it moves over {seen:.3g} deg where the goal moves over {asked:.3g} deg: torque "
+               "off, a gain of 0, a servo or horn that came loose, or another joint's column?")
+        return
+    yield from _ends(log, fit, c)
+    if fit.explained < c.explained or abs(fit.gain - 1) > c.alike:
+        return
+    yield from _stands_off(log, fit, c)
+
+
+def _ends(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:
+    for sign, which in ((1, "above"), (-1, "below")):
+        value = float(np.max(sign * log.position)) * sign
+        there = log.position == value
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int))).reshape(-1, 2)
+        visits = [(a, b) for a, b in edges if b - a >= c.rows
+                  and np.rad2deg(np.max(sign * (log.goal[a:b] - value))) > c.beyond]
+        rows = sum(b - a for a, b in visits)
+        if len(visits) >= c.visits and rows > c.piles * len(there):
+            most = np.rad2deg(max(float(np.max(sign * log.goal[a:b])) for a, b in visits)) * sign
+            yield (f"is never {which} {np.rad2deg(value):.4g} deg, where it stands to the last digit {len(visits)} times while "
+                   f"the goal goes on to {most:.4g} deg: a stop, or a sensor or register that is cut off there?")
+
+
+def _stands_off(log: JointLog, fit: Response, c: HeldBackChecks) -> Iterator[str]:
+    away = np.rad2deg(log.position - (fit.predicted - fit.offset) / fit.gain)
+    middle = float(np.median(away))
+    if abs(middle) > c.off and np.rad2deg(fit.spread) < c.share * abs(middle):
+        yield (f"stands {middle:+.1f} deg from goal.{log.name} all the time, though it follows it: are their zeros the same (a "
+               "homing offset, a horn turned by a tooth)?")

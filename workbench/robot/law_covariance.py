@@ -1,0 +1,75 @@
+"""Covariance of the numbers of a servo's law, as an earlier diagnosis estimated it and servo.yaml and model.yaml keep it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from workbench.files import InputError
+from workbench.types import Array
+
+
+@dataclass(frozen=True)
+class LawCovariance:
+    """names (n): keys of servo.yaml, "torque_at_full_duty", "back_emf" and "zero". rows (n, n): covariance of their natural
+    logarithms, of "zero" in rad. InputError where it is no covariance."""
+
+    names: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        n = len(self.names)
+        if len(set(self.names)) != n:
+            raise InputError(None, "covariance: expected each name once")
+        if len(self.rows) != n or any(len(row) != n for row in self.rows):
+            raise InputError(None, f"covariance: expected {n} rows of {n} numbers, as there are {n} names")
+        C = self.matrix
+        scale = float(np.max(np.diag(C), initial=0.0))
+        if not np.isfinite(C).all() or not np.allclose(C, C.T, atol=1e-9 * scale):
+            raise InputError(None, "covariance: expected finite numbers, the same across the diagonal")
+        if n and float(np.linalg.eigvalsh(C)[0]) < -1e-9 * scale:
+            raise InputError(None, "covariance: expected no negative variance in any direction")
+
+    @property
+    def matrix(self) -> Array:
+        """The rows as an array (n, n)."""
+        return np.array(self.rows, dtype=float).reshape(len(self.names), len(self.names))
+
+    @classmethod
+    def of(cls, names: Sequence[str], matrix: Array) -> LawCovariance:
+        """From an array (n, n)."""
+        return cls(tuple(names), tuple(tuple(float(v) for v in row) for row in 0.5 * (matrix + matrix.T)))
+
+    def among(self, names: Sequence[str]) -> Array:
+        """The covariance (n, n) of these numbers, zero where a name is not known."""
+        at = {name: k for k, name in enumerate(self.names)}
+        out, known = np.zeros((len(names), len(names))), [k for k, name in enumerate(names) if name in at]
+        there = [at[names[k]] for k in known]
+        out[np.ix_(known, known)] = self.matrix[np.ix_(there, there)]
+        return out
+
+    def written(self) -> dict[str, Any]:
+        """As a file has it."""
+        return {"names": list(self.names), "rows": [list(row) for row in self.rows]}
+
+
+def law_covariance(content: Any, path: Path, at: str, known: Sequence[str]) -> LawCovariance:
+    """Reads it from a file. at: its place there, for messages; known: possible names. InputError names file, place and the
+    expected form."""
+    if not isinstance(content, Mapping) or set(content) != {"names", "rows"}:
+        raise InputError(path, f"{at}expected {{names: [...], rows: [[...], ...]}}")
+    names, rows = content["names"], content["rows"]
+    if not isinstance(names, list) or any(name not in known for name in names):
+        raise InputError(path, f"{at}names: expected a list of {', '.join(known)}")
+    numbers = isinstance(rows, list) and all(isinstance(row, list) and all(
+        isinstance(v, (int, float)) and not isinstance(v, bool) for v in row) for row in rows)
+    if not numbers:
+        raise InputError(path, f"{at}rows: expected lists of numbers")
+    try:
+        return LawCovariance(tuple(names), tuple(tuple(float(v) for v in row) for row in rows))
+    except InputError as e:
+        raise InputError(path, f"{at}{e}") from None

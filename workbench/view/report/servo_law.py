@@ -1,0 +1,44 @@
+"""The parts of a diagnosis's page about the servo law: constants that were adjusted, and torques that no effect describes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from workbench.identify.results.recalibrated import Recalibrated
+from workbench.identify.results.tied_names import GravityOverTorque
+from workbench.identify.results.unknown_torque import UnknownTorque
+from workbench.view.figures.unknown_torque import unknown_torque
+from workbench.view.report.page import Part, Picture, Section, Table, Text
+from workbench.view.report.tables import folded
+from workbench.view.report.words import capital, change, listed, probable, title_of, unbroken
+
+
+def unknown_torque_section(unknown: UnknownTorque) -> Section:
+    """Its probability, size and errors, with its plot."""
+    rows = [["probability", probable(unknown.confidence)], ["RMS over the recorded motion", f"{1e3 * unknown.rms:.2g} mN m"],
+            ["error where it was fitted", change(unknown.fit)], ["error on unseen stretches", change(unknown.validation)]]
+    parts: list[Part] = [
+        Text(capital(unknown.evidence)),
+        Text("It is repeatable: the same function serves all takes. model.yaml holds it as a table, so simulations and gaits "
+             "include it. A known cause would have to produce this curve."),
+        Table(["", "value"], rows),
+        Picture(unknown_torque(unknown), f"The torque at {unknown.joint} that the recordings ask for, with 90 % bounds.")]
+    return Section(f"Unknown torque at {unknown.joint}", parts)
+
+
+def tied_section(ties: Sequence[GravityOverTorque]) -> Section:
+    """Gravity over torque, and each effect that would explain it alone."""
+    rows = [[title_of(n.effect, n.where), n.sentence, f"{n.behind:.0f}"] for t in ties for n in t.names]
+    return Section("What angles do not tell apart", [*(Text(t.said()) for t in ties), *folded(
+        ["effect", "size, if it is this alone", "less likely by [nats]"], rows, "more names")])
+
+
+def recalibrated_section(numbers: Sequence[Recalibrated]) -> Section:
+    """Adjusted constants of the nominal law."""
+    shown = [(r, *(("deg", math.degrees(1.0)) if r.unit == "rad" else (r.unit, 1.0))) for r in numbers]
+    rows = [[r.number.replace("_", " "), listed(r.where), f"{scale * r.nominal:.4g}", f"{scale * r.value:.4g}", unbroken(unit),
+             f"{r.sigmas:+.1f}"] for r, unit, scale in shown]
+    said = "Within the tolerance of your servo file these constants were adjusted; that is not counted as a finding."
+    return Section("Recalibrated constants", [Text(said), *folded(
+        ["number", "where", "nominal", "used", "unit", "standard deviations"], rows, "more numbers")])
